@@ -1,7 +1,8 @@
 """Tuning numbers of a room, each a named field of one frozen class, with its unit and the reason for its value.
 
-A room is a package such as `friso.hunting`. Its `settings.py` declares a class; its code reads the values in use
-with `current()`. Other values are given for a block of code, as NumPy's `errstate` and friso's `allowance` do:
+A room is a package such as `friso.hunting`. Its `settings.py` declares a class and an object, `search_settings =
+SearchSettings.live()`, whose fields are the values in use. Other values are given for a block of code, as NumPy's
+`errstate` and friso's `allowance` do:
 
     with SearchSettings(candidate_work=2.0).in_use():
         friso.check("stage.toml")
@@ -25,7 +26,7 @@ from functools import cache
 from importlib import import_module
 from itertools import pairwise
 from pkgutil import walk_packages
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, cast
 
 
 def setting(value: Any, unit: str) -> Any:
@@ -64,6 +65,11 @@ class Settings:
         """Return the settings in use: those of the innermost `in_use` block, or the default values."""
         return cls._in_use.get(None) or _defaults(cls)
 
+    @classmethod
+    def live(cls) -> Self:
+        """Return an object whose fields are those of the settings in use when they are read."""
+        return cast(Self, _Live(cls))
+
     @contextmanager
     def in_use(self) -> Iterator[Self]:
         """Use these settings in the block, and in threads that copy its context."""
@@ -94,6 +100,16 @@ class Settings:
             reason = " ".join(str(reasons[item.name]).split())
             rows.append(SettingRow(item.name, item.default, item.metadata["unit"], reason))
         return rows
+
+
+@dataclass(frozen=True)
+class _Live:
+    """The settings in use, read field by field."""
+
+    settings_class: type[Settings]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.settings_class.current(), name)
 
 
 @cache

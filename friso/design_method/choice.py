@@ -13,7 +13,7 @@ import numpy as np
 from friso.design_method.front import Candidate, evaluate_geometries
 from friso.design_method.geometry import Geometry, mechanisms, round_geometries, sizes_of
 from friso.design_method.requirements import LeafTask, Requirement, buckling_share, load_stress, requirements
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.leaf_springs.beams import BeamFailure, beams
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.joint import first_interfering
@@ -103,7 +103,6 @@ def _in_order(
     The softest come first. Each geometry comes with the factor by which it uses up every requirement, shape
     (requirements,), at most 1.
     """
-    settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover
     near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]
     sizes = list(
@@ -130,7 +129,6 @@ def confirmed(task: LeafTask, candidates: Sequence[Candidate]) -> Iterable[Confi
 
     Where the model finds no solution, the result holds the reason.
     """
-    settings = DesignSettings.current()
     for k in np.unique(np.linspace(0, len(candidates) - 1, settings.confirmed_candidates).astype(int)):
         candidate = candidates[k]
         try:

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.design_method.modal import Modal
 from friso.design_method.population import Population
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.frequency.ranges import Range, shared
 from friso.frequency.tuning import Tuning, tuning
@@ -37,7 +37,6 @@ class Damping:
 
         Index 0 is the stage's own damping.
         """
-        settings = DesignSettings.current()
         return int(np.flatnonzero(self.margins >= settings.enough_margin * self.margins.max())[0])
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from friso.design_method.population import Population
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.hunting import find_attractors
 from friso.progress import Progress, silent
@@ -67,7 +67,6 @@ def edges_over(
     The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts. It then halves the step
     above that point, for the machines that may have the highest edge of all. `label` names the search to the progress.
     """
-    settings = DesignSettings.current()
     corners = population.over({**flat, CROSSOVER: np.nan, "motion.kind": "release"})  # whatever the stage's motion
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
     inside, outside, unsure = np.full(count, -np.inf), np.full(count, np.inf), np.zeros((2, count), bool)
@@ -123,7 +122,6 @@ def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarra
 
     `which` are indices of corners, and `crossover` the logarithm of a crossover for each.
     """
-    settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
     attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)
     return attracted.attracts | ~attracted.decided, attracted.certain

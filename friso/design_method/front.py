@@ -13,7 +13,7 @@ from scipy.optimize import differential_evolution
 
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets
 from friso.design_method.requirements import PARASITIC, LeafTask, Requirement, requirements
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.joint import first_interfering
 
@@ -36,7 +36,6 @@ def front(task: LeafTask) -> list[Candidate]:
     The list is empty if no leaf springs meet the requirements. The requirement on the frequency of modes is left out,
     since the search raises this frequency.
     """
-    settings = DesignSettings.current()
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.operators.crossover.sbx import SBX
     from pymoo.operators.mutation.pm import PM
@@ -106,7 +105,6 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     The result has the logarithms of their sizes and the index of their sheet, shape (4,). Differential evolution
     searches for them.
     """
-    settings = DesignSettings.current()
     bought = sheets(task.spec)
 
     def objective(x: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.design_method.population import Population, typical_move
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.design_method.verification import move_machines
 from friso.equations.controllers.van_dijk import CROSSOVER
@@ -33,7 +33,6 @@ def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
 
     The drive stiffness is the design's own.
     """
-    settings = DesignSettings.current()
     flat = stage.flat()
     crossovers, strokes = (
         np.geomspace(low * flat[key], high * flat[key], count)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.equations.breakaway import least_breakaway
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
@@ -23,7 +23,6 @@ STEEL = 190e9
 
 def split(flat: Mapping[str, Any]) -> dict[str, float]:
     """Return the masses of cart and stage [kg]; a stage file with one mass has it divided."""
-    settings = DesignSettings.current()
     masses = {key: flat[key] for key in ("masses.cart", "masses.stage") if key in flat}
     if len(masses) == 2:
         return masses
@@ -37,7 +36,6 @@ def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stag
     The new joint has a stroke [m], and stops whose stiffness follows from Young's modulus `young` [Pa]. The controller
     stays tuned for the whole mass. Raises StageError if the result is not a valid stage.
     """
-    settings = DesignSettings.current()
     free = stage.variants().get("free")
     if free is not None:
         return free

@@ -18,7 +18,7 @@ from friso.design_method.front import evaluate_geometries
 from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms, moved_along, sheets
 from friso.design_method.outline import outline
 from friso.design_method.requirements import BREAKAWAY, PARASITIC, LeafTask, requirements
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.design_method.spec import read_spec
 from friso.equations.breakaway import least_breakaway
 from friso.errors import InputError
@@ -90,7 +90,6 @@ class _Search:
 
     def best(self) -> np.ndarray:
         """Return logarithms of the best length and spacing [m] and the index of the sheet, (3,)."""
-        settings = DesignSettings.current()
         ends = [*np.log([self.low[[0, 2]], self.high[[0, 2]]]).T, (0.0, len(self.bought) - 1e-9)]
         bounds = [(low, high + 1e-12 * (high == low)) for low, high in ends]
         minimum = differential_evolution(
@@ -111,7 +110,6 @@ class _Search:
         `bought` has the sheet of each row. Leaves that break a requirement cost more, the farther they break it. For
         other leaves, the cost falls as the frequency of the first mode that interferes with control rises.
         """
-        settings = DesignSettings.current()
         sizes = self.with_width(spans, bought)
         worst = self.broken(sizes, bought)
         frequency = np.minimum(first_interfering(mechanisms(self.task.flat, sizes, bought)), settings.highest_mode)
@@ -119,7 +117,6 @@ class _Search:
 
     def with_width(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
         """Return lengths, widths and spacings [m], (count, 3), of leaves of the required stiffness."""
-        settings = DesignSettings.current()
         sizes = np.insert(spans, 1, self.high[1], axis=1)
         for _ in range(settings.width_steps):
             built = mechanisms(self.task.flat, sizes, bought)
@@ -131,7 +128,6 @@ class _Search:
 
         The space for their width is one requirement. The result is 0 or less for leaves that break none.
         """
-        settings = DesignSettings.current()
         scores = evaluate_geometries(self.task, self.needs, sizes, bought)
         space = np.stack([self.low[1] / sizes[:, 1], sizes[:, 1] / self.high[1]], axis=1)
         worst = np.log(np.concatenate([scores.excess, space], axis=1)).max(axis=1)
@@ -143,7 +139,6 @@ class _Search:
         Only leaf springs that break no requirement are returned. First come those whose lowest mode that interferes
         with control has the highest frequency.
         """
-        settings = DesignSettings.current()
         sheet = self.bought[int(best[2])]
         near = [
             np.round(np.exp(size) / settings.size_step + side) * settings.size_step

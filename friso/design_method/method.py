@@ -28,7 +28,7 @@ from friso.design_method.population import Population, corners
 from friso.design_method.prepare import prepared, with_leaves
 from friso.design_method.relax import Relaxation, relaxed_requirements
 from friso.design_method.requirements import LeafTask
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
 from friso.engine.side_by_side import both
@@ -137,7 +137,6 @@ class Design:
         If more joint damping allows a higher crossover, it comes first. Moves that do not come to rest are reported by
         the verification itself.
         """
-        settings = DesignSettings.current()
         limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(settings.slow_share)
         if limit is None or settling <= limit or not np.isfinite(settling):
             return ()
@@ -148,7 +147,6 @@ class Design:
     @property
     def meets(self) -> bool:
         """Tell whether all moves come to rest, and settle in the time specified."""
-        settings = DesignSettings.current()
         limit, free = self.spec.position.settling_time, self.verification.free
         return not free.missed and (limit is None or free.slower_than(settings.slow_share) <= limit)
 
@@ -217,7 +215,6 @@ def design(
     NoDesign if nothing meets the specification, and DesignInterrupted at Ctrl-C. Raises NotNeeded if no isolator is
     needed, unless one is wanted `anyway`.
     """
-    settings = DesignSettings.current()
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
     friction = float(np.min(least_breakaway(population.over(flat))))
@@ -289,7 +286,6 @@ def _by_law(
 
     Crossovers from `low` to `high` [Hz] are searched.
     """
-    settings = DesignSettings.current()
     edges = {}
     for law, friction in laws.items():
         there = under_law(flat, friction) if friction else flat
@@ -306,7 +302,6 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     high already, or if no damping tried helps. The second result is then the highest crossover that specification and
     leaf springs allow.
     """
-    settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec
     target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
     if flat[CROSSOVER] >= settings.accepted_crossover * target:
@@ -327,7 +322,6 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
     The task that the front solves comes first. `friction` [N] is the least static friction. Raises NoDesign if no leaf
     springs meet the requirements.
     """
-    settings = DesignSettings.current()
     stroke, choices = spec.leaves.stroke, []
     several = stroke.high > stroke.low
     strokes = np.geomspace(stroke.high, stroke.low, settings.tried_strokes).tolist() if several else [stroke.high]
@@ -359,7 +353,6 @@ def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], populat
 
     The two are adapted to each other in rounds. Raises NoDesign if none of the `candidates` fits.
     """
-    settings = DesignSettings.current()
     target = min(task.spec.limit, allowed_crossover(task, candidates))
     for _ in range(settings.design_rounds):
         task = replace(task, crossover=target)

@@ -17,7 +17,7 @@ from friso.frequency.drive import DriveTiming
 from friso.frequency.family import controller_response, distance_to_lines, frequency_grid, plants, stability_by_poles
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range, ranges_below
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.leaf_springs.evaluation import Evaluation
 
 AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
@@ -73,7 +73,6 @@ class Modal:
     @property
     def comfortable(self) -> tuple[Range, ...]:
         """Return the crossovers [Hz] with a modulus margin of at least 0.5."""
-        settings = FrequencySettings.current()
         return ranges_below(
             np.geomspace(*searched_crossovers(self.flat), settings.crossover_steps), lambda at: WANTED - self.margin(at)
         )
@@ -101,7 +100,6 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
     """Return angular frequencies that show the loop at all crossovers, and every mode."""
-    settings = FrequencySettings.current()
     ends = [
         frequency_grid(faster(flat, np.array(end / bandwidth(flat))), settings.search_density)
         for end in searched_crossovers(flat)

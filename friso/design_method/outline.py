@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from friso.design_method.prepare import by_rules, check_designable
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.equations.motion import size
 from friso.quantities import as_toml, percent
@@ -30,7 +30,6 @@ def outline(stage: Stage) -> str:
     assumed. Moves go up to the travel, and sheets are spring steel in usual gauges. Raises InputError for a stage that
     `friso design` cannot design for.
     """
-    settings = DesignSettings.current()
     check_designable(stage)
     flat = stage.flat()
     limit = f"{by_rules(stage).flat()[CROSSOVER]:.4g}"

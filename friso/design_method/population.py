@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.errors import InputError
 from friso.intervals import Interval
@@ -42,7 +42,6 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
     with masses that are all light or all heavy. All other friction is at its ends together, but viscous friction at the
     opposite end, because it damps. Raises InputError if friction never falls.
     """
-    settings = DesignSettings.current()
     friction, masses = _friction(spec, flat), _masses(spec)
     main = [name for name in ("static", "coulomb", "gap") if name in friction]
     rest = [name for name in friction if name not in main]
@@ -79,7 +78,6 @@ def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: 
     Friction, masses and stiffness are uniform; travel and acceleration are uniform in the logarithm. Stiffness varies
     by its tolerance; its low end is also reduced by `softening`, the fraction that the load may take away.
     """
-    settings = DesignSettings.current()
     ranges = _friction(spec, flat) | _masses(spec)
     names = [*ranges, "stiffness", "travel", "acceleration"]
     sequence = qmc.Sobol(len(names), rng=settings.population_seed).random_base2(int(np.ceil(np.log2(count))))[:count]
@@ -103,7 +101,6 @@ def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str
 
     `travel` and `acceleration` are these fractions, on a logarithmic scale.
     """
-    settings = DesignSettings.current()
     distance, rate = (
         interval.low * (interval.high / interval.low) ** share
         for interval, share in ((spec.moves.travel, travel), (spec.moves.acceleration, acceleration))

@@ -14,7 +14,7 @@ from scipy.optimize import differential_evolution
 
 from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms
 from friso.design_method.requirements import LeafTask, Requirement, less, more, requirements
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.leaf_springs.mechanism import Mechanism
 
 
@@ -103,7 +103,6 @@ class _Trials:
     @property
     def bounds(self) -> list[tuple[float, float]]:
         """Return the bounds of each variable, somewhat beyond the space allowed."""
-        settings = DesignSettings.current()
         low, high = box(self.task.spec)
         ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(
             settings.relaxed_beyond
@@ -121,7 +120,6 @@ class _Trials:
 
 def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
     """Yield the least changes of keys that relax requirement `k` so that all others can be met."""
-    settings = DesignSettings.current()
     of_sheets = np.array([requirement.keys[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))
     spare = np.where(of_sheets, 0.0, settings.relaxed_reserve)  # sizes of sheets are met exactly

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.joint import first_interfering
@@ -96,7 +96,6 @@ BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first 
 
 def requirements(task: LeafTask) -> list[Requirement]:
     """Return all requirements except those on space and sheets."""
-    settings = DesignSettings.current()
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
     shorter = less("leaves.stroke", stroke, "m")
     stiffest = safety.breakaway * (1 + safety.stiffness_tolerance)

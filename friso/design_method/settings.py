@@ -176,3 +176,6 @@ class DesignSettings(Settings):
 
     runs_per_report: int = setting(512, "")
     """Runs between progress reports, about a second."""
+
+
+settings = DesignSettings.live()

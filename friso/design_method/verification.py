@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from friso.design_method.population import Population, random_machines
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.engine.settings import RoomSettings
+from friso.engine.settings import room_settings
 from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
@@ -94,7 +94,6 @@ class MachineOutcomes:
 
     def followed(self, number: int) -> float:
         """Return for how long [s] the machine with this number was simulated after its move."""
-        settings = DesignSettings.current()
         soon = self.settling[number] <= (1 - settings.last_share) * settings.followed_time
         return settings.followed_time if soon else settings.longer_factor * settings.followed_time
 
@@ -132,7 +131,6 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Progress)
 
     The load reduces the drive stiffness by up to the fraction `softening`.
     """
-    settings = DesignSettings.current()
     flat = stage.flat()
     machines = random_machines(spec, flat, settings.verified_moves, softening)
     window = float(spec.position.window)
@@ -159,7 +157,6 @@ def move_machines(
 
     If `patient`, machines that are not in position are simulated again for longer. `window` is the position window [m].
     """
-    settings = DesignSettings.current()
     first = _followed_moves(flat, count, window, settings.followed_time, progress, label)
     again = np.flatnonzero(first.restless & patient)
     if again.size:
@@ -185,7 +182,6 @@ def _followed_moves(
 
     `window` is the position window [m]; `label` names the work to the progress.
     """
-    settings = DesignSettings.current()
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
     options = RunOptions(
@@ -194,7 +190,7 @@ def _followed_moves(
         window=1 - settings.last_share,
         record_from=np.inf,
         least_swing=window / 4,
-        room=round(RoomSettings.current().first_turning_points * time / settings.followed_time),
+        room=round(room_settings.first_turning_points * time / settings.followed_time),
         chunk=settings.runs_per_report,
     )
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))

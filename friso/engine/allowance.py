@@ -13,7 +13,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from friso.engine.settings import WorkSettings
+from friso.engine.settings import work_settings
 
 
 class Exhausted(Exception):
@@ -44,10 +44,10 @@ class Allowance:
 
         Raises Exhausted if nothing is left.
         """
-        settings, left = WorkSettings.current(), self.left
+        left = self.left
         if left <= 0:
             self.exhaust()
-        return left / step * min(1 / settings.counted_lanes, settings.fair_share_factor / runs)
+        return left / step * min(1 / work_settings.counted_lanes, work_settings.fair_share_factor / runs)
 
     def exhaust(self) -> NoReturn:
         """Raise Exhausted, because the allowance, or one around it, does not suffice."""
@@ -63,9 +63,8 @@ class Allowance:
 
         A single run counts as much as eight, because eight are computed side by side.
         """
-        settings = WorkSettings.current()
-        longest = settings.counted_lanes * float(np.max(steps, initial=0.0))
-        work = settings.batch_work + step * max(float(np.sum(steps)), longest)
+        longest = work_settings.counted_lanes * float(np.max(steps, initial=0.0))
+        work = work_settings.batch_work + step * max(float(np.sum(steps)), longest)
         at: Allowance | None = self
         while at is not None:
             at.used += work

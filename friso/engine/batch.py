@@ -17,7 +17,7 @@ from friso.engine.arrays import STATISTICS, Batch, BatchOptions, Results, Status
 from friso.engine.kernel import Kernel, columns, empty_results
 from friso.engine.layout import LANES
 from friso.engine.overtaken import current_flag, go_on
-from friso.engine.settings import RoomSettings, StepSettings
+from friso.engine.settings import RoomSettings, room_settings, step_settings
 from friso.engine.side_by_side import cores_to_use, results_of
 from friso.equations import motion
 from friso.equations.reference import moved_on
@@ -95,7 +95,6 @@ def prepare(
 
     Runs begin in the states `starts`, or as the motion says. `flat` has the stages' keys in SI.
     """
-    steps = StepSettings.current()
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         constants = columns(kernel.module.constants(values), runs)
@@ -106,8 +105,8 @@ def prepare(
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
     starts = kernel.with_modes(starts, segments[:, 0, 1:].T, values)
     modes = np.ascontiguousarray(kernel.modes(starts.T, 0.0, segments[:, 0, 1:].T, values).T)
-    first_steps = np.ascontiguousarray(steps.first_step / rates)
-    longest = np.broadcast_to(steps.longest_step_share * segments[:, -1, 0], (runs,)).copy()
+    first_steps = np.ascontiguousarray(step_settings.first_step / rates)
+    longest = np.broadcast_to(step_settings.longest_step_share * segments[:, -1, 0], (runs,)).copy()
     clocks = columns(kernel.module.clock(values), runs) if kernel.layout.clocked else np.zeros((1, 2))
     least = np.full(runs, options.least_swing, dtype=float)
     tolerances = options.rtol * scales
@@ -163,7 +162,6 @@ def _run_with_room(
     Runs with too many turning points are repeated, fewer at a time, with more room for each. Without `starts`, runs
     begin as their motions say.
     """
-    settings = RoomSettings.current()
     part = part_of(flat, numbers)
     least = options.least_swing
     part_options = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
@@ -174,7 +172,7 @@ def _run_with_room(
     results = empty_results(len(numbers), room, samples, len(kernel.full_state))
     _run_within_allowance(kernel, batch, options, results)
     crowded = results.turn_counts > room
-    if room >= settings.most_turning_points:
+    if room >= room_settings.most_turning_points:
         results.statuses[crowded] = Status.FULL
         results.turn_counts[crowded] = room
         crowded[:] = False
@@ -184,7 +182,7 @@ def _run_with_room(
     if not crowded.all():
         yield Runs(numbers[~crowded], Results(*(array[~crowded] for array in results)))
     del results, batch
-    repeated, fewer = numbers[crowded], max(1, options.chunk * settings.first_turning_points // (4 * room))
+    repeated, fewer = numbers[crowded], max(1, options.chunk * room_settings.first_turning_points // (4 * room))
     for first in range(0, len(repeated), fewer):
         yield from _run_with_room(kernel, flat, repeated[first : first + fewer], 4 * room, options, starts)
 
@@ -202,7 +200,7 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
     which, part, steps = np.arange(len(batch.starts)), results, 0
     while which.size:
         before, steps = steps, int(min(options.budget, allowance.most_steps(len(which), kernel.work)))
-        if steps < RoomSettings.current().repeated_budget_factor * before:
+        if steps < room_settings.repeated_budget_factor * before:
             allowance.exhaust()
         run_batch(kernel, _batch_of(batch, which), options_of(replace(options, budget=steps)), part, options.threads)
         allowance.charge(part.statistics[:, STATISTICS.index("attempted")], kernel.work)

@@ -11,13 +11,13 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from friso.engine.settings import BuildSettings
+from friso.engine.settings import build_settings
 from friso.platform.helper_process import answer_questions
 
 
 def main(folder: Path) -> None:
     """Compile the requests that arrive, into a folder of the cache."""
-    gc.set_threshold(*BuildSettings.current().builder_garbage_thresholds)
+    gc.set_threshold(*build_settings.builder_garbage_thresholds)
 
     def built(asked: tuple[str, bytes]) -> str | OSError:
         """Build one request; return the name of its entry, or the error that prevented it."""

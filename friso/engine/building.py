@@ -21,7 +21,7 @@ from filelock import FileLock, Timeout
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, leave_cache, logger
 from friso.engine.overtaken import ASKER, Overtaken, go_on
 from friso.engine.prune import prune
-from friso.engine.settings import BuildSettings
+from friso.engine.settings import build_settings
 from friso.platform.helper_process import HelperProcess
 from friso.platform.system import usable_cores
 from friso.progress import WORK_CLOCK
@@ -84,7 +84,7 @@ class _Work:
             jobs = [*self._jobs.values()]
             for job in jobs:
                 job.give_up()
-        wait([job.met for job in jobs], BuildSettings.current().ending_time)
+        wait([job.met for job in jobs], build_settings.ending_time)
 
     def _joined(self, request: CodeRequest, place: str) -> _Job:
         """Return the job of a request, started if necessary, and count one more waiting thread.
@@ -142,7 +142,7 @@ def _wait(jobs: list[_Job]) -> None:
     waiting = {job.met for job in jobs}
     while waiting:
         go_on()
-        done, waiting = wait(waiting, BuildSettings.current().waiting_interval, FIRST_EXCEPTION)
+        done, waiting = wait(waiting, build_settings.waiting_interval, FIRST_EXCEPTION)
         for job in jobs:
             job.announce()
         for met in done:
@@ -192,7 +192,7 @@ class _Job:
         while not lock.is_locked:
             self._go_on()
             with suppress(Timeout):
-                lock.acquire(timeout=BuildSettings.current().waiting_interval)
+                lock.acquire(timeout=build_settings.waiting_interval)
         try:
             yield
         finally:
@@ -201,7 +201,7 @@ class _Job:
     @contextmanager
     def _core(self) -> Iterator[None]:
         """Occupy a core in the `with` block, while building."""
-        while not self._cores.acquire(timeout=BuildSettings.current().waiting_interval):
+        while not self._cores.acquire(timeout=build_settings.waiting_interval):
             self._go_on()
         try:
             self.builds = True

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, empty_results
-from friso.engine.settings import RoomSettings
+from friso.engine.settings import room_settings
 
 
 @dataclass(frozen=True)
@@ -71,13 +71,16 @@ def run_driven(
     shape (runs, kept). The states of a failed run are NaN from the failure on, and the run has its status.
     """
     count, shared = len(inputs.reference), inputs.segments if np.ndim(inputs.force) == 1 else None
-    room = RoomSettings.current()
     options = RunOptions(
-        rtol=rtol, bands=(0.0, 0.0), record_from=np.inf, least_swing=np.inf, budget=room.driven_steps_per_sample * count
+        rtol=rtol,
+        bands=(0.0, 0.0),
+        record_from=np.inf,
+        least_swing=np.inf,
+        budget=room_settings.driven_steps_per_sample * count,
     )
     size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
     settings = options_of(replace(options, interval=inputs.sample_time))
-    at_once = int(np.clip(room.driven_samples / count, *room.driven_runs))
+    at_once = int(np.clip(room_settings.driven_samples / count, *room_settings.driven_runs))
     for first in range(0, runs, at_once):
         numbers = np.arange(first, min(first + at_once, runs))
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])

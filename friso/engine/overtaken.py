@@ -14,7 +14,7 @@ from threading import Condition
 
 import numpy as np
 
-from friso.engine.settings import BuildSettings
+from friso.engine.settings import build_settings
 
 
 class Overtaken(BaseException):
@@ -69,7 +69,7 @@ def going_first() -> Iterator[None]:
     """Give priority to runs within the `with` block: other work waits at its next batch of runs."""
     token, own = _FIRST.set(True), object()
     with _turn:
-        _ahead[own] = time.monotonic() + BuildSettings.current().priority_time
+        _ahead[own] = time.monotonic() + build_settings.priority_time
     try:
         yield
     finally:

@@ -9,7 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.engine.cache import DAY, ENTRY, REQUEST, entry_lock, logger
-from friso.engine.settings import BuildSettings
+from friso.engine.settings import build_settings
 from friso.platform.whole_file import PARTIAL
 
 
@@ -20,12 +20,12 @@ def prune(folder: Path) -> None:
     """
     try:
         with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
-            size, now, settings = 0, time.time(), BuildSettings.current()
+            size, now = 0, time.time()
             for used, file, length in sorted(_used(folder), reverse=True):
                 size += length
                 age = now - used
                 unfinished = file.suffix == PARTIAL and age > DAY
-                if unfinished or age > settings.kept_time or (age > DAY and size > settings.kept_size):
+                if unfinished or age > build_settings.kept_time or (age > DAY and size > build_settings.kept_size):
                     _delete(file)
     except (Timeout, OSError) as error:  # another process is pruning, too
         logger.debug("old kernels are left: %s", error)

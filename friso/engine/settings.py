@@ -110,3 +110,9 @@ class BuildSettings(Settings):
 
     kept_size: int = setting(200_000_000, "bytes")
     """Size of the cache beyond which code is deleted that was not used within a day."""
+
+
+step_settings = StepSettings.live()
+room_settings = RoomSettings.live()
+work_settings = WorkSettings.live()
+build_settings = BuildSettings.live()

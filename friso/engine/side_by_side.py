@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.engine.overtaken import ended_by, go_on
-from friso.engine.settings import BuildSettings
+from friso.engine.settings import build_settings
 from friso.platform.system import usable_cores
 
 _T = TypeVar("_T")
@@ -58,7 +58,7 @@ def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
     interrupts no wait on Windows.
     """
     while any(not job.done() for job in jobs):
-        for job in wait(jobs, BuildSettings.current().waiting_interval, FIRST_EXCEPTION).done:
+        for job in wait(jobs, build_settings.waiting_interval, FIRST_EXCEPTION).done:
             job.result()
         go_on()
     return [job.result() for job in jobs]

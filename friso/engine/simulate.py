@@ -10,7 +10,7 @@ from friso.axis import axis_of
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import Kernel, kernel
-from friso.engine.settings import RoomSettings
+from friso.engine.settings import room_settings
 from friso.engine.tolerance import checked_rtol
 from friso.equations import motion
 from friso.equations.structure import structure
@@ -53,7 +53,7 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
 
 def usual_interval(duration: float) -> float:
     """Return the interval between samples [s] of a run of a duration [s] for which none is given."""
-    return duration / RoomSettings.current().samples_by_default
+    return duration / room_settings.samples_by_default
 
 
 def checked_interval(interval: float, duration: float) -> float:
@@ -61,7 +61,7 @@ def checked_interval(interval: float, duration: float) -> float:
 
     Raises InputError if the run would have too many samples, or none.
     """
-    least = duration / RoomSettings.current().most_samples
+    least = duration / room_settings.most_samples
     if not least <= interval <= duration:
         text, expected = f"{interval:g} s", f"from {least:g} s to the duration, {duration:g} s"
         raise InputError("sample_time", text, expected, "1 ms")

@@ -15,7 +15,7 @@ import sympy as sp
 from friso.engine.elimination import eliminate
 from friso.engine.layout import AXES, ROW, SCALARS, Layout
 from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
-from friso.engine.settings import StepSettings
+from friso.engine.settings import step_settings
 from friso.engine.tableaus.tableau import Tableau
 from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
@@ -67,7 +67,6 @@ class StepWriter:
     """Writer of the code of one model's step, by one method."""
 
     def __init__(self, model: Model, tableau: Tableau) -> None:
-        self._settings = StepSettings.current()
         self.model, self.tableau = model, tableau
         self.size, self.kinks = len(model.states), len(model.kinks)
         self.constants = Constants(model.parameters)
@@ -367,7 +366,7 @@ class StepWriter:
         The code sets `fraction` to the fraction of the step at which it lies, or 1 if there is none. It sets `astray`
         to true if a run is on the other side of a kink than its mode says.
         """
-        clear, rounding = self._settings.kink_hysteresis, self._settings.surface_rounding
+        clear, rounding = step_settings.kink_hysteresis, step_settings.surface_rounding
         lines = []
         for point, theta in enumerate(THIRDS):
             states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
@@ -430,7 +429,7 @@ class StepWriter:
             "proposed = h * factor",
             "proposed = min(proposed, 0.5 * h) if astray else proposed",
             "proposed = min(proposed, fraction * h) if passed_over else proposed",
-            f"proposed = {self._settings.step_after_kink!r} * proposed if good & cut else proposed",
+            f"proposed = {step_settings.step_after_kink!r} * proposed if good & cut else proposed",
             "trial = max(proposed, trial) if good & (factor >= 1.0) else proposed",
         ]
 
@@ -442,7 +441,7 @@ class StepWriter:
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
-                far = f"(guess{k} <= earliest) & (near{k} > {self._settings.narrow_peak_widths!r} * narrow{k}__s)"
+                far = f"(guess{k} <= earliest) & (near{k} > {step_settings.narrow_peak_widths!r} * narrow{k}__s)"
                 within = f"(last{k} >= -narrow{k}__s) & (last{k} <= 0.0)"
                 lines.append(f"passed_over = passed_over | ({far} & (not ({within})))")
         return lines
@@ -468,11 +467,11 @@ class StepWriter:
         """
         lines = ["root8 = sqrt(sqrt(sqrt(square + 1e-20)))"]
         if self.tableau.order == 4:
-            return [*lines, f"factor = {self._settings.step_safety!r} / root8"]
+            return [*lines, f"factor = {step_settings.step_safety!r} / root8"]
         return [
             *lines,
             "root16 = sqrt(root8)",
-            f"factor = {self._settings.step_safety!r} / (root16 * sqrt(root16))",
+            f"factor = {step_settings.step_safety!r} / (root16 * sqrt(root16))",
         ]
 
     def _statistics(self) -> list[str]:
@@ -487,7 +486,7 @@ class StepWriter:
             f"happened = good & ({'' if self.model.clock else '(now >= next_sample) | '}(t_n >= stop))",
             f"within = {'False' if self.model.clock else INSIDE}",
             "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
-            f"diverged = abs(deviation_n) * rtol > {self._settings.diverged_deviation!r} * tol{self._position}",
+            f"diverged = abs(deviation_n) * rtol > {step_settings.diverged_deviation!r} * tol{self._position}",
             "event = 2.0 if within else (1.0 if happened | failed else 0.0)",
             "event = 3.0 if diverged else event",
             "fraction = fraction if good else 0.0",
@@ -512,7 +511,7 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
-            f"least = {self._settings.least_turning_rate!r} * tol{self._velocity}",
+            f"least = {step_settings.least_turning_rate!r} * tol{self._velocity}",
             "swing = max(abs(turning_s), abs(turning_n)) > least",
             # other turning points change no result
             "turned = turned & swing & ((now >= record_from) | (off <= outer))",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.motions.settings import MotionSettings
+from friso.equations.motions.settings import settings
 from friso.equations.reference import at_rest, moved_on, value
 from friso.stage.motion import DURATION, ReferenceForm, Stand, Tone, motion_of
 
@@ -57,7 +57,7 @@ def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     `rows`, shape (pieces, 1 + inputs), are pieces up to the time `end` [s], whose sinusoids have their phases at time
     0. The result has as many columns.
     """
-    starts, first, per_period = rows[:, 0], form.degree + 3, MotionSettings.current().samples_per_period
+    starts, first, per_period = rows[:, 0], form.degree + 3, settings.samples_per_period
     tones = rows[0, first:].reshape(-1, 4)
     fastest = np.max(np.maximum(np.abs(tones[:, 2]), np.abs(tones[:, 2] + tones[:, 3] * end)))
     bare = rows.copy()

@@ -21,7 +21,7 @@ from friso.frequency.margins import Margins, margins, with_resonances
 from friso.frequency.members import Members, concatenate_families, family, limit_cases, member
 from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.ranges import Range, ranges_below
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import Complex
 from friso.stage import Stage
@@ -148,7 +148,6 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     touched limiter is added. Raises InputError for frequencies that are not usable, a controller that exerts no force,
     and a delay that is too long (see `DriveTiming`).
     """
-    settings = FrequencySettings.current()
     if band is not None and not 0 < band[0] < band[1] < np.inf:
         raise InputError("band", repr(band), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
     flat = stage.flat()
@@ -202,7 +201,6 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
 
     The crossovers are those of `all_margins`.
     """
-    settings = FrequencySettings.current()
     poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
     places = np.array(

@@ -20,7 +20,7 @@ from friso.frequency.margins import Margins, margins_of
 from friso.frequency.members import Members
 from friso.frequency.parts import FORCE, STAGE, VELOCITY, plant
 from friso.frequency.rates import locus_of
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.system import Complex
 from friso.stage.controllers import controller_of
 
@@ -72,7 +72,6 @@ def _seen(rates: Complex) -> np.ndarray:
 
     `rates` are the poles [rad/s], shape (1, n).
     """
-    settings = FrequencySettings.current()
     sizes = np.abs(rates[0])
     return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)
 

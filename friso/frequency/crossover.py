@@ -21,7 +21,7 @@ from friso.frequency.family import (
 )
 from friso.frequency.members import Members, concatenate_families, family, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.system import Complex
 
 WANTED = 0.5
@@ -61,7 +61,6 @@ def limits(flat: Mapping[str, Any]) -> Limits:
 
     `flat` has the stage's keys in SI.
     """
-    settings = FrequencySettings.current()
     search = _Search(flat, settled_members(flat))
     ends, crossover = search.ends, _stated(flat)
     stable = search.stable()
@@ -103,7 +102,6 @@ def searched_crossovers(flat: Mapping[str, Any]) -> Range:
     The range ends below half the sampling frequency of a drive. For a controller that states no crossover, it is a
     range of factors of its bandwidth.
     """
-    settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
         return 1 / 100.0, 1000.0
@@ -124,7 +122,6 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
 
     A stage is in one of them unless it creeps or has just broken away, while its friction falls with speed.
     """
-    settings = FrequencySettings.current()
     members = family(flat, settings.search_biases, 2)
     return concatenate_families([*limit_cases(flat).values(), members[members.stuck]])
 
@@ -170,7 +167,6 @@ class _Search:
     @cached_property
     def at(self) -> np.ndarray:
         """Return the crossovers [Hz] at which to look first, shape (crossovers,)."""
-        settings = FrequencySettings.current()
         return np.geomspace(*self.ends, settings.crossover_steps)
 
     def stable(self) -> tuple[Range, ...]:
@@ -195,7 +191,6 @@ class _Search:
         The function takes the keys of a stage with any controller, and returns its loops at the frequencies. The
         frequencies do not depend on the crossover, so that the distance from -1 is a smooth function of it.
         """
-        settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
         omega = np.unique(np.concatenate(grids))
         return omega, bare_loops(self.flat, self.members, omega)

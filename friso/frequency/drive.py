@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.system import Complex, System
 from friso.stage.rig import LOOPS
 
@@ -44,7 +44,6 @@ class DriveTiming:
 
         Raises InputError for a delay of too many samples, and for a loop that is due too rarely.
         """
-        settings = FrequencySettings.current()
         sample_time = flat.get("drive.sample_time", 0.0)
         slow = {key: flat[key] for key in SLOW_LOOPS if key in flat}
         key = max(slow, key=lambda key: slow[key], default="")
@@ -98,7 +97,6 @@ class DriveTiming:
 
 def resonances(poles: Complex) -> Complex:
     """Return those of the poles [rad/s] that are lightly damped."""
-    settings = FrequencySettings.current()
     return poles[np.abs(poles.real) < settings.light_damping * np.abs(poles.imag)]
 
 
@@ -143,7 +141,6 @@ def delayed(machine: System, delay: float, loop: float) -> System:
     A long delay is split into several such functions. `loop` [rad/s] is the fastest resonance of the closed loop
     without delay. Raises InputError if the phase of the plant's own resonances turns too far within the delay.
     """
-    settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
     sections = int(
         np.ceil(

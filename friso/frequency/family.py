@@ -25,7 +25,7 @@ from friso.frequency.members import Members, concatenate_families, limit_cases
 from friso.frequency.operating_point import operating_point
 from friso.frequency.parts import FORCE, RATED, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.rates import controller_over_period, samples_controller
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.system import Complex, System
 
 _T = TypeVar("_T")
@@ -63,7 +63,6 @@ class Scan:
         It is computed at common frequencies and near each state's closed-loop resonances. For the states that come
         closest to -1 it is exact.
         """
-        settings = FrequencySettings.current()
         omega = frequency_grid(self.flat, settings.family_density)
 
         def shared(which: np.ndarray) -> np.ndarray:
@@ -152,7 +151,6 @@ def about_resonances(system: Poles) -> np.ndarray:
     The shape is (members, k), with NaN for states that have fewer. With loops at several rates all are NaN, because the
     poles do not show which alias resonates.
     """
-    settings = FrequencySettings.current()
     if system.drive.period > 1:  # its poles do not show which alias resonates
         return np.full((len(system.closed), 1), np.nan)
     closed = system.in_s
@@ -251,7 +249,6 @@ def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.nd
     They are position [m/N] and velocity [m/(N s)]; for a sampled drive, the second is the position that it
     differentiates [m/N]. Encoders may be on different sides of a transmission. `members` are states of the stage.
     """
-    settings = FrequencySettings.current()
     second = RATED if DriveTiming.of(flat).sample_time else VELOCITY
     answers = np.empty((len(members), len(omega), 2), complex)
     for mask in (members.stuck, ~members.stuck):
@@ -307,5 +304,4 @@ def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Compl
 
 
 def _split(numbers: np.ndarray) -> list[np.ndarray]:
-    settings = FrequencySettings.current()
     return np.array_split(numbers, -(-len(numbers) // settings.members_together)) if len(numbers) else []

@@ -14,7 +14,7 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction, solve_linear
 from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, sine
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
 from friso.stage.transmission import STATE_PREFIX, leading_friction
@@ -147,7 +147,6 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Return speeds [m/s] from creeping to where friction hardly depends on speed, (count,)."""
-    settings = FrequencySettings.current()
     flat = leading_friction(flat)
     units = {key: quantity.unit for key, quantity in declared_keys(flat).items() if key.startswith("friction.")}
     named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]

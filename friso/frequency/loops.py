@@ -23,7 +23,7 @@ from friso.frequency.parts import (
     reference_derivatives,
 )
 from friso.frequency.rates import Lifted, closed_over_period, cut_over_period, samples_controller, unseen
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.system import Complex, System
 
 ROUNDING = 50 * float(np.finfo(float).eps)
@@ -99,7 +99,6 @@ class Poles:
         It is 0 for a pole on the imaginary axis, up to rounding. Slow poles are taken in continuous time without delay,
         where rounding does less harm.
         """
-        settings = FrequencySettings.current()
         step = self.drive.sample_time or self.drive.delay
         if not step:
             return _real_parts(self.closed).max(axis=1)
@@ -236,7 +235,6 @@ def _shut(loop: System) -> Complex:
 
 def _real_parts(poles: Complex) -> np.ndarray:
     """Return real parts of poles, (members, n), 0 on the imaginary axis up to rounding."""
-    settings = FrequencySettings.current()
     size = np.abs(poles)
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)
     edge = np.where(poles.imag != 0, settings.undamped_ratio * size, 0.0) + ROUNDING * fastest

@@ -15,7 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 from friso.frequency.drive import DriveTiming, resonances
 from friso.frequency.loops import Poles, poles, response
 from friso.frequency.members import Members
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.system import Complex
 
 AROUND = np.tan(np.linspace(-1.5, 1.5, 15))
@@ -77,7 +77,6 @@ def margins(flat: Mapping[str, Any], member: Members) -> Margins:
 
 def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_poles: Poles) -> Margins:
     """Return the margins of one loop of a stage from its response, `at`, and its poles."""
-    settings = FrequencySettings.current()
     drive, closed = loop_poles.drive, loop_poles.in_s[0]
     resonant = [closed, drive.to_s(loop_poles.cut[0]), *([loop_poles.continuous] if drive.period > 1 else [])]
     omega, aside = frequencies(flat, member, drive, settings.margin_density, resonant), 1.0
@@ -99,7 +98,6 @@ def frequencies(
     There are `density` per decade, up to the highest that the drive can represent, and more about the resonances among
     the poles `resonant`.
     """
-    settings = FrequencySettings.current()
     size = np.concatenate([np.abs(poles(flat, kind, DriveTiming(0.0, 0.0)).closed).ravel() for kind in members.kinds])
     size = size[size > settings.negligible_pole * size.max(initial=0.0)] if size.any() else np.ones(1)
     low, high = size.min() / settings.frequencies_beyond, min(size.max() * settings.frequencies_beyond, drive.highest)
@@ -121,7 +119,6 @@ def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
 
     The loop counts as finite if it is real and constant towards 0. `slow` is a low frequency [rad/s].
     """
-    settings = FrequencySettings.current()
     low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)
     flat = np.abs(low - lower) < settings.rest_frequency * np.abs(lower) and np.abs(
         lower.imag
@@ -171,7 +168,6 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
     `values` are those of the function at `omega`. Jumps, such as those of a locus that changes to an alias, do not
     count.
     """
-    settings = FrequencySettings.current()
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)
     zeros: list[Any] = [
@@ -188,7 +184,6 @@ def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Comp
     `gains` are the values of L at the frequencies `omega` [rad/s]. `ends` are further real values, at rest and at half
     the sampling frequency. The result is empty if L is nowhere real and negative.
     """
-    settings = FrequencySettings.current()
     # leave out rounding
     clear = np.where(np.abs(gains.imag) > settings.real_share * np.abs(gains.real), gains.imag, np.nan)
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)

@@ -11,7 +11,7 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.friction import level, speeds
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.stage.arguments import check_arguments
 from friso.stage.transmission import leading_friction
 
@@ -124,7 +124,6 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
     cover all speeds by `speeds_` of them, in both directions if friction differs between them. Without friction they
     are the limit cases alone.
     """
-    settings = FrequencySettings.current()
     flat = leading_friction(flat)
     if flat["friction.model"] == "none":
         return concatenate_families([*limit_cases(flat).values()])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 
 EVENLY, NEAR = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
 """Where a step that contains an end is divided: evenly, and near the zero of a straight line, as fractions of the
@@ -36,7 +36,6 @@ def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, 
 
 def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
     """Return the zero of the function `excess` between two arguments, from its values there."""
-    settings = FrequencySettings.current()
     precise = settings.end_precision * np.log(at[-1] / at[0])
     while np.log(at[-1] / at[0]) > precise:
         with np.errstate(invalid="ignore"):

@@ -206,3 +206,6 @@ class FrequencySettings(Settings):
 
     end_precision: float = setting(4e-6, "")
     """Relative accuracy of the ends of ranges, beyond the digits that are shown."""
+
+
+settings = FrequencySettings.live()

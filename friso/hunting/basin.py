@@ -23,7 +23,7 @@ from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of
 from friso.hunting.return_map.fates import motions_go_on
 from friso.hunting.return_map.landing_map import LandingMap
-from friso.hunting.settings import BasinSettings
+from friso.hunting.settings import basin_settings
 from friso.shares import share_interval
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
@@ -106,10 +106,9 @@ def _ends_closed(
     early; a run that has not reached an attractor by then is continued, twice as long each time. Returns which runs end
     there, which were completed, and the peak-to-peak swing [m], all of shape (count,).
     """
-    settings = BasinSettings.current()
     size, lasting, early, last = (
         np.broadcast_to(part, (count,))
-        for part in (2 * target.amplitude, target.lasting, target.early, settings.judged_periods * target.period)
+        for part in (2 * target.amplitude, target.lasting, target.early, basin_settings.judged_periods * target.period)
     )
     ends, completed, swing, since = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count), np.zeros(count)
     left, until, leg = np.arange(count), np.minimum(early, lasting), np.max(last_corner(flat)) + early
@@ -117,7 +116,7 @@ def _ends_closed(
         part = some_of(flat, left), leg[left], last[left], starts
         swing[left], completed[left], starts = _last_swing(*part, RTOL, **options)
         final = until[left] >= lasting[left]
-        close = np.abs(swing[left] / size[left] - 1) <= settings.caught_swing_share
+        close = np.abs(swing[left] / size[left] - 1) <= basin_settings.caught_swing_share
         ends[left] = completed[left] & np.where(final, lasts(swing[left], 0.0, size[left] / 4), close)
         on = completed[left] & ~ends[left] & ~final
         left, starts, flat = left[on], starts[on], standing(flat)
@@ -135,13 +134,14 @@ def _ends_observed(
     tolerance is tighter than for closed orbits. Returns which runs end there, which were completed, and the
     peak-to-peak swing [m], all of shape (count,).
     """
-    settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
-    swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
+    swing, completed, _ = _last_swing(
+        flat, after, basin_settings.judged_periods * target.period, starts, TIGHT, **options
+    )
     ends = completed & lasts(swing, 0.0, np.broadcast_to(target.amplitude, (count,)) / 2)
     if (others := np.flatnonzero(completed & ~ends)).size:
         begin = None if starts is None else starts[others]
-        part = some_of(flat, others), after[others], settings.resting_end_share * after[others]
+        part = some_of(flat, others), after[others], basin_settings.resting_end_share * after[others]
         swing[others], completed[others], _ = _last_swing(*part, begin, TIGHT, **options)
     return ends, completed, swing
 
@@ -223,7 +223,7 @@ def displacements_that_hunt(
 def displacements_that_run_away(stage: Stage) -> Kick:
     """Find the displacements after which a stage with a force limit and no anti-windup diverges."""
     flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
-    end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
+    end = basin_settings.runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Run the stage from displacements [m]; return which diverge, and which are certain, (n,)."""
@@ -259,20 +259,21 @@ def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], u
     The search covers a range of sizes around the kick `unit`, in [m] or [m/s]. `hunts` runs some kicks; it returns
     which of them hunt, and for which that is certain.
     """
-    settings = BasinSettings.current()
-    tried = np.geomspace(settings.kick_range[0] * unit, settings.kick_range[1] * unit, settings.kick_count)
+    tried = np.geomspace(
+        basin_settings.kick_range[0] * unit, basin_settings.kick_range[1] * unit, basin_settings.kick_count
+    )
     hunting, completed = hunts(tried)
     kicks, hunting, unknown = tried[completed], hunting[completed], int(np.count_nonzero(~completed))
     if not kicks.size:
         return Kick((), (float(tried[0]), float(tried[-1])), unknown)
     edges = np.flatnonzero(hunting[1:] != hunting[:-1])
     low, high = kicks[edges], kicks[edges + 1]
-    while edges.size and np.any(high > (1 + settings.kick_edge_share) * low):
-        between = np.geomspace(low, high, settings.kicks_between + 2, axis=1)
-        ends, completed = (part.reshape(-1, settings.kicks_between) for part in hunts(between[:, 1:-1].ravel()))
+    while edges.size and np.any(high > (1 + basin_settings.kick_edge_share) * low):
+        between = np.geomspace(low, high, basin_settings.kicks_between + 2, axis=1)
+        ends, completed = (part.reshape(-1, basin_settings.kicks_between) for part in hunts(between[:, 1:-1].ravel()))
         unknown += int(np.count_nonzero(~completed))
         unlike = completed & (ends != hunting[edges, None])
-        last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), settings.kicks_between)
+        last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), basin_settings.kicks_between)
         low, high = (between[np.arange(len(edges)), last + step] for step in (0, 1))
     places = np.where(hunting[edges], low, high)  # the side that hunts
     turns = [*([kicks[0]] if hunting[0] else []), *places, *([kicks[-1]] if hunting[-1] else [])]
@@ -289,13 +290,12 @@ def moves_that_hunt(
     peak [m], are left out. A `landing_map`, the stage's return map, saves long runs. Returns None for motions that are
     no moves, or if every run fails.
     """
-    settings = BasinSettings.current()
     flat = stage.flat()
     if not (ranges := motion_of(flat).varied(flat, SEARCH_LIMITS.move_shares)):
         return None
-    drawn = zip(ranges.items(), evenly(settings.drawn_moves), strict=True)
+    drawn = zip(ranges.items(), evenly(basin_settings.drawn_moves), strict=True)
     moved = {**flat, **{key: low + places * (high - low) for (key, (low, high)), places in drawn}}
-    ends, decided = _caught(moved, settings.drawn_moves, target, widest, landing_map)
+    ends, decided = _caught(moved, basin_settings.drawn_moves, target, widest, landing_map)
     return MoveShare(int(decided.sum()), int(ends[decided].sum()), ranges) if decided.any() else None
 
 

@@ -18,7 +18,7 @@ from friso.engine.simulate import RTOL, sampled_outputs, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.motion import size, stands
 from friso.equations.structure import structure
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.feeding import Feeding, feeding
@@ -30,7 +30,7 @@ from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.outward import BandwidthWindow
 from friso.hunting.parameter_margin import ParameterMargin
-from friso.hunting.settings import CheckSettings, ToleranceSettings
+from friso.hunting.settings import ToleranceSettings, check_settings
 from friso.hunting.stage_margins import friction_margin, keeps_friction_margin
 from friso.hunting.tracking import Dwell, Tracking, dwells, tracking
 from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
@@ -156,7 +156,6 @@ def check(
     case and its verdict as soon as the verdict is certain. Both may be called from worker threads. Raises InputError
     for an `rtol` that is not usable.
     """
-    settings = CheckSettings.current()
     checked_rtol(rtol)
     variants = stage.variants()
     kernels(needed_kernels(stage))
@@ -172,7 +171,13 @@ def check(
         names = [name for name, other in variants.items() if other == variant]
         share = _share(variant) if len(different) > 1 else 1.0
         return _case(
-            variant, rtol, traces, done, share * settings.check_work, lambda verdict: tell(names[-1], verdict), margins
+            variant,
+            rtol,
+            traces,
+            done,
+            share * check_settings.check_work,
+            lambda verdict: tell(names[-1], verdict),
+            margins,
         )
 
     cases = side_by_side([partial(judged, variant) for variant in different])
@@ -189,9 +194,8 @@ def _share(stage: Stage) -> float:
 
     It depends on whether the variant has a free joint.
     """
-    settings = CheckSettings.current()
     free = stage.joint is not None and not stage.joint.locked
-    return settings.free_work_share if free else 1 - settings.free_work_share
+    return check_settings.free_work_share if free else 1 - check_settings.free_work_share
 
 
 def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -> Case:
@@ -201,7 +205,7 @@ def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -
     """
     checked_rtol(rtol)
     kernels(_needed(stage))
-    return _case(stage, rtol, False, Tally(progress, PART_COUNT), CheckSettings.current().check_work)
+    return _case(stage, rtol, False, Tally(progress, PART_COUNT), check_settings.check_work)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
@@ -223,7 +227,6 @@ def _case(
     `done` counts the parts of the check. `tell` is called with the verdict as soon as it is certain. With `traces` the
     time response is kept, and with `margins` the margin in static friction is computed.
     """
-    survey_settings = SurveySettings.current()
     flat, ended = stage.flat(), 0
 
     def begin(part: CheckPart) -> None:
@@ -234,7 +237,7 @@ def _case(
 
     with allowance() as spent:
         (runs,) = run_chunks(
-            kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=survey_settings.run_turning_points)
+            kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=settings.run_turning_points)
         )
         measures = measure_runs(flat, runs)
         judgement = judge(stage, measures, max(rtol, LONG_RUN_RTOL), begin, work - spent.used, tell)
@@ -242,7 +245,7 @@ def _case(
     status = Status(int(measures.status[0]))
     fed = None
     if judgement.swing and structure(flat).plays:
-        fed = _fed(stage, max(work - spent.used, CheckSettings.current().feeding_work_share * work))
+        fed = _fed(stage, max(work - spent.used, check_settings.feeding_work_share * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
     static_friction, keeps = None, (None, None)
     if margins:
@@ -301,8 +304,7 @@ def _friction(
     somewhat other static friction, and None if it is not advised. Each result is None if its allowance of work does not
     suffice.
     """
-    settings = CheckSettings.current()
-    with allowance(settings.friction_margin_work_share * work):
+    with allowance(check_settings.friction_margin_work_share * work):
         margin = friction_margin(stage, judgement)
     if margin is None or judgement.swing is None:
         return margin, (None, None)
@@ -313,7 +315,7 @@ def _friction(
         """Tell whether the stage does not hunt with other static friction at a `factor` of its bandwidth."""
         if factor is None or factor > SEARCH_LIMITS.highest_bandwidth:
             return None
-        return keeps_friction_margin(stage, factor, settings.advice_work_share * work)
+        return keeps_friction_margin(stage, factor, check_settings.advice_work_share * work)
 
     return margin, (kept(higher), kept(lower))
 
@@ -324,7 +326,6 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
     It does so if break-away takes more force, `breakaway` [N], or if the run ends with the force at the limit. The
     result is None for a stage that settles, swings, or may still move, as `judgement` says.
     """
-    settings = CheckSettings.current()
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible
     stands = judgement.followed is not None if possible else judgement.verdict == "settles"
     stays = stands and judgement.settled_after is None
@@ -333,7 +334,11 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
     shape = kernel(structure(flat))
     forces = sampled_outputs(shape, flat, runs.results.ends.T, runs.statistic("ended"))
     force = float(forces[list(shape.outputs).index("force")][0])
-    return limit if abs(force) > limit * (1 - settings.limit_force_share) or (possible and limit < breakaway) else None
+    return (
+        limit
+        if abs(force) > limit * (1 - check_settings.limit_force_share) or (possible and limit < breakaway)
+        else None
+    )
 
 
 def _breakaway(flat: Mapping[str, Any]) -> float:

@@ -13,7 +13,7 @@ from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import Cycles, find_cycles
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.shooting import Orbits, close
-from friso.hunting.settings import EdgeSettings
+from friso.hunting.settings import edge_settings
 
 
 @dataclass(frozen=True)
@@ -121,24 +121,23 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
     are central differences. Returns None if no cycle flips there, if a limiter may chatter, or if an orbit could not be
     closed.
     """
-    settings = EdgeSettings.current()
-    inside = faster(flat, factor * (1 - settings.inside_edge_share))
+    inside = faster(flat, factor * (1 - edge_settings.inside_edge_share))
     first = find_cycles(Ensemble.held(inside, 1))
     if (
-        not (first.closed[0] and -1 <= first.multiplier[0] < -settings.flip_multiplier)
+        not (first.closed[0] and -1 <= first.multiplier[0] < -edge_settings.flip_multiplier)
         or Ensemble.held(inside, 1).chatters
     ):
         return None
     changed = [
         {name: inside[name] * (1 + step)}
         for name in keys
-        for step in (-settings.key_nudge_share, settings.key_nudge_share)
+        for step in (-edge_settings.key_nudge_share, edge_settings.key_nudge_share)
     ]
-    changed += [faster(inside, 1 + step) for step in (-settings.key_nudge_share, settings.key_nudge_share)]
+    changed += [faster(inside, 1 + step) for step in (-edge_settings.key_nudge_share, edge_settings.key_nudge_share)]
     multiplier = _multipliers(inside, changed, first, rtol)
     if multiplier is None:
         return None
-    slopes = (multiplier[1::2] - multiplier[::2]) / (2 * settings.key_nudge_share)
+    slopes = (multiplier[1::2] - multiplier[::2]) / (2 * edge_settings.key_nudge_share)
     return -slopes[:-1] / slopes[-1]
 
 

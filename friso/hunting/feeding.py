@@ -15,7 +15,7 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.hunting.loop import unstable
 from friso.hunting.many_stages import find_attractors
-from friso.hunting.settings import CheckSettings
+from friso.hunting.settings import check_settings
 from friso.stage import Stage
 from friso.stage.stage import declared_keys
 from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
@@ -64,9 +64,8 @@ def _without_friction(stage: Stage) -> Decline:
 
     All motions scale with the backlash, so nothing changes until it is zero, when the loop is linear.
     """
-    settings = CheckSettings.current()
     rests = not unstable(stage.replace({BACKLASH: None}))
-    return Decline(lasts=float(np.array(settings.feeding_shares)[-1]), gone=0.0 if rests else None, certain=True)
+    return Decline(lasts=float(np.array(check_settings.feeding_shares)[-1]), gone=0.0 if rests else None, certain=True)
 
 
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
@@ -85,13 +84,12 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
     """Survey a stage with `keys` scaled down in steps, and return how hunting declines."""
-    settings = CheckSettings.current()
-    scaled = {**flat, **{key: flat[key] * np.array(settings.feeding_shares) for key in keys}}
-    attracted = find_attractors(scaled, len(np.array(settings.feeding_shares)))
+    scaled = {**flat, **{key: flat[key] * np.array(check_settings.feeding_shares) for key in keys}}
+    attracted = find_attractors(scaled, len(np.array(check_settings.feeding_shares)))
     gone = np.flatnonzero(~attracted.attracts)
-    first = int(gone[0]) if gone.size else len(np.array(settings.feeding_shares))
+    first = int(gone[0]) if gone.size else len(np.array(check_settings.feeding_shares))
     return Decline(
-        lasts=float(np.array(settings.feeding_shares)[first - 1]) if first else 1.0,
-        gone=float(np.array(settings.feeding_shares)[first]) if gone.size else None,
+        lasts=float(np.array(check_settings.feeding_shares)[first - 1]) if first else 1.0,
+        gone=float(np.array(check_settings.feeding_shares)[first]) if gone.size else None,
         certain=bool(attracted.certain[: first + 1].all()),
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.settings import CheckSettings
+from friso.hunting.settings import check_settings
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 from friso.stage.standstill import NO_SETTINGS
@@ -67,7 +67,7 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     the viscous friction matter for the largest motions: with a mass m and viscous friction b, they shrink if b k_p > m
     k_i and grow if less. This is Hurwitz's criterion for the loop at any gain.
     """
-    at_once = CheckSettings.current().loops_at_once
+    at_once = check_settings.loops_at_once
     controller, form = controller_of(stages.flat), stages.structure.controller
     settings = form.settings if form else NO_SETTINGS
     if not controller.loop_gain or settings.deadband or settings.dead_zone or settings.gains or settings.push:
@@ -81,13 +81,14 @@ def _at_lower_gains(stages: Ensemble) -> np.ndarray:
 
     The stages are few enough for the memory, and their controller names the keys of its gain.
     """
-    settings = CheckSettings.current()
-    shares = np.geomspace(*settings.lower_gain_shares)
+    shares = np.geomspace(*check_settings.lower_gain_shares)
     controller, form = controller_of(stages.flat), stages.structure
     flat = stages.take(np.repeat(np.arange(stages.count), len(shares))).flat
     gains = {key: flat[key] * np.tile(shares, stages.count) for key in map(controller.key, controller.loop_gain)}
     slower = Ensemble.held({**flat, **gains}, stages.count * len(shares), form=form)
-    growths = _growth(_sliding(slower, _rates(slower), np.min)) / (settings.least_growth_rate * slower.number("rate"))
+    growths = _growth(_sliding(slower, _rates(slower), np.min)) / (
+        check_settings.least_growth_rate * slower.number("rate")
+    )
     growing, shrinking = (
         (growths > 1).reshape(-1, len(shares)),
         (growths <= 1).reshape(-1, len(shares)),
@@ -122,7 +123,7 @@ def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
 
     A sliding stage is damped by the mean viscous friction of both directions.
     """
-    limit = CheckSettings.current().least_growth_rate * stages.number("rate")
+    limit = check_settings.least_growth_rate * stages.number("rate")
     return {state: growth > limit for state, growth in _growths(stages).items()}
 
 
@@ -134,7 +135,7 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     They have no backlash and no dither. Without friction, the controller must also act alike near the reference and far
     from it.
     """
-    least_rate = CheckSettings.current().least_growth_rate
+    least_rate = check_settings.least_growth_rate
     form = stages.structure
     drive, controller = form.transmission, form.controller
     settings = controller.settings if controller else NO_SETTINGS
@@ -156,7 +157,7 @@ def lags(stages: Ensemble) -> np.ndarray:
     force comes behind the error, which feeds a swing. A controller whose force never lags below the crossover only
     takes energy out.
     """
-    at_once, controller = CheckSettings.current().loops_at_once, stages.structure.controller
+    at_once, controller = check_settings.loops_at_once, stages.structure.controller
     lagging = np.zeros(stages.count, bool)
     if controller is not None and not controller.integral:
         pulled_back = np.flatnonzero(stages.number("stiffness") > 0)
@@ -173,14 +174,14 @@ def _lags(stages: Ensemble) -> np.ndarray:
     """
     from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
 
-    settings, rate = CheckSettings.current(), stages.number("rate")
+    rate = stages.number("rate")
     mass = stages.number("stiffness") / rate**2
-    lowest, highest = settings.lag_rates
-    omega = rate[:, None] * np.geomspace(lowest, highest, settings.lag_points)
+    lowest, highest = check_settings.lag_rates
+    omega = rate[:, None] * np.geomspace(lowest, highest, check_settings.lag_points)
     control = compensator(stages.flat, stages.count).take((STAGE, VELOCITY), (FORCE,)).at(1j * omega)[:, :, 0]
     stiffness = -(control[..., 0] + 1j * omega * control[..., 1])
     acts = np.abs(stiffness) > mass[:, None] * omega**2
-    return np.any(acts & (np.angle(stiffness) < -settings.lag_angle), axis=1)
+    return np.any(acts & (np.angle(stiffness) < -check_settings.lag_angle), axis=1)
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
@@ -214,10 +215,9 @@ def _motor_state(stages: Ensemble, which: int) -> int:
 
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
     """Yield states (count, states) at zero but for one state moved slightly, each state in turn."""
-    settings = CheckSettings.current()
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
-        moved[:, k] = settings.derivative_step_share * scale
+        moved[:, k] = check_settings.derivative_step_share * scale
         yield moved
 
 
@@ -227,7 +227,6 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
     Row i, column j has the derivative of the rate of state i by state j, in units of the states' `scales`. In a
     backlash, the motor stands on a flank. If `touched`, the cart stands at twice the stroke and presses the limiter.
     """
-    settings = CheckSettings.current()
     flank = np.zeros((stages.count, len(stages.kernel.states)))
     if touched:
         flank[:, stages.kernel.cart_position] = 2 * np.asarray(stages.flat["joint.stroke"])
@@ -235,7 +234,8 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
         flank[:, _motor_state(stages, 0)] = stages.flat[BACKLASH]
     moved = ((flank + step, flank - step) for step in _displaced_states(stages))
     columns = [
-        (stages.rates(ahead) - stages.rates(behind)) / (2 * settings.derivative_step_share) for ahead, behind in moved
+        (stages.rates(ahead) - stages.rates(behind)) / (2 * check_settings.derivative_step_share)
+        for ahead, behind in moved
     ]
     return np.stack(columns, axis=2) / stages.scales[:, :, None]
 
@@ -246,7 +246,6 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
     `stuck` are the systems of the sticking stages, (count, states, states). `of_directions` combines the viscous
     friction of the two directions, such as their mean.
     """
-    settings = CheckSettings.current()
     kernel, flat = stages.kernel, stages.flat
     bodies = ("cart", "stage") if stages.structure.joint == "rigid" else ("cart",)
     mass = sum(np.asarray(flat.get(f"masses.{body}", 0.0)) for body in bodies)
@@ -260,8 +259,8 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
         unit = stages.scales[:, body]
         for k, step in enumerate(_displaced_states(stages)):
             change = _force(stages, step, output) - _force(stages, -step, output)
-            matrix[:, body, k] += change / (2 * settings.derivative_step_share * own * unit)
-        both = [_viscous(stages, way * settings.viscous_speed * unit, output) for way in (1.0, -1.0)]
+            matrix[:, body, k] += change / (2 * check_settings.derivative_step_share * own * unit)
+        both = [_viscous(stages, way * check_settings.viscous_speed * unit, output) for way in (1.0, -1.0)]
         matrix[:, body, body] -= of_directions(both, axis=0) / own
     bristles = kernel.having(Role.BRISTLE)
     return np.delete(np.delete(matrix, bristles, 1), bristles, 2)

@@ -16,7 +16,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.loop import unstable_among
 from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, EdgeSearch
-from friso.hunting.settings import CheckSettings, EdgeSettings
+from friso.hunting.settings import check_settings, edge_settings
 from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage
 
@@ -124,7 +124,7 @@ def unstable_bandwidths(stage: Stage) -> tuple[BandwidthWindow, ...]:
 
     The loop is unstable while the stage sticks, or while it slides. Windows narrower than a step may be missed.
     """
-    count, flat = CheckSettings.current().loop_bandwidths, stage.flat()
+    count, flat = check_settings.loop_bandwidths, stage.flat()
 
     def end(inside: float, outside: float) -> AttractionEnd:
         """Return where the loop becomes stable between a factor at which it is not, and one at which it is."""
@@ -183,13 +183,14 @@ class _Grid:
         Factors nearest to 1 come first, until a fraction of the work is used up. Raises Exhausted if the allowance
         around the whole search is used up.
         """
-        settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
         self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
         left = numbers[~sketch.decided]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
         at_once, work = (
-            (settings.bandwidths_at_once, settings.simulated_work) if sketch.decided.any() else (len(left), np.inf)
+            (edge_settings.bandwidths_at_once, edge_settings.simulated_work)
+            if sketch.decided.any()
+            else (len(left), np.inf)
         )
         with allowance(work) as simulated:
             try:
@@ -312,7 +313,7 @@ class _Grid:
                 end = np.flatnonzero(~self.attracts[behind])
                 some = [k for k in behind[: end[0] if end.size else None].tolist() if k not in self.inspected]
                 if some:
-                    self._inspect(np.array(some[: EdgeSettings.current().bandwidths_at_once]))
+                    self._inspect(np.array(some[: edge_settings.bandwidths_at_once]))
         return bool(self.attracts[at])
 
     def _inspect(self, numbers: np.ndarray) -> None:

@@ -15,13 +15,13 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner, rests
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors.rounds import loose_from
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import BAND, COUNTED_ABOVE, lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
 from friso.hunting.measures import Measures, measure_runs
 from friso.hunting.rows import ArrayRows
-from friso.hunting.settings import CheckSettings
+from friso.hunting.settings import check_settings
 from friso.hunting.turning import HALF, WINDOW
 
 
@@ -93,10 +93,9 @@ class FollowedMotions:
 
         `flat` has the keys of their `count` stages in SI. Raises Exhausted if an allowance of work is used up.
         """
-        settings = CheckSettings.current()
         stages = Ensemble.held(flat, count, form=shared_structure(flat))
-        waits = settings.least_followed_waits * wait(stages, loose_from(stages))
-        lasts_for = np.maximum(np.maximum(settings.least_followed_time, flat["motion.duration"]), waits)
+        waits = check_settings.least_followed_waits * wait(stages, loose_from(stages))
+        lasts_for = np.maximum(np.maximum(check_settings.least_followed_time, flat["motion.duration"]), waits)
         long = {**flat, "motion.duration": lasts_for + last_corner(flat)}
         last = run_motions(long, count, replace(run_options, window=WINDOW))
         done = last.completed.copy()
@@ -105,7 +104,7 @@ class FollowedMotions:
             done[swinging] = half.completed
             swing = last.swing[swinging]
             self.steady[which[swinging]] = half.completed & lasts(
-                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + settings.steady_motion_share)
+                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + check_settings.steady_motion_share)
             )
         self.followed[which], self.away[which] = np.where(done, lasts_for, np.nan), last.away
         after = np.where(self.rests[which], self.after[which], last.settling)
@@ -141,7 +140,7 @@ def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
 
     `flat` has the keys of stages of one structure in SI.
     """
-    return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
+    return 2 * settings.least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from friso.hunting.boundary.locate import Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, described, kept
 from friso.hunting.cycle.shooting import close
-from friso.hunting.settings import EdgeSettings
+from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
 
@@ -130,7 +130,7 @@ class EdgeSearch:
 
         Raises Beyond if an attractor exists up to the end of the search.
         """
-        for _ in range(EdgeSettings.current().most_orbits_followed):
+        for _ in range(edge_settings.most_orbits_followed):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 return self._bracketed(place)
@@ -170,8 +170,11 @@ class EdgeSearch:
         The first result is the factor next to the end; the second, shape (n,), has factors farther off and may be
         empty. Raises Beyond if the first is beyond the end of the search.
         """
-        settings, ahead = EdgeSettings.current(), self._ahead(end)
-        next_to, farther = end * settings.beyond_edge_factor**ahead, end * np.array(settings.farther_factors) ** ahead
+        ahead = self._ahead(end)
+        next_to, farther = (
+            end * edge_settings.beyond_edge_factor**ahead,
+            end * np.array(edge_settings.farther_factors) ** ahead,
+        )
         if self.settled is not None and ahead * (self.settled - end) > 0:
             next_to = _nearer(ahead, next_to, self.settled)
         if ahead * (next_to - self.farthest) > 0:
@@ -187,11 +190,10 @@ class EdgeSearch:
         Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
         them until they are close together. Raises Beyond if an attractor exists up to the end of the search.
         """
-        settings = EdgeSettings.current()
-        reach, ahead = settings.reach_log, self._ahead(place.at)
+        reach, ahead = edge_settings.reach_log, self._ahead(place.at)
         place.outside = _nearer(ahead, place.outside, self.farthest)
         while True:
-            factors = np.geomspace(place.at, place.outside, settings.bracket_steps + 2)[1:]
+            factors = np.geomspace(place.at, place.outside, edge_settings.bracket_steps + 2)[1:]
             survey = self._told(factors, _followed_from([motion.distance for motion in place.motions]))
             attracts = np.flatnonzero(survey.attracts)
             if attracts.size:
@@ -205,7 +207,7 @@ class EdgeSearch:
                 continue
             place.outside = float(factors[last])
             end = AttractionEnd(place.at, place.outside, bool(survey.decided[last:].all()))
-            if end.reserve <= settings.edge_bracket_share:
+            if end.reserve <= edge_settings.edge_bracket_share:
                 return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
@@ -235,7 +237,7 @@ class EdgeSearch:
         if stages.chatters:
             return ()
         states, times = at.states, at.times
-        for factor in np.geomspace(end, beyond, EdgeSettings.current().past_end_steps + 1)[1:]:
+        for factor in np.geomspace(end, beyond, edge_settings.past_end_steps + 1)[1:]:
             there = self._stages(np.array([factor]))
             before, at = at, close(there, states, times, at.sign, RTOL, at.swings)
             if not (at.closed & kept(there, at, before.states[:, stages.sticking]))[0]:
@@ -254,7 +256,7 @@ class EdgeSearch:
     def _still_ahead(self, at: float, outside: float) -> float:
         """Return `outside`, a factor without attractor, or one farther ahead if `at` has passed it."""
         ahead = self._ahead(at)
-        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
+        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * edge_settings.reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def followed(self, at: float, orbit: Swinging) -> tuple[float, Point]:
@@ -262,7 +264,6 @@ class EdgeSearch:
 
         Returns this factor and the orbit there. Raises Beyond if the orbit is stable up to the end of the search.
         """
-        settings = EdgeSettings.current()
         ahead, cycles = self._ahead(at), orbit.cycles
         assert cycles is not None
 
@@ -273,18 +274,18 @@ class EdgeSearch:
         length = abs(float(np.log(self.farthest / at)))
         chatters = Ensemble.held(self.flat, 1).chatters
         shortest, flip = (
-            (settings.chattering_edge_step, settings.chattering_edge_step)
+            (edge_settings.chattering_edge_step, edge_settings.chattering_edge_step)
             if chatters
-            else (settings.shortest_edge_step, settings.flip_search_step)
+            else (edge_settings.shortest_edge_step, edge_settings.flip_search_step)
         )
         tracer = Tracer(
             family,
             cycles.sign,
             farthest=length,
             swings=cycles.swings,
-            pace=settings.edge_pace,
+            pace=edge_settings.edge_pace,
             shortest=shortest,
-            first=settings.first_edge_step,
+            first=edge_settings.first_edge_step,
         )
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest = start
@@ -301,7 +302,7 @@ class EdgeSearch:
             first, second = ([start, *points])[-2:]
             kind = _kind(first, second)
             last = last_inside(
-                tracer, first, second, kind, max(flip, settings.fold_search_step) if kind == "fold" else flip
+                tracer, first, second, kind, max(flip, edge_settings.fold_search_step) if kind == "fold" else flip
             )
             farthest = max(farthest, last or first, key=lambda point: point.place)
         elif tracer.reaches(points, reason):
@@ -316,7 +317,7 @@ def _orbit_distance(point: Point, orbit: Swinging) -> float:
 
 def _followed_from(distances: list[float]) -> np.ndarray:
     """Return start distances [m], shape (n,), from which motions are followed that stick at some distances [m]."""
-    return np.outer(distances, EdgeSettings.current().followed_starts).ravel()
+    return np.outer(distances, edge_settings.followed_starts).ravel()
 
 
 def _nearer(ahead: float, one: float, other: float) -> float:

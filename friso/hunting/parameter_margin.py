@@ -14,7 +14,7 @@ from friso.engine.allowance import Exhausted
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.rows import ArrayRows
-from friso.hunting.settings import EdgeSettings
+from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
 
@@ -99,7 +99,7 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
     around a change. Both ends are searched thoroughly, side by side. Ranges narrower than these steps may be missed. A
     side is open if an allowance of work is used up, or the search does not decide.
     """
-    step = EdgeSettings.current().widest_factor_step
+    step = edge_settings.widest_factor_step
     farthest = {side: at for side, at in ((-1, lowest), (1, highest)) if side * (at - 1) > step}
     searches = {side: _Side(attracts, at).end() for side, at in farthest.items()}
     ends, open_sides = _ends(scaled, searches)
@@ -129,9 +129,9 @@ def _ends(scaled: Scaled, searches: dict[int, _Search]) -> tuple[dict[int, Margi
             thorough = all(one.thorough for one in wanted.values())
             now = [side for side, one in wanted.items() if one.thorough == thorough]
             if now:
-                found = _surveyed(scaled, np.concatenate([wanted[side].factors for side in now]), thorough)
+                survey = _surveyed(scaled, np.concatenate([wanted[side].factors for side in now]), thorough)
                 places = np.cumsum([0, *(len(wanted[side].factors) for side in now)])
-                answers = {side: found.take(slice(*part)) for side, part in zip(now, pairwise(places), strict=True)}
+                answers = {side: survey.take(slice(*part)) for side, part in zip(now, pairwise(places), strict=True)}
     return ends, tuple(side for side in searches if side not in ends)
 
 
@@ -166,11 +166,10 @@ class _Side:
 
         Raises Undecided if surveys leave open whether hunting changes.
         """
-        settings = EdgeSettings.current()
-        yield from self._try(self.farthest ** np.array(settings.margin_steps))
-        for _ in range(settings.most_proofs):
+        yield from self._try(self.farthest ** np.array(edge_settings.margin_steps))
+        for _ in range(edge_settings.most_proofs):
             first = yield from self._bracketed()
-            pair = np.array(settings.thorough_margin_steps) if first is None else (yield from self._pair(first))
+            pair = np.array(edge_settings.thorough_margin_steps) if first is None else (yield from self._pair(first))
             yield from self._search(pair[~self.searched[pair]])
             if first is None and not self.changed.any():
                 if not self.decided.all():
@@ -190,12 +189,11 @@ class _Side:
 
         Factors before it are tried until the last one without a change is close.
         """
-        settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])
-            if abs(self.factors[first] / self.factors[first - 1] - 1) <= settings.widest_factor_step:
+            if abs(self.factors[first] / self.factors[first - 1] - 1) <= edge_settings.widest_factor_step:
                 return first
-            between = np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
+            between = np.geomspace(self.factors[first - 1], self.factors[first], edge_settings.bracket_steps + 1)[1:-1]
             yield from self._try(between)
         return None
 
@@ -205,11 +203,10 @@ class _Side:
         Their distances from the change are `proved_distances`: close to the end of hunting, motions take long to decay,
         and a rough survey may be wrong. Factors that were not surveyed yet are surveyed roughly.
         """
-        settings = EdgeSettings.current()
-        inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]
+        inward, outward = edge_settings.proved_distances if self.attracts else edge_settings.proved_distances[::-1]
         places, farthest = np.abs(np.log(self.factors)), abs(np.log(self.farthest))
         wanted = np.clip([places[first - 1] - inward, places[first] + outward], 0.0, farthest)
-        new = [place for place in wanted if np.abs(places - place).min() > settings.same_factor_log]
+        new = [place for place in wanted if np.abs(places - place).min() > edge_settings.same_factor_log]
         if new:
             yield from self._try(np.exp(np.sign(np.log(self.farthest)) * np.array(new)))
         places = np.abs(np.log(self.factors))
@@ -217,11 +214,11 @@ class _Side:
 
     def _try(self, factors: np.ndarray) -> Generator[_Wanted, _Found, None]:
         """Survey more factors roughly."""
-        found = yield _Wanted(factors, thorough=False)
+        survey = yield _Wanted(factors, thorough=False)
         order = np.argsort(np.abs(np.log(np.append(self.factors, factors))), kind="stable")
         self.factors = np.append(self.factors, factors)[order]
-        self.changed = np.append(self.changed, found.attracts != self.attracts)[order]
-        self.decided = np.append(self.decided, found.decided)[order]
+        self.changed = np.append(self.changed, survey.attracts != self.attracts)[order]
+        self.decided = np.append(self.decided, survey.decided)[order]
         nothing = np.zeros(len(factors), bool)
         self.searched, self.certain = (np.append(flags, nothing)[order] for flags in (self.searched, self.certain))
 
@@ -229,6 +226,6 @@ class _Side:
         """Search factors thoroughly, by number."""
         if not numbers.size:
             return
-        found = yield _Wanted(self.factors[numbers], thorough=True)
-        self.changed[numbers], self.searched[numbers] = found.attracts != self.attracts, True
-        self.decided[numbers], self.certain[numbers] = found.decided, found.certain
+        survey = yield _Wanted(self.factors[numbers], thorough=True)
+        self.changed[numbers], self.searched[numbers] = survey.attracts != self.attracts, True
+        self.decided[numbers], self.certain[numbers] = survey.decided, survey.certain

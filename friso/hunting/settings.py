@@ -300,3 +300,10 @@ class TrackingSettings(Settings):
 
     closed_distance: float = setting(1e-4, "of the scales of the states")
     """Largest distance between states one period apart on a closed response, of which three digits are shown."""
+
+
+tolerance_settings = ToleranceSettings.live()
+basin_settings = BasinSettings.live()
+edge_settings = EdgeSettings.live()
+check_settings = CheckSettings.live()
+tracking_settings = TrackingSettings.live()

@@ -11,7 +11,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.parameter_margin import ParameterMargin, Scaled, parameter_margin
-from friso.hunting.settings import EdgeSettings
+from friso.hunting.settings import edge_settings
 from friso.hunting.verdict import Judgement
 from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
@@ -48,7 +48,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
         return lambda factors: {**flat, key: flat[key] * factors}
 
     keys = [key for key in JOINT_KEYS if flat.get(key)]
-    with allowance(EdgeSettings.current().joint_margin_work):
+    with allowance(edge_settings.joint_margin_work):
         return {key: _margin(scaled(key), judgement, 1 / SEARCH_LIMITS.most_friction) for key in keys}
 
 

@@ -15,7 +15,7 @@ from friso.equations import motion
 from friso.equations.structure import structure
 from friso.hunting.criteria import BAND, settling_of_traces
 from friso.hunting.measures import BANDS, WINDOW, measuring_options
-from friso.hunting.settings import TrackingSettings
+from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
 from friso.stage.motion import DURATION, motion_of
 
@@ -131,7 +131,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
     For a periodic reference, Newton's method closes the response of equal period, from the end of the stage's own
     motion.
     """
-    flat, settings = stage.flat(), TrackingSettings.current()
+    flat = stage.flat()
     shape, period = kernel(structure(flat)), motion_of(flat).period(flat)
     start, multiplier = None, None
     begins, ends = WINDOW * flat[DURATION], flat[DURATION]
@@ -139,7 +139,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
     if period is not None and period <= end and (orbit := _closed(shape, flat, period, rtol)) is not None:
         start, multiplier = orbit
         begins, ends, end = 0.0, period, 2 * period  # the error behind the last reversal lasts into the next period
-    interval = (ends - begins) / settings.samples_of_a_period
+    interval = (ends - begins) / tracking_settings.samples_of_a_period
     options = RunOptions(rtol=rtol, interval=interval, record_from=np.inf, least_swing=np.inf)
     (runs,) = run_chunks(shape, {**flat, DURATION: end}, 1, options, start)
     if runs.results.statuses[0] != Status.DONE:
@@ -181,7 +181,6 @@ def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) 
 
     Returns a state on it, shape (1, kept), and its multiplier per period. `flat` has the stage's keys in SI.
     """
-    settings = TrackingSettings.current()
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
     scales = shape.scales(values, 1)[0]
     size = len(shape.states)
@@ -201,21 +200,23 @@ def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) 
         return ends
 
     state = later(None, max(1, int(flat[DURATION] / period)))
-    for _ in range(settings.closing_rounds):
+    for _ in range(tracking_settings.closing_rounds):
         if state is None:
             return None
-        beside = np.vstack([state, state + np.eye(size, state.shape[1]) * settings.derivative_step * scales[:, None]])
+        beside = np.vstack(
+            [state, state + np.eye(size, state.shape[1]) * tracking_settings.derivative_step * scales[:, None]]
+        )
         ends = later(beside)
         if ends is None:
             return None
         gap = (ends[0, :size] - state[0, :size]) / scales
-        by = (ends[1:, :size] - ends[0, :size]).T / (settings.derivative_step * scales[:, None])
+        by = (ends[1:, :size] - ends[0, :size]).T / (tracking_settings.derivative_step * scales[:, None])
         step = np.linalg.lstsq(np.eye(size) - by, gap, rcond=None)[0]
-        if max(np.abs(gap).max(), np.abs(step).max()) <= settings.closed_distance:
+        if max(np.abs(gap).max(), np.abs(step).max()) <= tracking_settings.closed_distance:
             return state, float(np.abs(np.linalg.eigvals(by)).max())
         tried = ends[:1].copy()
         tried[0, :size] = state[0, :size] + step * scales
         after = later(tried)
         closer = after is not None and np.abs((after - tried)[0, :size] / scales).max() < np.abs(gap).max() / 2
-        state = tried if closer else later(ends[:1], settings.periods_waited)
+        state = tried if closer else later(ends[:1], tracking_settings.periods_waited)
     return None

@@ -14,7 +14,7 @@ from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load_object
 from friso.equations import motion
 from friso.hunting import turning
-from friso.hunting.settings import CheckSettings
+from friso.hunting.settings import check_settings
 from friso.hunting.turning import HALF
 
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
@@ -55,14 +55,13 @@ def scan_turning_points(
     make the period, so that ringing on top does not count. `ended` [s], shape (runs,), is the end of each run, and
     `corner` [s] the last time at which its reference moved.
     """
-    settings = CheckSettings.current()
     runs = len(counts)
     since = motion.last_part(HALF, ended, corner)
     arrays = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended, since)))
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
     period, turned, earlier = (np.empty(runs) for _ in range(3))
-    scan_runs: Callable[..., None] = turning.run if counts.sum() < settings.compiled_from_points else _compiled()
+    scan_runs: Callable[..., None] = turning.run if counts.sum() < check_settings.compiled_from_points else _compiled()
     scan_runs(*arrays, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
 

@@ -13,7 +13,7 @@ from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.rounds import RTOL
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.basin import (
     Kick,
     MoveShare,
@@ -39,7 +39,7 @@ from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
-from friso.hunting.settings import BasinSettings, CheckSettings
+from friso.hunting.settings import basin_settings, check_settings
 from friso.hunting.what_attracts import resolved_map
 from friso.stage import Stage
 
@@ -173,14 +173,15 @@ def judge(
     Kicks and other bandwidths are searched afterwards; a cycle followed from another bandwidth may still contradict the
     verdict. Parts that `work` does not suffice for (see `friso.engine.allowance`) are not certain.
     """
-    settings = CheckSettings.current()
-    work = settings.check_work if work is None else work
+    work = check_settings.check_work if work is None else work
     motions = Motions.of(ran)
     begin(CheckPart.ATTRACTION)
     with allowance() as spent:
         moves_on = keeps_moving(stage.flat()) and not cannot_hunt(stage)
         attraction = (
-            Hunting((), MOVING, True, None) if moves_on else hunting(stage, work=settings.survey_work_share * work)
+            Hunting((), MOVING, True, None)
+            if moves_on
+            else hunting(stage, work=check_settings.survey_work_share * work)
         )
     if not motions.completed[0]:
         return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))
@@ -204,12 +205,12 @@ def _without_a_target(
 
     `motions` has its own motion, and `attraction` the search for attractors. `tell` is called with the verdict.
     """
-    with allowance(CheckSettings.current().rest_work_share * work) as spent:
+    with allowance(check_settings.rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
             motions,
             1,
-            replace(measuring_options(rtol), room=SurveySettings.current().run_turning_points),
+            replace(measuring_options(rtol), room=settings.run_turning_points),
             possible=attraction.possible,
         )
     if rest.away[0] and leaves_for_good(stage):
@@ -259,22 +260,21 @@ def _with_a_target(
 
     `target` is how far and how late a run must swing to count as hunting. `begin` and `tell` are called as in `judge`.
     """
-    settings = CheckSettings.current()
     with allowance() as spent:
-        own = own_motion(stage, target, settings.rest_work_share * work)
+        own = own_motion(stage, target, check_settings.rest_work_share * work)
         if not own.completed:
             return Judgement("failed", attraction, runs_away=_runs_away(stage, target) and leaves_for_good(stage))
         within = float(motions.settling[0])
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
         doubt = own.doubt or doubt
-        if own.ends and own.swing > settings.runaway_swing_factor * _widest(attraction):
+        if own.ends and own.swing > check_settings.runaway_swing_factor * _widest(attraction):
             doubt = RUNS_AWAY
         sure = np.ones(1, bool)
         word = verdicts(sure, sure, sure, np.array([own.ends]), ~sure)[0]
         if attraction.certain and not doubt:
             tell(word)
         begin(CheckPart.STARTS)
-        starts, started = _starts(stage, attraction, target, settings.kick_work_share * work)
+        starts, started = _starts(stage, attraction, target, check_settings.kick_work_share * work)
     begin(CheckPart.BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     sought = _as_sure(stage, sought, attraction)
@@ -311,9 +311,8 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     The motion hunts if it ends in a swing of the size and period of `target`. A motion that still swings, but less far
     or less often, may be decaying. It is then continued, if the given work suffices.
     """
-    settings = CheckSettings.current()
     flat = stage.flat()
-    factors = 1 + np.array(settings.mass_changes)
+    factors = 1 + np.array(check_settings.mass_changes)
     changed = {key: value * factors for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
     ends, completed, swing = ends_in({**flat, **changed}, len(factors), target)
     doubt = BY_CHANCE if np.any(ends[completed] != ends[0]) else "" if completed.all() else UNCHECKED
@@ -321,7 +320,9 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     if own.ends or own.doubt or not own.completed or own.swing <= resting(flat)[0]:
         return own
     longer = replace(
-        target, early=settings.small_swing_factor * target.lasting, lasting=settings.small_swing_factor * target.lasting
+        target,
+        early=check_settings.small_swing_factor * target.lasting,
+        lasting=check_settings.small_swing_factor * target.lasting,
     )
     try:
         with allowance(work):
@@ -355,11 +356,10 @@ def _starts(
     work does not suffice. The second result names this part of the check if its answer is incomplete: for lack of work,
     or because runs failed.
     """
-    settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     if attraction.passing:  # a swing that is smaller at its end may be transient as well
         return starts, ()
-    widest = np.inf if attraction.lower_gains is None else settings.runaway_swing_factor * _widest(attraction)
+    widest = np.inf if attraction.lower_gains is None else check_settings.runaway_swing_factor * _widest(attraction)
     try:
         with allowance(work):
             surveyed = attraction.surveyed
@@ -394,7 +394,7 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
     """
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
-    return lost or (moved is not None and not moved.hunting and moved.count < BasinSettings.current().drawn_moves)
+    return lost or (moved is not None and not moved.hunting and moved.count < basin_settings.drawn_moves)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:

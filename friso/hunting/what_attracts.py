@@ -23,7 +23,7 @@ from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_map
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.mapped import Mapped, map_stages
-from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.return_map.settings import settings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 from friso.stage.standstill import dead_band
@@ -177,7 +177,7 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
     """
     if not has_a_map(stages):
         return None, np.zeros(stages.count, bool)
-    mapped = map_stages(stages, ReturnMapSettings.current().sketched_starts, 1, SKETCH_RTOL, sparse=True)
+    mapped = map_stages(stages, settings.sketched_starts, 1, SKETCH_RTOL, sparse=True)
     return mapped, MapSurvey(mapped, (), (), np.zeros(stages.count, bool)).resolved
 
 
@@ -213,7 +213,6 @@ def _hardly_attracts(landing_map: LandingMap) -> bool:
     A trusted attractor is simple, strongly stable, and reached from enough points. Where a stage next sticks almost as
     far off as before, straight pieces between points create long cycles that the stage does not have.
     """
-    settings = ReturnMapSettings.current()
     swings = 1 if landing_map.symmetric else 2
     return not any(
         len(one.distances) == swings

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, t_value
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.intervals import COVERAGE
 
 Correlated = tuple[Sequence[Estimate], np.ndarray]
@@ -95,7 +95,7 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     shared = float(np.average([estimate.systematic for estimate in estimates], weights=weights))
     squares = float(np.sum(weights * (values - mean) ** 2))
     method = ", ".join(dict.fromkeys(estimate.method for estimate in estimates))
-    if chi2.sf(squares, freedom) > IdentificationSettings.current().chance_of_agreement:
+    if chi2.sf(squares, freedom) > identification_settings.chance_of_agreement:
         errors = np.array([(estimate.half_width - estimate.systematic) / COVERAGE for estimate in estimates])
         error = float(np.linalg.norm(weights * errors)) / float(weights.sum())
         ratio = (squares / freedom) ** 0.5

@@ -19,7 +19,7 @@ from friso.identification.logs.read import file_format, is_frequency_response, r
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.logs.time_base import usual_step
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.identification.sources import log_with_signals, unnamed
 
 
@@ -61,8 +61,7 @@ class ChannelContent:
 
         The mean of a part without finite values is NaN.
         """
-        settings = IdentificationSettings.current()
-        parts = np.array_split(self.values, min(settings.bins_of_a_small_plot, max(self.values.size, 1)))
+        parts = np.array_split(self.values, min(identification_settings.bins_of_a_small_plot, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
         # divided first, because the sum of huge values is infinite
         return np.array([(part / part.size).sum() if part.size else np.nan for part in finite])

@@ -28,8 +28,8 @@ from friso.identification.output_error.effects import (
     reaching_over,
 )
 from friso.identification.output_error.parameters import BRISTLES
-from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.settings import DoubtSettings
+from friso.identification.output_error.settings import settings
+from friso.identification.settings import doubt_settings
 from friso.progress import Progress, silent
 from friso.registry import Registry
 
@@ -178,7 +178,7 @@ class FitCase(FittedCase):
         `moved` is the shift of the fitted numbers, shape (free,); it is multiplied by a setting, `reach_of_an_effect`.
         `further` widens the intervals of some parameters more, by name.
         """
-        reach = DoubtSettings.current().reach_of_an_effect * np.abs(moved)
+        reach = doubt_settings.reach_of_an_effect * np.abs(moved)
         return reaching_over(self.fit, reach + [(further or {}).get(name, 0.0) for name in self.fit.fitted])
 
     def named(
@@ -204,7 +204,7 @@ class FitCase(FittedCase):
         """
         finding = self.named(effect, words, size, self.unit, further)
         force = self.log["force"][self.log.longest]
-        small = size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
+        small = size < doubt_settings.force_share_of_a_told_effect * float(np.std(force))
         return RaisedDoubt(fit=finding.fit) if small else finding
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
@@ -324,14 +324,15 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
     those that fit much worse than the best; then causes that no inverse model tests. Doubts of the moment "otherwise"
     are examined only if no effect fits much better. Returns [] if nothing explains the log.
     """
-    settings = DoubtSettings.current()
     every = list(raised("cause", case))
-    enough = settings.error_share_of_a_cause * case.inverse.error
+    enough = doubt_settings.error_share_of_a_cause * case.inverse.error
     better = sorted(
         (finding for finding in every if finding.without and finding.without.error < enough),
         key=lambda finding: finding.without.error if finding.without else np.inf,
     )
-    most = settings.error_ratio_of_rival_causes * min((one.without.error for one in better if one.without), default=0.0)
+    most = doubt_settings.error_ratio_of_rival_causes * min(
+        (one.without.error for one in better if one.without), default=0.0
+    )
     rivals = [one for one in better if one.without and one.without.error <= most]
     plain = [finding for finding in every if finding.without is None]
     return [*raised("fault", case), *rivals, *plain, *(() if rivals else raised("otherwise", case))]
@@ -339,7 +340,7 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
 
 def way_of(velocity: np.ndarray) -> np.ndarray:
     """Return the direction, -1 to 1, of a velocity [m/s], (n,); it turns gradually near 0."""
-    return np.clip(velocity / (DoubtSettings.current().speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
+    return np.clip(velocity / (doubt_settings.speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
@@ -363,7 +364,7 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
         return None
     of_all = float(rest @ rest) / float(case.fit.residual @ case.fit.residual)
     left, moved = 1 - of_all * (1 - best.explained.left), best.explained.moved[[*case.fit.free]]
-    enough = left <= DoubtSettings.current().power_left_by_an_effect
+    enough = left <= doubt_settings.power_left_by_an_effect
     return replace(best, explained=replace(best.explained, moved=moved, left=left)) if enough else None
 
 
@@ -389,7 +390,7 @@ def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[s
     `reasons` are by key; an estimate without a reason is left out. The range left to Coulomb friction reaches down to
     its lower end divided by the highest ratio of static to Coulomb friction.
     """
-    ratio = OutputErrorSettings.current().highest_friction_ratio
+    ratio = settings.highest_friction_ratio
     return {
         one.name: Estimate.unknown(
             one.name,

@@ -9,7 +9,7 @@ import numpy as np
 from friso.identification.inverse_model import FilteredMotion, motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.problem import Simulated
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.identification.spread import correlation_length
 
 
@@ -54,9 +54,8 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
     `bandwidth` [Hz] is the motion's.
     """
-    settings = IdentificationSettings.current()
-    measured = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
-    modelled = motion(simulated.position, log.sample_time, settings.smoothing_bandwidths * bandwidth)
+    measured = motion(log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * bandwidth)
+    modelled = motion(simulated.position, log.sample_time, identification_settings.smoothing_bandwidths * bandwidth)
     disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
     return SimulationErrors(
         _relative(log["position"][part], simulated.position),
@@ -101,11 +100,10 @@ def _explained(residual: np.ndarray, along: np.ndarray) -> float:
 
     `along`, shape (n,), is a position or a speed. The fraction that chance explains is subtracted.
     """
-    settings = IdentificationSettings.current()
-    edges = np.linspace(along.min(), along.max(), settings.bins_of_a_residual + 1)
-    bins = np.clip(np.digitize(along, edges) - 1, 0, settings.bins_of_a_residual - 1)
-    count = np.bincount(bins, minlength=settings.bins_of_a_residual)
-    means = np.bincount(bins, residual, minlength=settings.bins_of_a_residual) / np.maximum(count, 1)
+    edges = np.linspace(along.min(), along.max(), identification_settings.bins_of_a_residual + 1)
+    bins = np.clip(np.digitize(along, edges) - 1, 0, identification_settings.bins_of_a_residual - 1)
+    count = np.bincount(bins, minlength=identification_settings.bins_of_a_residual)
+    means = np.bincount(bins, residual, minlength=identification_settings.bins_of_a_residual) / np.maximum(count, 1)
     power = float(np.mean(residual**2))
     independent = len(residual) / correlation_length(residual)
     share = float(np.sum(count * means**2)) / len(residual) / power if power else 0.0

@@ -24,7 +24,7 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.readings.common import cart, noise_of, turns_of
-from friso.identification.settings import DoubtSettings, IdentificationSettings
+from friso.identification.settings import doubt_settings, identification_settings
 from friso.identification.spread import groups_of, spread_of
 
 METHOD = "least squares on the inverse model"
@@ -78,11 +78,10 @@ def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
 
     Positions stay unchanged if the cut-off is above half the sampling frequency.
     """
-    settings = IdentificationSettings.current()
     if cutoff >= 0.5 / sample_time:
         return position
-    sections = _smoothing(settings.order_of_smoothing, 2 * cutoff * sample_time)
-    edge = min(3 * settings.order_of_smoothing, position.shape[-1] - 1)
+    sections = _smoothing(identification_settings.order_of_smoothing, 2 * cutoff * sample_time)
+    edge = min(3 * identification_settings.order_of_smoothing, position.shape[-1] - 1)
     return sosfiltfilt(sections, position, axis=-1, padlen=edge)
 
 
@@ -101,9 +100,8 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
     If the cut-off is near the sampling frequency, derivatives are taken from a spline, because differences would lose a
     part of the acceleration.
     """
-    settings = IdentificationSettings.current()
     smooth, filtered = smoothed(position, sample_time, cutoff), cutoff < 0.5 / sample_time
-    if cutoff * sample_time < settings.sampling_of_splines:
+    if cutoff * sample_time < identification_settings.sampling_of_splines:
         velocity = np.gradient(smooth, sample_time)
         return FilteredMotion(smooth, velocity, np.gradient(velocity, sample_time))
     time = np.arange(len(smooth)) * sample_time
@@ -120,21 +118,22 @@ def bandwidth_of(log: Log) -> float:
     The bandwidth is the frequency below which the acceleration has 95 % of its power, counting only frequencies at
     which the position (or the integrated velocity) stands out of its noise. Raises InputError if there are none.
     """
-    settings = IdentificationSettings.current()
     role, derivatives = ("velocity", 1) if log.is_integrated else ("position", 2)
     lengths = [part.stop - part.start for part in log.segments]
-    pieces = min(max(lengths), max(256, sum(lengths) // settings.pieces_of_a_spectrum))
+    pieces = min(max(lengths), max(256, sum(lengths) // identification_settings.pieces_of_a_spectrum))
     whole = [log[role][part] for part, length in zip(log.segments, lengths, strict=True) if length >= pieces]
     spectra = [welch(part, 1 / log.sample_time, nperseg=pieces, detrend="linear") for part in whole]
     frequency = spectra[0][0]
     power = np.average([spectrum for _, spectrum in spectra], axis=0, weights=[part.size for part in whole])
     noise = np.median(power[3 * len(power) // 4 :])
-    below = np.flatnonzero(power < settings.power_above_noise * noise)
+    below = np.flatnonzero(power < identification_settings.power_above_noise * noise)
     passband = slice(0, below[0] if below.size else len(power))
     share = np.cumsum((power - noise)[passband] * frequency[passband] ** (2 * derivatives))
     if not share.size or not share[-1] > 0:
         raise InputError(role, "nothing but noise", "a motion that stands out of it", "a larger or faster move")
-    return float(frequency[passband][np.searchsorted(share, settings.power_share_of_the_motion * share[-1])])
+    return float(
+        frequency[passband][np.searchsorted(share, identification_settings.power_share_of_the_motion * share[-1])]
+    )
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:
@@ -142,14 +141,17 @@ def directions(position: np.ndarray) -> tuple[bool, bool]:
 
     Noise does not count as motion.
     """
-    settings = IdentificationSettings.current()
     steps = np.diff(
         position[
-            [0, *turns_of(position, settings.deviations_of_standing_still * noise_of(position)), len(position) - 1]
+            [
+                0,
+                *turns_of(position, identification_settings.deviations_of_standing_still * noise_of(position)),
+                len(position) - 1,
+            ]
         ]
     )
     travelled = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
-    forward, back = travelled > settings.way_share_of_a_direction * travelled.sum()
+    forward, back = travelled > identification_settings.way_share_of_a_direction * travelled.sum()
     return bool(forward), bool(back)
 
 
@@ -177,7 +179,7 @@ def inverse_model(
     """
     if bandwidth is None:
         return _within_its_moves(log, by_direction, cart_share, averaged, extra)
-    settings, band = IdentificationSettings.current(), bandwidth
+    band = bandwidth
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
         actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
@@ -187,11 +189,11 @@ def inverse_model(
     time, columns, force, position = (np.concatenate([part[i] for part in parts]) for i in range(4))
     velocity = columns[:, 1] + columns[:, 3] if by_direction else columns[:, 1]
     speed = np.abs(velocity)
-    slides = ~_rests(speed <= settings.speed_share_of_sliding * speed.max(initial=0.0), time)
+    slides = ~_rests(speed <= identification_settings.speed_share_of_sliding * speed.max(initial=0.0), time)
     time, columns, force, position, velocity = (rows[slides] for rows in (time, columns, force, position, velocity))
-    if len(force) < settings.rows_of_an_inverse_model:
+    if len(force) < identification_settings.rows_of_an_inverse_model:
         actual = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
-        least = f"at least {settings.rows_of_an_inverse_model} in motion after decimation"
+        least = f"at least {identification_settings.rows_of_an_inverse_model} in motion after decimation"
         expected = f"{least}: a longer log, or the experiment that it is"
         raise InputError("position", actual, expected, "--as break-away, for force that rises from rest")
     both = all(directions(log["position"]))
@@ -207,8 +209,11 @@ def inverse_model(
         for (name, unit), value, variance in zip(names, solution[:own], np.diag(covariance), strict=True)
     )
     residual, size = np.linalg.norm(force - fitted), float(np.linalg.norm(force))
-    power, little = float(force @ velocity), settings.power_share_of_friction * size * float(np.linalg.norm(velocity))
-    poor = residual > DoubtSettings.current().error_of_a_poor_model * size
+    power, little = (
+        float(force @ velocity),
+        identification_settings.power_share_of_friction * size * float(np.linalg.norm(velocity)),
+    )
+    poor = residual > doubt_settings.error_of_a_poor_model * size
     if estimates[0].high < 0 and (power < 0 or (not poor and power < little)):  # the motor feeds friction
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
         actual = f"a mass of {solution[0]:.3g} {unit_of('kg', log)}"
@@ -227,14 +232,14 @@ def _within_its_moves(
 
     A smaller bandwidth counts if the error is half of the first or less. Raises InputError as `inverse_model` does.
     """
-    poor, band = DoubtSettings.current().error_of_a_poor_model, bandwidth_of(log)
+    poor, band = doubt_settings.error_of_a_poor_model, bandwidth_of(log)
     first: InverseModel | InputError
     try:
         first = inverse_model(log, band, by_direction, cart_share, averaged, extra)
     except InputError as error:  # vibration may be against the force, as of a negative mass
         first = error
     worse = first.error if isinstance(first, InverseModel) else 1.0
-    for part in IdentificationSettings.current().bandwidths_within_vibration if worse > poor else ():
+    for part in identification_settings.bandwidths_within_vibration if worse > poor else ():
         with suppress(InputError):
             model = inverse_model(log, part * band, by_direction, cart_share, averaged, extra)
             if model.error <= min(poor, worse / 2):
@@ -289,11 +294,10 @@ def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
 
     `slow` marks slow rows, and `time` [s] has their instants.
     """
-    settings = IdentificationSettings.current()
     ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     rests = np.zeros(len(slow), bool)
     for first, behind in zip(ends[::2], ends[1::2], strict=True):
-        rests[first:behind] = time[behind - 1] - time[first] >= settings.time_of_a_left_out_rest
+        rests[first:behind] = time[behind - 1] - time[first] >= identification_settings.time_of_a_left_out_rest
     return rests
 
 
@@ -317,14 +321,13 @@ def _rows(
     `part` are its samples, and `band` [Hz] is the motion's bandwidth; the other arguments are those of `inverse_model`.
     All results are empty for a segment too short to filter.
     """
-    settings = IdentificationSettings.current()
-    if part.stop - part.start < 2 * settings.samples_of_an_edge:
+    if part.stop - part.start < 2 * identification_settings.samples_of_an_edge:
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
-    moved = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * band)
+    moved = motion(log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * band)
     v, a = moved.velocity, moved.acceleration
     carried_position = cart(log) if cart_share else None
     if carried_position is not None:
-        carried = motion(carried_position[part], log.sample_time, settings.smoothing_bandwidths * band)
+        carried = motion(carried_position[part], log.sample_time, identification_settings.smoothing_bandwidths * band)
         v, a = carried.velocity, cart_share * carried.acceleration + (1 - cart_share) * a
     sign = np.sign(v)
     if by_direction:
@@ -335,9 +338,16 @@ def _rows(
     if averaged > 1:
         columns = uniform_filter1d(columns, averaged, axis=0)
     columns = np.hstack([columns, extra])
-    step = max(1, round(settings.decimation_pass / (2 * settings.decimation_bandwidths * band * log.sample_time)))
+    step = max(
+        1,
+        round(
+            identification_settings.decimation_pass
+            / (2 * identification_settings.decimation_bandwidths * band * log.sample_time)
+        ),
+    )
     arrays = [
-        array[settings.samples_of_an_edge :] for array in (log.time[part], columns, log["force"][part], moved.position)
+        array[identification_settings.samples_of_an_edge :]
+        for array in (log.time[part], columns, log["force"][part], moved.position)
     ]
     time, position = (array[_first(len(array), step) :: step] for array in (arrays[0], arrays[3]))
     return time, _decimated(arrays[1], step), _decimated(arrays[2], step), position
@@ -345,13 +355,15 @@ def _rows(
 
 def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
     """Keep every `step`th row, after a low-pass forward and back against aliasing."""
-    settings = IdentificationSettings.current()
     if step == 1:
         return columns
     sections = cheby1(
-        settings.order_of_decimation, settings.ripple_of_decimation, settings.decimation_pass / step, output="sos"
+        identification_settings.order_of_decimation,
+        identification_settings.ripple_of_decimation,
+        identification_settings.decimation_pass / step,
+        output="sos",
     )
-    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * settings.order_of_decimation)
+    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * identification_settings.order_of_decimation)
     return low[_first(len(columns), step) :: step]
 
 

@@ -12,7 +12,7 @@ from friso.identification.doubt import IMITATED, KeyCase, RaisedDoubt
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.parameters import BRISTLES, is_free
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 SLOW_FRICTION = ("friction.static", "friction.stribeck_velocity", "friction.stribeck_exponent")
 """Keys of friction at low speed, which a fit that leaves much can trade for what the model lacks."""
@@ -167,7 +167,7 @@ def _reaching(case: KeyCase) -> dict[str, Estimate]:
 
 def _wider(estimate: Estimate, much: bool) -> Estimate:
     """Return an estimate, its interval widened by a set factor if `much` is left unexplained."""
-    more = (DoubtSettings.current().widening_where_much_is_left - 1) * estimate.half_width if much else 0.0
+    more = (doubt_settings.widening_where_much_is_left - 1) * estimate.half_width if much else 0.0
     return replace(estimate, low=estimate.low - more, high=estimate.high + more)
 
 

@@ -27,7 +27,7 @@ from friso.identification.output_error.repeated import as_far_off_as_repeated, l
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -99,7 +99,6 @@ def identify_moves(
     per unit of force. `tell` gets the inverse model's estimates as soon as they are known. Raises InputError for a log
     without position or force.
     """
-    settings = IdentificationSettings.current()
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
@@ -107,7 +106,9 @@ def identify_moves(
     by_direction = inverse_model(log, inverse.bandwidth, True, share)
     tell(log.name, inverse.estimates)
     follows, loop = _problems(log, part, flat, inverse, own_loop)
-    moved = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)
+    moved = motion(
+        log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth
+    )
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
@@ -225,10 +226,11 @@ def _problems(
 
     Both have all parameters of their equations. The second is None without `own_loop`.
     """
-    settings = IdentificationSettings.current()
     speed = float(
         np.abs(
-            motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth).velocity
+            motion(
+                log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth
+            ).velocity
         ).max()
     )
     levels = _levels(log, flat, inverse)

@@ -12,7 +12,7 @@ from friso.identification.doubt import DOUBTS, RaisedDoubt, RecordCase, ValueCas
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 from friso.quantities import percent, plain_factor
 
 UNKNOWN = (
@@ -64,12 +64,12 @@ class Quality:
     @property
     def lacks_something(self) -> bool:
         """Tell whether the fit leaves clearly more than noise."""
-        return self.ratio > DoubtSettings.current().noise_ratio_of_a_lacking_model
+        return self.ratio > doubt_settings.noise_ratio_of_a_lacking_model
 
     @property
     def may_imitate_bristles(self) -> bool:
         """Tell whether the residual is so large that missing effects may look like bristles."""
-        return self.ratio > DoubtSettings.current().noise_ratio_of_imitated_bristles
+        return self.ratio > doubt_settings.noise_ratio_of_imitated_bristles
 
     @property
     def lacking(self) -> float:
@@ -88,20 +88,23 @@ def quality_of(
     The whole model may describe a record that the inverse model, which has no sticking, does not. A cause then raises
     no doubt if the whole model is clearly better than the inverse model corrected for the cause.
     """
-    settings, case = DoubtSettings.current(), RecordCase(log, inverse, cart_share)
+    case = RecordCase(log, inverse, cart_share)
     flat, left, passed = fit.stage, fit.left, fit.problem.noise_left(noise)
     findings = list(raised("record", case))
     plain = Quality(noise, left, passed, inverse.error, whole_error(flat, inverse), tuple(findings))
     if fit.problem.closed and fit.explains(noise):
         return plain
     force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
-    beyond = inverse.error > settings.error_of_a_poor_model and left < settings.error_of_an_unsettled_record * force
-    poor = inverse.error > settings.error_of_a_poor_model and not beyond
+    beyond = (
+        inverse.error > doubt_settings.error_of_a_poor_model
+        and left < doubt_settings.error_of_an_unsettled_record * force
+    )
+    poor = inverse.error > doubt_settings.error_of_a_poor_model and not beyond
     reasons = causes(case) if plain.lacks_something or poor else []
-    better = settings.error_share_of_a_clearly_better_model * force
+    better = doubt_settings.error_share_of_a_clearly_better_model * force
     if beyond:
         reasons = [cause for cause in reasons if cause.without is None or better * cause.without.error < left]
-    worse = max(settings.error_ratio_of_a_contradiction * inverse.error, settings.error_of_a_fine_model)
+    worse = max(doubt_settings.error_ratio_of_a_contradiction * inverse.error, doubt_settings.error_of_a_fine_model)
     contradicts = plain.whole_error > worse and left > better * inverse.error
     rejected = plain.lacks_something and contradicts and not (beyond or poor)
     seen = any(cause.without is None and DOUBTS[cause.doubt].moment == "cause" for cause in reasons)
@@ -111,12 +114,12 @@ def quality_of(
     findings += raised("value", ValueCase(log, inverse, cart_share, plain.lacks_something, poor))
     without = tuple(cause.without for cause in reasons if cause.without)
     best = min([inverse.error, *(model.error for model in without)])
-    unsettled = plain.lacks_something and min(left / force, best) > settings.error_of_an_unsettled_record
+    unsettled = plain.lacks_something and min(left / force, best) > doubt_settings.error_of_an_unsettled_record
     return replace(
         plain,
         findings=tuple(findings),
         rejected=rejected,
-        failed=poor and plain.whole_error > settings.error_of_a_poor_model,
+        failed=poor and plain.whole_error > doubt_settings.error_of_a_poor_model,
         without=without,
         spoilt=unsettled or any(one.spoils for one in (*reasons, *findings)),
         unsettled=unsettled,

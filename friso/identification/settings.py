@@ -458,3 +458,8 @@ class ExperimentSettings(Settings):
 
     stiffness_share_of_a_limiter: float = setting(0.1, "")
     """Largest stiffness of a joint, relative to its limiter's stiffness."""
+
+
+doubt_settings = DoubtSettings.live()
+identification_settings = IdentificationSettings.live()
+experiment_settings = ExperimentSettings.live()

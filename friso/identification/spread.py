@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.intervals import COVERAGE
 
 CONFIDENCE = 0.975
@@ -22,7 +22,7 @@ def correlation_length(residual: np.ndarray) -> int:
     centred = residual - residual.mean()
     count = len(centred)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
-    correlation = np.fft.irfft(spectrum)[: max(2, int(IdentificationSettings.current().row_share_of_likeness * count))]
+    correlation = np.fft.irfft(spectrum)[: max(2, int(identification_settings.row_share_of_likeness * count))]
     if correlation[0] <= 0:
         return 1
     correlation = correlation / correlation[0]
@@ -37,11 +37,10 @@ def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarr
     Groups are blocks of time, of position [m], and of velocity [m/s], split into speeding up and slowing down by the
     acceleration [m/s^2]. Model errors recur with place and speed, so a repeated motion gives no new information.
     """
-    settings = IdentificationSettings.current()
     return (
-        np.arange(len(position)) * settings.blocks_of_time // len(position),
-        binned(position, settings.bins_of_place_and_speed),
-        2 * binned(velocity, settings.bins_of_place_and_speed) + (velocity * acceleration > 0),
+        np.arange(len(position)) * identification_settings.blocks_of_time // len(position),
+        binned(position, identification_settings.bins_of_place_and_speed),
+        2 * binned(velocity, identification_settings.bins_of_place_and_speed) + (velocity * acceleration > 0),
     )
 
 
@@ -87,7 +86,7 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """
     count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
-    window = min(max(window, 1), max(2, int(IdentificationSettings.current().row_share_of_likeness * count)))
+    window = min(max(window, 1), max(2, int(identification_settings.row_share_of_likeness * count)))
     middle = scores.T @ scores
     for lag in range(1, window):
         shifted = scores[lag:].T @ scores[:-lag]
@@ -106,7 +105,7 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
     power = np.bincount(members, (scores**2).sum(axis=1), len(names))
     equal = power.sum() ** 2 / (power @ power) if power.any() else 1.0
-    freedom = max(equal - 1, IdentificationSettings.current().least_freedom_of_groups)
+    freedom = max(equal - 1, identification_settings.least_freedom_of_groups)
     wider = float(student.ppf(CONFIDENCE, freedom)) / COVERAGE
     return wider**2 * (1 + 1 / freedom) * (sums.T @ sums)
 
@@ -117,9 +116,8 @@ def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Directions that the columns do not resolve are left out. `square` is X' X, shape (p, p); the second result has the
     shape (p,).
     """
-    settings = IdentificationSettings.current()
     sizes, directions = np.linalg.eigh(square)
-    collinear = sizes < settings.eigenvalue_of_likeness * sizes[-1]
+    collinear = sizes < identification_settings.eigenvalue_of_likeness * sizes[-1]
     resolved = directions[:, ~collinear]
-    alike = (np.abs(directions[:, collinear]) > np.sqrt(settings.eigenvalue_of_likeness)).any(axis=1)
+    alike = (np.abs(directions[:, collinear]) > np.sqrt(identification_settings.eigenvalue_of_likeness)).any(axis=1)
     return resolved / sizes[~collinear] @ resolved.T, alike

@@ -13,7 +13,7 @@ from friso.equations.controllers.van_dijk import controller_table
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel, motion
 from friso.identification.logs.log import Log
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.stage import Stage
 
 NOT_IDENTIFIED = "not identified: all that is possible"
@@ -34,11 +34,10 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
     The stage has one rigid mass, LuGre friction without Stribeck effect, a controller chosen by friso, and a move as
     fast as the log's fastest motion.
     """
-    settings = IdentificationSettings.current()
     mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
-    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / settings.bend_of_made_up_bristles
+    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / identification_settings.bend_of_made_up_bristles
     parts = [
-        motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)
+        motion(log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth)
         for part in log.segments
     ]
     axis = log.axis
@@ -52,7 +51,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
             "model": "lugre",
             "static": f"{coulomb:.6g} {axis.force}",
             "coulomb": f"{coulomb:.6g} {axis.force}",
-            "stribeck_velocity": f"{settings.made_up_stribeck_velocity:g} {axis.length}/s",
+            "stribeck_velocity": f"{identification_settings.made_up_stribeck_velocity:g} {axis.length}/s",
             "stribeck_exponent": 2,
             "bristle_stiffness": f"{stiffness:.6g} {axis.unit('N/m')}",
             "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} {axis.unit('N*s/m')}",
@@ -142,6 +141,6 @@ def round_uncertainty(half: float) -> tuple[str, int]:
 
     The number is negative if tens, hundreds and so on are the last digit.
     """
-    digits = IdentificationSettings.current().digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
+    digits = identification_settings.digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits
     return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits

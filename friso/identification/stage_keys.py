@@ -9,8 +9,8 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.settings import IdentificationSettings
+from friso.identification.output_error.settings import settings
+from friso.identification.settings import identification_settings
 from friso.identification.stage_file import estimate_text, identified_stage
 from friso.intervals import uncertain_value
 from friso.quantities import Number, Quantity
@@ -83,7 +83,7 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
     flat = stage.flat()
     coulomb = next((candidate for candidate in estimates if candidate.name == COULOMB and candidate.determined), None)
     value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
-    top = OutputErrorSettings.current().highest_friction_ratio * value
+    top = settings.highest_friction_ratio * value
     # a bound equal to Coulomb friction adds nothing: static friction then follows Coulomb friction
     return replace(estimate, high=top) if max(flat[STATIC], high) < estimate.low < top else estimate
 
@@ -104,7 +104,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
         return None, f"{ends} is all that is known, the stage file keeps its value: it has to be {field.bound.text}"
     if _allowed(estimate, field):
         return estimate, ""
-    low = IdentificationSettings.current().share_of_a_least_value * estimate.high
+    low = identification_settings.share_of_a_least_value * estimate.high
     cut = replace(estimate, value=np.nan, low=low, reason=estimate.reason or f"it has to be {field.bound.text}")
     limits = f"{estimate_text(estimate)} was found, but it has to be {field.bound.text}"
     if estimate.low < low and _allowed(cut, field):

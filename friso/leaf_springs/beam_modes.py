@@ -18,7 +18,7 @@ from friso.leaf_springs.closed_forms import axial, body_mass
 from friso.leaf_springs.evaluation import Mode, peak_of
 from friso.leaf_springs.mechanism import Mechanism, along_motion
 from friso.leaf_springs.naming import mode_name
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 
 KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
 """Coordinates of a node that couple while the leaf is straight, with the number of modes between held ends: bending,
@@ -107,7 +107,6 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
 
     The drive mode comes first, the others by frequency.
     """
-    settings = LeafSpringSettings.current()
     ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
     count = len(leaf.squares)
     size = COORDINATES + count * len(rows)

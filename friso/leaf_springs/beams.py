@@ -16,7 +16,7 @@ from friso.leaf_springs.beam_modes import Reduced, buckling_load, modes
 from friso.leaf_springs.beam_system import ELEMENTS, BeamFailure, Condensed, Configuration, LeafBeams
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 
 PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 """Coordinates of the stage in the plane of motion, and across it, as slices of six."""
@@ -66,7 +66,6 @@ def _check(mechanism: Mechanism, stroke: float) -> None:
 
 def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluation:
     """Evaluate the mechanism at several deflections up to the stroke [m], and its modes at rest."""
-    settings = LeafSpringSettings.current()
     deflections = np.linspace(0, stroke, settings.beam_deflections)
     rest = Configuration.rest(leaves)
     straight = np.repeat(leaves.stiffness(rest.state(mechanism.offsets)[:1]), leaves.count, axis=0)
@@ -98,7 +97,6 @@ def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium]
 
     The number of steps doubles until one succeeds. Raises BeamFailure if none does.
     """
-    settings = LeafSpringSettings.current()
     nearest = held[-2:]
     start = nearest[-1].place.stage[1]
     for halving in range(settings.most_step_halvings):
@@ -138,7 +136,6 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
 
     Raises BeamFailure if the method does not converge.
     """
-    settings = LeafSpringSettings.current()
     z = place.stage[1]
     close = (
         settings.newton_energy_share

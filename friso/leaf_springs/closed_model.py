@@ -12,7 +12,7 @@ from friso.leaf_springs.curved import stage_stiffness_at
 from friso.leaf_springs.evaluation import Evaluation, Mode, peak_of
 from friso.leaf_springs.mechanism import Mechanism, along_motion
 from friso.leaf_springs.naming import mode_name
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 
 
 def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
@@ -20,7 +20,6 @@ def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
 
     The drive stiffness is equal at all deflections.
     """
-    settings = LeafSpringSettings.current()
     deflections = np.linspace(0.0, stroke, settings.closed_deflections)
     drive = closed_forms.drive_stiffness(mechanism) * np.ones(settings.closed_deflections)
     return Evaluation(
@@ -71,7 +70,6 @@ def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
 
     The motion has shape (6,), and the leaves follow statically.
     """
-    settings = LeafSpringSettings.current()
     s = np.linspace(0.0, 1.0, settings.mode_shape_points)
     by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)
     x, y, z, turn_x, turn_y, turn_z = stage
@@ -92,7 +90,6 @@ def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
 
 def _unlike(mechanism: Mechanism) -> list[Mode]:
     """Return the modes in which the leaves bend against each other, with the stage at rest."""
-    settings = LeafSpringSettings.current()
     count, leaf_mass = int(mechanism.leaves), float(mechanism.leaf_mass)
     modes = []
     for k in range(1, count):
@@ -106,7 +103,6 @@ def _unlike(mechanism: Mechanism) -> list[Mode]:
 
 def _clamped_shape() -> np.ndarray:
     """Return the first bending mode of a clamped beam at even places, with mean square 1."""
-    settings = LeafSpringSettings.current()
     x = CLAMPED * np.linspace(0.0, 1.0, settings.mode_shape_points)
     ratio = (np.cosh(CLAMPED) - np.cos(CLAMPED)) / (np.sinh(CLAMPED) - np.sin(CLAMPED))
     return np.cosh(x) - np.cos(x) - ratio * (np.sinh(x) - np.sin(x))
@@ -114,6 +110,5 @@ def _clamped_shape() -> np.ndarray:
 
 def _torsion_mode(mechanism: Mechanism) -> Mode:
     """Return the first torsional mode of the leaves, whose middle lines stay at rest."""
-    settings = LeafSpringSettings.current()
     leaves = np.zeros((int(mechanism.leaves), settings.mode_shape_points, 3))
     return Mode("leaf torsion", float(closed_forms.leaf_torsion(mechanism)), 0.0, 0.0, 0.0, np.zeros(6), leaves)

@@ -10,7 +10,7 @@ import numpy as np
 from friso.leaf_springs import plate
 from friso.leaf_springs.closed_forms import SHEAR, axial, edgewise_shear
 from friso.leaf_springs.mechanism import Mechanism
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 
 
 def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
@@ -33,7 +33,6 @@ def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
     The leaf is bent by `deflection` [m] into the shape 3 s^2 - 2 s^3, s being the fraction of its length.
     """
-    settings = LeafSpringSettings.current()
     nodes, weights = np.polynomial.legendre.leggauss(settings.gauss_points)
     x, weight = (nodes + 1) / 2 * mechanism.length, weights / 2 * mechanism.length
     share = x / mechanism.length

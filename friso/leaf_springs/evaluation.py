@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.leaf_springs.mechanism import Mechanism
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,6 @@ class Mode:
     @property
     def interferes(self) -> bool:
         """Tell whether actuator and sensor both see the mode well enough to disturb control."""
-        settings = LeafSpringSettings.current()
         return self.peak > settings.visible_peak
 
 

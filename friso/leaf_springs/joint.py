@@ -11,7 +11,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.mechanism import Mechanism, along_motion
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 from friso.stage.flexure import register_derivation
 
 
@@ -54,7 +54,6 @@ class VisibleModes:
     @classmethod
     def of(cls, mechanism: Mechanism) -> VisibleModes:
         """Compute the modes by closed forms, and decide which of them are visible."""
-        settings = LeafSpringSettings.current()
         frequency, shapes = closed_forms.modes(mechanism)
         motion = along_motion(mechanism, mechanism.actuation, shapes) * along_motion(
             mechanism, mechanism.sensor, shapes
@@ -95,7 +94,6 @@ def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     In the equations, a part m_p of the stage's mass m moves on a spring, which gives the residue m_p/(m (m - m_p)). It
     is never negative. If actuator and sensor move against each other, only the size of the residue counts.
     """
-    settings = LeafSpringSettings.current()
     visible = VisibleModes.of(mechanism)
     height = np.where(visible.visible, np.abs(visible.residue), 0.0) / np.maximum(visible.frequency, 1e-9) ** 2
     frequency, residue = visible.at(np.argmax(height, axis=-1))

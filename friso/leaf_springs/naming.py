@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 
 STAGE = ("stage along x", "stage along y", "drive", "stage about x", "stage about y", "stage about z")
 """Names by the motion of the stage."""
@@ -70,7 +70,6 @@ def _number(shapes: np.ndarray) -> str:
 
     `shapes` (leaves, points) are displacements. Waves are counted on the leaf that moves most.
     """
-    settings = LeafSpringSettings.current()
     shape = shapes[np.argmax(np.sum(shapes**2, axis=1))]
     signs = np.sign(shape[np.abs(shape) > settings.shape_ripple * np.max(np.abs(shape))])
     waves = 1 + int(np.sum(signs[1:] != signs[:-1]))

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.leaf_springs.settings import LeafSpringSettings
+from friso.leaf_springs.settings import settings
 
 CONVERGED, PEAK = 0.878, 0.63
 """Fractions that remain with more functions across the width: of the stiffening (0.866 to 0.895 at a Poisson's ratio of
@@ -169,7 +169,6 @@ def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted
     `places` (n,) run along the leaf. The tilt makes the sum of the compliances, weighted by the square of the `torques`
     (n,), equal to `weighted_sum`. Their plain sum stays, so that an even torque twists the leaf as before.
     """
-    settings = LeafSpringSettings.current()
     tilt, total = 0.0, shares.sum()
     for _ in range(settings.tilt_iterations):
         now = shares * np.exp(tilt * places**2)

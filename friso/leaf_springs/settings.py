@@ -53,3 +53,6 @@ class LeafSpringSettings(Settings):
 
     tilt_iterations: int = setting(8, "")
     """Iterations of the tilt. Four reach rounding."""
+
+
+settings = LeafSpringSettings.live()

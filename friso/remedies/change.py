@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
@@ -59,7 +59,6 @@ def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
 
 def _differ(before: Any, after: Any) -> bool:
     """Tell whether two values of a key differ by more than rounding."""
-    settings = RemedySettings.current()
     if before is None or after is None or isinstance(before, str) or isinstance(after, str):
         return bool(before != after)
     return abs(after - before) > settings.unchanged_share * max(abs(before), abs(after))

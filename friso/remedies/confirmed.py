@@ -12,7 +12,7 @@ from friso.equations.bandwidth import faster
 from friso.equations.structure import structure
 from friso.hunting import Hunting, LoopState, find_attractors, hunting, judge_many, kernels_to_judge, unstable
 from friso.remedies.goal import Goal
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.stage import Stage
 
 
@@ -69,7 +69,6 @@ def confirmed(stage: Stage, goal: Goal) -> Confirmation:
     The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and each is
     searched from more starts.
     """
-    settings = RemedySettings.current()
     kernels(kernels_to_judge(structure(stage.flat())))
     steps = settings.bandwidths_beside
     factors = np.delete(goal.distance ** (np.arange(-steps, steps + 1) / steps), steps)

@@ -12,7 +12,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.remedies.catalogue import Remedy
 from friso.remedies.search import Search
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.remedies.variables import Variable, of_key
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
@@ -46,7 +46,6 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
     """Return a key as a variable between two values, and slightly beyond if a stage allows it."""
-    settings = RemedySettings.current()
     towards, away = (
         (new * settings.factor_beyond, old / settings.factor_away)
         if new > old
@@ -86,7 +85,6 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
     fresh machines meets the goal; by default, one standard error more than the goal requires. By default, smaller
     changes between grid points are tried, too. With `enough` they are not, so the first answer has a reserve.
     """
-    settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
     home = np.array([variable.share(variable.present) for variable in search.remedy.variables])
     ways = np.concatenate([np.diag(end - home) for end in (1.0, 0.0)]) / settings.values_alone
@@ -114,7 +112,6 @@ def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> 
     meet the goal by moves and margins. By default, this fraction lies one standard error above the one required of all
     machines.
     """
-    settings = RemedySettings.current()
     least = search.goal.surely(search.fresh.count) if enough is None else enough
     robust = points[search.share(points) >= least] if len(points) else points
     for few in np.array_split(robust, -(-len(robust) // settings.survey_batch)) if len(robust) else ():
@@ -169,7 +166,6 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     taken further, points between it and the working settings, and other small changes tried. The best of all points
     tried follow (`Search.surveyed`).
     """
-    settings = RemedySettings.current()
     wanted, points = partial(change_costs, search.remedy), search.points
     free = points.shares[points.meets(search.goal)]
     free = free[wanted(free) >= min(2, len(search.remedy.variables))]

@@ -12,7 +12,7 @@ from scipy.constants import golden
 from friso.equations.motion import size
 from friso.errors import InputError, StageError
 from friso.quantities import exactly
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
@@ -54,7 +54,7 @@ class MoveRange:
         """
         own, stated = float(size(stage.flat())), stage.moves
         if stated is None:
-            return cls(min(own, RemedySettings.current().smallest_move * within), own)
+            return cls(min(own, settings.smallest_move * within), own)
         low, high = stated.lowest_acceleration, stated.highest_acceleration
         accelerations = None if low is None or high is None else (float(low), float(high))
         return cls(float(stated.smallest), float(stated.largest), accelerations)

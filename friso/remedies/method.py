@@ -30,7 +30,7 @@ from friso.remedies.machines import Fleet, MoveRange, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.remedies.trials import modulus_margins
 from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import (
@@ -206,7 +206,6 @@ def tune(
     `begins` is called before the work starts. `answered` is called with the outcome of a changed bandwidth alone, if
     that is tried first. Raises InputError for a motion after which nothing has to settle.
     """
-    settings = RemedySettings.current()
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _check_motion(stage)
     moves = goal.moves_of(stage)
@@ -297,7 +296,6 @@ def machines_of_search(
     In so small a sample, a machine far less robust than nearly all others would weigh too much. It is left out, and
     another machine counts twice. Sampling and delay come from the stage `drive`.
     """
-    settings = RemedySettings.current()
     machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed, goal.moves)
     many = draw_fleet(stage, correlations, settings.usual_machines, seed + settings.usual_seed)
     own, flat = Remedy.settled_on("", stage), drive.flat()
@@ -465,7 +463,6 @@ class _Session:
 
         Returns False if none of these keys can be searched.
         """
-        settings = RemedySettings.current()
         assert outcome.stage is not None
         less = least_remedy(self.stage, outcome.stage, outcome.remedy)
         if less is None:
@@ -493,9 +490,7 @@ class _Session:
                 continue
             for number in points.for_large_moves(self.goal, largest)[:1]:
                 listed.append((float(points.moves_from[number]), place, points.shares[number], points))
-        for smallest, place, shares, points in sorted(listed, key=lambda item: item[:2])[
-            : RemedySettings.current().most_tries
-        ]:
+        for smallest, place, shares, points in sorted(listed, key=lambda item: item[:2])[: settings.most_tries]:
             remedy = self.outcomes[place].remedy
             search = Search(remedy, self.goal, self.machines, self.fresh, self.drive, self.budget, self.report)
             search.tried.append(points)
@@ -532,7 +527,6 @@ class _Session:
         If no settings work, the first outcome is recorded, which is not sure to work. Few settings are tried, and the
         work is limited.
         """
-        settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
         tries, worked = 0, 0.0
         looks = settings.most_looks if search.remedy.verifiable else 1
@@ -572,7 +566,6 @@ class _Session:
         The interval of the fraction of machines that meet the goal must lie at the required fraction or above. While
         the interval leaves that open, further machines are measured.
         """
-        settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
         unseen, further = (
@@ -604,7 +597,6 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
     These remedies are tried only if no change of the controller alone works.
     """
-    settings = RemedySettings.current()
     if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):
         return []
     several = (outcome for outcome in outcomes if outcome.remedy.of_setting and outcome.remedy.verifiable)
@@ -637,13 +629,11 @@ def _check_motion(stage: Stage) -> None:
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
     """Estimate the number of progress steps of a remedy."""
-    settings = RemedySettings.current()
     return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + settings.progress_steps
 
 
 def _generations(budget: Budget) -> int:
     """Return the largest number of generations of a search."""
-    settings = RemedySettings.current()
     return budget.generations + len(settings.near_ranges) * budget.refined
 
 

@@ -15,7 +15,7 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.remedies.trials import attraction, moves_of_points
 from friso.remedies.verified import RemedyOutcome
 from friso.stage import Stage
@@ -61,7 +61,6 @@ def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet)
     If possible, no part is relaxed by more than a reasonable factor. Otherwise, this is required of the bandwidth limit
     only.
     """
-    settings = RemedySettings.current()
     needed = _needed(points, goal)
     far = [name for name, values in needed.items() if name != "within" and (values > settings.reasonable_factor).any()]
     listed = [*_within(remedy, points, goal, machines, needed, far)]
@@ -81,7 +80,6 @@ def _within(
     `needed` has, by part, the factor by which each of the `points` must be relaxed. Parts in `limited` may not be
     relaxed by more than a reasonable factor. A few of the `machines` must not hunt at a point.
     """
-    settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)
     factor = np.prod([np.maximum(values, 1.0) for values in needed.values()], axis=0)
@@ -138,7 +136,6 @@ def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet)
     A few factors are tried. The first with which the machines settle within the goal's time is taken. If there is none,
     it is the factor of the looser tolerance of the search.
     """
-    settings = RemedySettings.current()
     factors = np.full(len(shares), settings.looser_tolerance)
     open_still = np.arange(min(len(shares), settings.most_relaxed))
     latest = np.inf if goal.settle is None else goal.settle
@@ -158,7 +155,6 @@ def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
 
     Factors are by the names of parts. A part that a point meets has a factor of at most 1.
     """
-    settings = RemedySettings.current()
     none = np.zeros(len(points.margin))
     limit = goal.bandwidth_limit
     return {

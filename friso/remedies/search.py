@@ -20,7 +20,7 @@ from friso.frequency.bandwidth import loop_bandwidths
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.stage import Stage
 
@@ -102,7 +102,7 @@ class TriedPoints:
         first.
         """
         broken = self.broken(goal)
-        some = self.moves_from <= largest / RemedySettings.current().large_share
+        some = self.moves_from <= largest / settings.large_share
         some &= ~np.any([broken[name] for name in ("bandwidth", "margin", "force")], axis=0) & ~self.meets(goal)
         return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
@@ -111,7 +111,6 @@ class TriedPoints:
 
         Points that break constraints cost more than all others, the more they break them.
         """
-        settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
         excess += np.where(np.isfinite(self.force), _excess(np.nan_to_num(self.force), goal.force_limit), 3.0)
         excess += np.nan_to_num(_excess(self.bandwidth, goal.bandwidth_limit), nan=3.0)
@@ -176,8 +175,7 @@ class Search:
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
         """Try settings, as points (points, variables), in batches; yield those that meet the goal."""
-        tuning = RemedySettings.current()
-        for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)) if len(points) else ():
+        for few in np.array_split(points, -(-len(points) // settings.points_looked_at)) if len(points) else ():
             self.report(f"{self.remedy.name}: trying settings")
             with self._allowed(self._work):
                 self.tried.append(self.measured(few))
@@ -190,7 +188,6 @@ class Search:
 
         The search is marked as `cut` in that case.
         """
-        settings = RemedySettings.current()
         left = settings.looking_work * self._work
         while True:
             point = None
@@ -204,7 +201,6 @@ class Search:
     @property
     def _work(self) -> float:
         """Return the work allowed for this search, in the units of `Allowance`."""
-        settings = RemedySettings.current()
         return settings.search_work * (settings.setting_work_share if self.remedy.of_setting else 1.0)
 
     @contextmanager
@@ -222,7 +218,6 @@ class Search:
         One variable is searched on a grid, which is then refined. Several variables are searched by differential
         evolution, if given from the points `start`, then again in smaller ranges around the best point.
         """
-        tuning = RemedySettings.current()
         variables = len(self.remedy.variables)
         if variables == 0:
             self.tried.append(self.measured(np.zeros((1, 0))))
@@ -244,15 +239,15 @@ class Search:
             at = points.shares[int(best), 0]
             cost(np.clip(np.linspace(at - 1 / count, at + 1 / count, self.budget.points * 2), 0, 1)[None])
             return
-        size = max(5, min(self.budget.points * variables, tuning.generation_points))
-        drawn = np.random.default_rng(tuning.optimiser_seed).random((size, variables))
+        size = max(5, min(self.budget.points * variables, settings.generation_points))
+        drawn = np.random.default_rng(settings.optimiser_seed).random((size, variables))
         if start is not None:
             few = start[: size // 2]
             drawn[: len(few)] = few
         _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations, self._is_hopeless)
-        for away in tuning.near_ranges:
+        for away in settings.near_ranges:
             points = self.points
-            if not points.meets(self.goal).any() and points.nearness.max() < tuning.hopeful_nearness:
+            if not points.meets(self.goal).any() and points.nearness.max() < settings.hopeful_nearness:
                 return
             costs = points.cost(self.goal, None if wanted is None else wanted(points.shares))
             best = points.shares[int(costs.argmin())]
@@ -264,15 +259,14 @@ class Search:
 
     def _is_hopeless(self, generation: int) -> bool:
         """Tell whether, after some generations, no settings let the machines nearly settle."""
-        tuning, points = RemedySettings.current(), self.points
-        return generation >= tuning.hopeless_generations and points.nearness.max() < tuning.hopeless_nearness
+        points = self.points
+        return generation >= settings.hopeless_generations and points.nearness.max() < settings.hopeless_nearness
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
         """Return coordinates between grid points at which a variable reaches the bandwidth limit.
 
         The bandwidth rises through the limit there. The list is empty if the goal has no limit.
         """
-        settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
         if limit is None:
             return []
@@ -303,7 +297,6 @@ class Search:
         as soon as it must cost more than `most`, where cost is settling time or the quantity `wanted`. The machines
         that are slowest most often are tried first.
         """
-        settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
         bandwidth = self._bandwidth(shares)
@@ -401,7 +394,6 @@ class Search:
 
         If no point has enough fresh machines, the one with the most is yielded, unless surveyed machines hunt there.
         """
-        settings = RemedySettings.current()
         points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
         left, apart = points.shares[free[np.argsort(_order(points, wanted)[free], kind="stable")]], settings.alike_share
@@ -448,7 +440,6 @@ class Search:
         there machines hunted, or too few met the goal. New points are drawn at random around it. Once a better one
         works, further points are drawn around that one.
         """
-        settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
         cost = self.measured(point[None]).cost(goal, None if wanted is None else wanted(point[None]))[0]
         for number in range(settings.most_closer):
@@ -514,7 +505,6 @@ def _evolve(
     A new point replaces its rival only if it costs less; `cost` receives the rival's cost so that it can stop early.
     After each generation, `is_hopeless` receives its number and may end the search.
     """
-    settings = RemedySettings.current()
     most: np.ndarray | float = np.inf
 
     def bounded(points: np.ndarray) -> np.ndarray:
@@ -549,7 +539,6 @@ def _agree(intermediate_result: Any) -> bool:
 
     Points that break constraints may all be equally bad; the search must then go on.
     """
-    settings = RemedySettings.current()
     costs = intermediate_result.population_energies
     return bool(costs.max() < settings.worst_time and costs.std() <= settings.agreed_cost * costs.mean())
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Results, Status
-from friso.engine.settings import RoomSettings
+from friso.engine.settings import room_settings
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import initial_displacement, rests, size, stands
 from friso.equations.structure import decisive_keys
@@ -30,7 +30,7 @@ from friso.hunting import (
     edge_derivatives,
     flow_derivatives,
 )
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.stage import Stage, numeric_keys
 from friso.stage.arguments import check_arguments
 from friso.stage.controllers import as_tuned, controller_of
@@ -259,7 +259,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     if not _is_smooth(flat, keys, until, float(entered[0]), settling, by, within):
         return None
     # a single run, with room for all turns
-    results = stages.run(start, duration, RTOL, least_swing=0.0, room=RoomSettings.current().most_turning_points)
+    results = stages.run(start, duration, RTOL, least_swing=0.0, room=room_settings.most_turning_points)
     if not _all_done(results):
         return None
     turns = slice(int(results.turn_counts[0]))
@@ -288,7 +288,6 @@ def _is_smooth(
     are changed a little either way, and the new times are compared with what the derivatives `by` predict. Times and
     predictions differ if the stage bounces on its limiter so often that neighbouring motions diverge.
     """
-    settings = RemedySettings.current()
     step = settings.loop_change * np.array([flat[name] for name in keys])
     changes = np.concatenate([-np.diag(step), np.diag(step)])
     beside = {name: flat[name] + values for name, values in zip(keys, changes.T, strict=True)}
@@ -312,7 +311,6 @@ def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...])
 
     They are central differences over small changes of the keys.
     """
-    settings = RemedySettings.current()
     columns = []
     for name in keys:
         low, high = _starts(
@@ -327,7 +325,6 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
 
     Returns None if the loop is unstable in a limit case, or stuck under a bias force.
     """
-    settings = RemedySettings.current()
     members = settled_members(flat)
     loops = scan_stability(flat, members)
     if not loops.stable.all():

@@ -246,3 +246,6 @@ class RemedySettings(Settings):
 
     worthwhile_share: float = setting(0.85, "")
     """Ratio of the logarithms of two changes above which the smaller one is not worth verifying."""
+
+
+settings = RemedySettings.live()

@@ -15,7 +15,7 @@ from friso.frequency.crossover import settled_margin
 from friso.hunting import find_attractors
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.remedies.variables import DAMPING_RATIOS, joint_variables
 from friso.stage import Stage
 
@@ -44,7 +44,6 @@ def suggestion(stage: Stage) -> Suggestion | None:
     At full stroke, an isolator pushes with a fixed fraction of static friction, so that the cart does not move. If none
     settles the stage, the last one tried is returned. Returns None for a stage that has a joint or cannot have one.
     """
-    settings = RemedySettings.current()
     if stage.joint:
         return None
     friction = float(least_breakaway(stage.flat()))
@@ -82,7 +81,6 @@ def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
 
     The scale is logarithmic. The force is `RemedySettings.suggested_force`.
     """
-    settings = RemedySettings.current()
     wanted = (stroke, settings.suggested_force, damping)
     return [
         float(np.log(value / variable.low) / np.log(variable.high / variable.low))

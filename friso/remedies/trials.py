@@ -17,7 +17,7 @@ from friso.hunting.criteria import settling_of_runs
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.compare.measures import linear_loops
@@ -61,7 +61,6 @@ def moves_of_points(
     `shares`, (points, variables), are coordinates from 0 to 1 over the remedy's ranges. The bandwidth is lower by the
     factor `slower`. `rtol` is the solver's relative tolerance.
     """
-    settings = RemedySettings.current()
     count = len(shares) * machines.count
     flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
     settling, looser, force = (np.full(count, np.inf) for _ in range(3))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import sped_up
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
@@ -39,7 +39,6 @@ class Variable:
 
     def at(self, share: np.ndarray) -> np.ndarray:
         """Return the values at coordinates from 0 to 1 over the range."""
-        settings = RemedySettings.current()
         value = np.asarray(self.low * (self.high / self.low) ** share)
         return np.where(np.abs(share - self.share(self.present)) < settings.snap_share, self.present, value)
 
@@ -58,13 +57,11 @@ def of_key(key: str, low: float, high: float, present: float = float("nan")) -> 
 
 def bandwidth_factor(present: float = float("nan")) -> Variable:
     """Return the bandwidth of the whole controller as a variable: a factor on the present one."""
-    settings = RemedySettings.current()
     return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up, present)
 
 
 def gains(stage: Stage) -> tuple[Variable, ...]:
     """Return as variables the numbers that shape the controller, then its bandwidth."""
-    settings = RemedySettings.current()
     flat, controller = stage.flat(), controller_of(stage.flat())
     shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
     keys = [controller.key(name) for name in controller.speeds_up if flat.get(controller.key(name))]
@@ -77,8 +74,6 @@ def joint_variables(friction: float) -> tuple[Variable, ...]:
 
     The ranges of the variables follow from the least static `friction` [N].
     """
-
-    settings = RemedySettings.current()
 
     def stiffness(flat: Mapping[str, Any], share: np.ndarray) -> dict[str, Any]:
         return {"joint.stiffness": share * friction / flat["joint.stroke"]}

@@ -20,7 +20,7 @@ from friso.remedies.confirmed import Confirmation
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet, MoveRange
 from friso.remedies.search import TriedPoints
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
 from friso.remedies.window import VariableWindow
 from friso.shares import DOUBT, Share, share
@@ -157,7 +157,7 @@ class Performance:
         Only machines that meet all other parts of the goal are surveyed, some of them first. If so many of these hunt
         that too few machines can meet the goal, the survey ends: the result then has the first machines only.
         """
-        first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
+        first, others = np.split(np.arange(machines.count), [machines.count // settings.survey_parts])
         measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
         if np.count_nonzero(self._meets_all(goal) & ~measured._meets_all(goal)) > (1 - goal.share) * machines.count:
             return measured._first(first.size)
@@ -287,7 +287,7 @@ def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[s
     """
     remedy = Remedy.settled_on("", stage)
     return {
-        "moves": moves_of_points(remedy, ONE, machines, goal, rtol=RemedySettings.current().move_rtol),
+        "moves": moves_of_points(remedy, ONE, machines, goal, rtol=settings.move_rtol),
         "margin": modulus_margins(remedy, ONE, machines, drive),
         "attraction": Attraction.none(machines.count),
     }
@@ -311,7 +311,7 @@ def checked(stage: Stage) -> Case:
     The edge of hunting is included if it is located soon.
     """
     try:
-        with allowance(RemedySettings.current().present_check_work):
+        with allowance(settings.present_check_work):
             return check_given(stage)
     except Exhausted:  # raised by a part that must not be left out
         return check_given(stage)
@@ -322,7 +322,7 @@ def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goa
 
     The reasons are names of `friso.questions.tune.present_words.DOUBTS`.
     """
-    rounded = 1 + RemedySettings.current().rounded_share
+    rounded = 1 + settings.rounded_share
     listed = [*confirmation.doubts]
     if goal.bandwidth_limit is not None and not loop_bandwidth(confirmation.stage) <= goal.bandwidth_limit * rounded:
         listed.append("bandwidth")

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
 from friso.remedies.search import Search
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,6 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
     in until enough surveyed machines do not hunt there. The result is empty if the point itself misses the goal on
     these machines, or if this takes too much work.
     """
-    settings = RemedySettings.current()
     variables, grid = search.remedy.variables, np.linspace(0, 1, settings.window_points)
     inside, outside = np.empty((len(variables), 2)), np.full((len(variables), 2), np.nan)
     for number in range(len(variables)):
@@ -98,7 +97,7 @@ def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
     Each is a copy of the point `shares` with one variable moved. `numbers` (n,) are the indices of the variables, and
     `places` (n,) their new coordinates from 0 to 1.
     """
-    worst = RemedySettings.current().worst_time  # points that break a constraint cost more
+    worst = settings.worst_time  # points that break a constraint cost more
     return search.measured(_moved(shares, numbers, places), worst).meets(search.goal)
 
 

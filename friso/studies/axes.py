@@ -14,7 +14,7 @@ from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted
 from friso.stage import Stage, parse_set
 from friso.studies.scalings import SCALINGS
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 AxisValues = str | Sequence[Any] | np.ndarray | tuple[Any, str]
 Scale = Literal["linear", "log"]
@@ -171,7 +171,6 @@ def _count(text: str, digits: str | None) -> int | None:
 
     `text` is the whole range, for the error. Raises InputError for fewer than two points, or too many.
     """
-    settings = StudySettings.current()
     if digits is None:
         return None
     count = int(digits) if digits.strip().isascii() and digits.strip().isdigit() and len(digits) < 20 else 0

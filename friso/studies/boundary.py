@@ -14,7 +14,7 @@ from friso.stage import Stage, violations
 from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
 from friso.studies.links import check_links, names
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 
 def boundary(
@@ -36,7 +36,6 @@ def boundary(
     `begins` is called once the input has been checked, and `progress` while cycles are followed. Raises InputError for
     a wrong range, link, tolerance or stage (one that cannot hunt).
     """
-    settings = StudySettings.current()
     checked_rtol(rtol)
     followers, example = dict(links or {}), range_example(stage.flat())
     ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
@@ -64,7 +63,6 @@ def boundary(
 
 def _refuse_impossible(space: Space, example: str) -> None:
     """Raise InputError if no stage in the ranges is valid, from a coarse grid of stages."""
-    settings = StudySettings.current()
     points = space.grid(settings.tried_values)
     if not space.allowed(points).any():
         key, why = space.ranges[0].key, violations(space.flat(space.values(points)))[0][1]

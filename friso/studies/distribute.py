@@ -15,7 +15,7 @@ from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.study import equations_version
 
 logger = logging.getLogger("friso")
@@ -30,7 +30,6 @@ def connected(scheduler: str) -> Iterator[Crew]:
     address can run code; this is logged. Raises InputError if the scheduler does not answer, has no workers, or one
     with another version of friso.
     """
-    settings = StudySettings.current()
     from distributed import Client, KilledWorker
     from distributed.comm.core import CommClosedError
 
@@ -55,7 +54,6 @@ async def _answers(scheduler: str) -> None:
 
     The address is tried first because Dask's client, if it fails, lingers for long.
     """
-    settings = StudySettings.current()
     from distributed.comm.core import connect
     from distributed.security import Security
 

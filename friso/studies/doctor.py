@@ -24,7 +24,7 @@ from friso.platform.leftovers import temporary_folder
 from friso.platform.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.stage import Stage
 from friso.stage.files import loads
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.version import VERSION
 
 
@@ -141,22 +141,21 @@ def _running() -> str:
 
     Raises RuntimeError if it does not swing as it should.
     """
-    tuning = StudySettings.current()
     from friso.engine.batch import run_chunks
     from friso.engine.kernel import kernel
     from friso.equations.structure import structure
     from friso.hunting.measures import measure_runs, measuring_options
 
     flat = _stage().flat()
-    settings = measuring_options(1e-6, threads=1)
+    options = measuring_options(1e-6, threads=1)
     shape = kernel(structure(flat))
     begin = time.perf_counter()
-    (runs,) = run_chunks(shape, flat, tuning.timed_runs, settings)
+    (runs,) = run_chunks(shape, flat, settings.timed_runs, options)
     seconds, steps = time.perf_counter() - begin, runs.statistic("attempted").sum()
     swings = measure_runs(flat, runs).peak_to_peak
-    if not abs(swings / tuning.expected_swing - 1).max() < tuning.swing_error:
+    if not abs(swings / settings.expected_swing - 1).max() < settings.swing_error:
         raise RuntimeError(
-            f"the template's stage swings by {swings.min():g} to {swings.max():g} m, not by {tuning.expected_swing:g} m"
+            f"the template's stage swings by {swings.min():g} to {swings.max():g} m, not {settings.expected_swing:g} m"
         )
     return f"{steps / seconds / 1e6:.2g} million steps of the solver per second on one core; the result is right"
 

@@ -17,7 +17,7 @@ from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, Sample, draw, laid_over
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,6 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     The verdicts come by name of the variant. After Ctrl-C, the result has the stages judged in all variants by then.
     Raises KeyboardInterrupt if there are none yet.
     """
-    settings = StudySettings.current()
     variants = different(stage)
     structures = [shared_structure(laid_over(variant, sample.keys)) for variant in variants.values()]
     kernels(set[KernelRequest]().union(*map(kernels_to_judge, structures)))
@@ -112,7 +111,6 @@ def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | N
     missed: the edges show their spread, not for certain where each lies. Returns None if there is no margin, or if the
     controller has no bandwidth.
     """
-    settings = StudySettings.current()
     own = bandwidth(stage.flat())
     if margin is None or margin.crossover is None or own is None:
         return None
@@ -147,7 +145,6 @@ def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float)
 
     The number is a power of two, for which Sobol's points are spread evenly.
     """
-    settings = StudySettings.current()
     with allowance() as spent:
         fates(stage, draw(stage, correlations, settings.trial_draws, seed), rtol)
     most = min(settings.trial_draws * settings.usual_work / max(spent.used, 1.0), settings.usual_draws)

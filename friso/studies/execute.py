@@ -14,7 +14,7 @@ import numpy as np
 
 from friso.engine.overtaken import go_on
 from friso.studies.cells import Columns, run_cells
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.study import CellBlock, Study
 
 _T = TypeVar("_T")
@@ -51,7 +51,6 @@ class Crew:
         Only as many blocks are in progress as keep the workers busy, so a study of any length streams. Any early end
         (such as Ctrl-C) cancels them. Raises Overtaken once nobody waits for the result.
         """
-        settings = StudySettings.current()
         self.cancel[0] = 0
         upcoming = iter(jobs)
         flying: dict[Future[Columns], tuple[Study, CellBlock]] = {}
@@ -73,7 +72,6 @@ class Crew:
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, CellBlock]]:
         """Yield the blocks of studies: as large as memory allows, but enough for all workers."""
-        settings = StudySettings.current()
         for study in studies:
             largest = settings.largest_survey_block if study.cycles else settings.largest_memory_block
             shape = study.block_shape(max(1, min(largest, study.cells // self.shares)))

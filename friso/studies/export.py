@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.escapes import table_cell
 from friso.studies.metric import every_variable, is_text
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,6 @@ def _bytes(texts: np.ndarray) -> np.ndarray:
 
 def _write_csv(runs: xr.Dataset, path: Path) -> None:
     """Write a study as a table of comma-separated values, one row per cell."""
-    settings = StudySettings.current()
     import pandas as pd
 
     dims = [str(dim) for dim in runs["outcome"].dims]

@@ -21,7 +21,7 @@ from friso.studies.axes import SweptAxis
 from friso.studies.cells import INFERRED, Columns, unfilled
 from friso.studies.metric import in_order, usual_metrics, worded
 from friso.studies.samples import SAMPLE
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.study import Dimension, Study
 
 Ask = Callable[[np.ndarray], Columns]
@@ -45,7 +45,6 @@ def _finer(axis: SweptAxis) -> SweptAxis:
 
     An evenly divided range is divided anew, as if the user had asked for that many points.
     """
-    settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
     if np.array_equal(space(*ends, len(axis.values)), axis.values):
@@ -69,7 +68,6 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
     `ask` computes the metrics of cells. A cell that was not computed has the outcome (and the verdict) of the nearest
     computed one, a status that says so, and no numbers.
     """
-    settings = StudySettings.current()
     grid = _Grid(study)
     grid.learn(_lattice(study.shape), ask)
     while (left := grid.budget - grid.runs) > 0:
@@ -86,7 +84,6 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
 
 def _lattice(shape: tuple[int, ...]) -> np.ndarray:
     """Return the indices of the cells of a coarse lattice, including the ends of the axes."""
-    settings = StudySettings.current()
     lines = [np.unique(np.append(np.arange(0, size, settings.lattice_step), size - 1)) for size in shape]
     return np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), shape).ravel()
 
@@ -95,7 +92,6 @@ class _Grid:
     """Results of the computed cells of a study on a fine grid, and which cells to compute next."""
 
     def __init__(self, study: Study) -> None:
-        settings = StudySettings.current()
         self.shape = study.shape
         coarse = math.prod(size // settings.finer_factor + 1 for size in study.shape)
         self.budget = max(int(settings.refined_share * study.cells), min(3 * coarse // 2, study.cells))
@@ -151,7 +147,6 @@ class _Grid:
 
         These are far from any computed cell, near changes, and where runs settle late.
         """
-        settings = StudySettings.current()
         from scipy.ndimage import distance_transform_edt
 
         distance, nearest = self._nearest()

@@ -15,7 +15,7 @@ from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues, SweptAxis, SweptRange, read_axes
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 SAMPLE = "sample"
 """Name of the dimension along which samples lie."""
@@ -45,7 +45,6 @@ class Samples:
 
     def __post_init__(self) -> None:
         """Check the fields. Raises InputError for other types."""
-        settings = StudySettings.current()
         if not isinstance(self.ranges, Mapping):
             raise InputError(
                 "ranges", quoted(self.ranges), "a dictionary of keys to ranges", 'ranges={"joint.stroke": "0 m..1 mm"}'

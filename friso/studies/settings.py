@@ -220,3 +220,6 @@ class StudySettings(Settings):
     followed_share: float = setting(0.5, "")
     """Fraction of machines in position from which longer runs are made. With fewer, an option fails anyway, and its
     longer runs would take as long as all others together."""
+
+
+settings = StudySettings.live()

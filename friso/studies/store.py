@@ -31,7 +31,7 @@ from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.store_files import ANSWERS, refuse_foreign
 from friso.studies.store_folder import (
     exchange,
@@ -62,7 +62,6 @@ class Store:
     """The store of a study in a folder at `path`, locked by this process while open."""
 
     def __init__(self, path: Path, study: Study) -> None:
-        settings = StudySettings.current()
         self.path, self.study = path, study
         usual = min(
             settings.surveyed_block if study.cycles else settings.stored_block, study.cells // settings.least_blocks
@@ -336,7 +335,6 @@ def in_memory(runs: xr.Dataset) -> xr.Dataset:
 
 def _shared(texts: xr.DataArray) -> np.ndarray:
     """Return stored texts as an array of Python's, in which equal texts are one object."""
-    settings = StudySettings.current()
     import pandas as pd
 
     words_once: dict[str, str] = {}

@@ -14,7 +14,7 @@ from friso.equations import motion
 from friso.hunting.measures import measuring_options
 from friso.progress import Progress, Tally, silent
 from friso.studies.cells import allowed_cells, by_equations, by_words
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.study import Study
 
 DRAWING = "drawing runs"
@@ -41,7 +41,6 @@ def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress =
 
     Invalid cells, and those `skipped`, shape (cells,), are NaN throughout.
     """
-    settings = StudySettings.current()
     columns = study.columns(np.arange(study.cells))
     parts = list(by_words(study.stage, study.links, columns))
     allowed = allowed_cells(study.stage, study.links, columns)
@@ -90,7 +89,6 @@ def _extremes(values: np.ndarray) -> np.ndarray:
     `values` is cut into the pieces of the settings; the result has the shape (2 pieces,). Both values are NaN if a
     piece is not complete.
     """
-    settings = StudySettings.current()
     pieces = values.reshape(settings.trace_bins, settings.samples_per_bin)
     places = np.sort(np.stack([pieces.argmin(axis=1), pieces.argmax(axis=1)], axis=1), axis=1)
     return np.take_along_axis(pieces, places, axis=1).ravel()

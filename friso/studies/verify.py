@@ -14,7 +14,7 @@ from friso.errors import InputError
 from friso.studies.cells import INFERRED, allowed_cells
 from friso.studies.execute import Crew, run_scattered
 from friso.studies.metric import in_order
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.study import Study
 
 if TYPE_CHECKING:
@@ -40,7 +40,6 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
     no outcome that could survive. The result is empty if there are no others, if `share` is 0, or if the tolerance
     cannot be tightened. It is also empty if the attributes of the runs state the counts already.
     """
-    settings = StudySettings.current()
     if (
         share in (0, runs.attrs.get("verified_share")) or study.rtol < 10 * TIGHTEST
     ):  # no tighter tolerance is available
@@ -86,7 +85,6 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
     and the number of cells used. If no tolerance is good enough, the one at which most outcomes survive is returned. If
     no cell has a valid stage, there are no fractions, and the tightest tolerance is returned.
     """
-    settings = StudySettings.current()
     picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))
     if not picked.size:
         return settings.candidate_rtols[-1], {}, 0

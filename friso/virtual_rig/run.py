@@ -19,7 +19,7 @@ from friso.equations.structure import carrying_force
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.rig import Floor
-from friso.virtual_rig.settings import RigSettings
+from friso.virtual_rig.settings import settings
 from friso.virtual_rig.surroundings import tables
 from friso.virtual_rig.task import SAMPLE_TIME, MoveTask
 
@@ -108,7 +108,6 @@ def run_flat(
     `interval` [s]; the runs come chunk by chunk. With `outputs`, all signals of the equations are recorded, not only
     those that the drive and a sensor see. Raises InputError for an interval, a delay or a [rail] that does not fit.
     """
-    settings = RigSettings.current()
     _check(flat, interval)
     first_run = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
     form = AsBuilt.of(first_run)
@@ -128,7 +127,6 @@ def _check(flat: Mapping[str, Any], interval: float) -> None:
     Raises InputError for an interval that is no whole number of samples, for a delay of too many, and for a rail along
     which nothing of the friction law varies.
     """
-    settings = RigSettings.current()
     if (
         "rail.seed" in flat
         and flat["friction.model"] != "none"
@@ -161,7 +159,6 @@ def _recorded(
     `numbers` are the numbers of the runs. `timing` has the interval of the samples [s], the number of samples, and the
     number of threads. All signals of the equations are added if `with_outputs`.
     """
-    settings = RigSettings.current()
     interval, count, threads = timing
     seeds = flat["drive.seed"].astype(np.int64)
     low, high = task.span

@@ -39,3 +39,6 @@ class RigSettings(Settings):
 
     points_per_period: int = setting(10, "")
     """Points per period of the highest frequency of the floor. Fewer flatten it by some percent."""
+
+
+settings = RigSettings.live()

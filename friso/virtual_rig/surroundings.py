@@ -14,7 +14,7 @@ from friso.engine.arrays import Tables
 from friso.equations.rail import friction_factors
 from friso.stage.rig import Floor
 from friso.virtual_rig.floor import floor_acceleration
-from friso.virtual_rig.settings import RigSettings
+from friso.virtual_rig.settings import settings
 from friso.virtual_rig.task import MoveTask
 
 
@@ -41,7 +41,6 @@ def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.nda
 
     The places reach beyond the reference on both sides. The grid holds the first place [m] and the points per metre.
     """
-    settings = RigSettings.current()
     low, high = task.span
     margin = max(settings.table_margin, settings.table_share * (high - low))
     lengths = [np.inf]
@@ -69,7 +68,6 @@ def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tup
 
     The second result is the number of points per second.
     """
-    settings = RigSettings.current()
     injected = task.injected.size > 0
     if floor is None and not injected:
         return np.zeros((1, 2, 2)), 0.0

@@ -20,3 +20,6 @@ class MotionSettings(Settings):
     samples_per_period: float = setting(32.0, "")
     """Samples in a period of the fastest sinusoid, among which reversals are sought. With fewer, two reversals close
     together are missed, and between them feedforward by direction has the wrong sign. More take longer."""
+
+
+settings = MotionSettings.live()

@@ -21,7 +21,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.frequency.describing.function import checked_positive, dynamic_stiffness
 from friso.frequency.describing.loop import receptance
 from friso.frequency.describing.steady import RTOL
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.stage import Stage
 
 AMPLITUDES = np.geomspace(1e-9, 1.0, 181)
@@ -71,7 +71,6 @@ def single_harmonic(
     loop turns by a right angle or more from one to the next. Two solutions in one cell are missed. Raises InputError
     for a stage without friction and for a grid that is not usable.
     """
-    settings = FrequencySettings.current()
     loop = _Loop(stage, checked_rtol(rtol))
     sizes = checked_positive("amplitudes", amplitudes, "1e-5 m, 1e-4 m")
     rates = loop.refined(checked_positive("frequencies", frequencies, "0.1 Hz, 1 Hz"))
@@ -136,7 +135,6 @@ class _Loop:
 
     def refined(self, frequencies: np.ndarray) -> np.ndarray:
         """Return ascending frequencies [Hz], (n,), with more inserted where the loop turns by TURN."""
-        settings = FrequencySettings.current()
         for _ in range(settings.grid_halvings):
             logs, share = np.log(frequencies), np.linspace(0, 1, WITHIN + 1)
             dense = np.exp(logs[:-1, None] + np.diff(logs)[:, None] * share)
@@ -153,7 +151,6 @@ class _Loop:
 
         A start stays where no step can be computed.
         """
-        settings = FrequencySettings.current()
         for _ in range(settings.balance_newton_steps if logs.size else 0):
             sides = [
                 self.left(logs + settings.logarithm_nudge * step[:, None])[0]

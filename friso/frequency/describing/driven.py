@@ -18,7 +18,7 @@ import numpy as np
 from friso.frequency.describing.function import dynamic_stiffness
 from friso.frequency.describing.steady import RTOL, Imposition
 from friso.frequency.parts import mechanics
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 
 LIMITS = (1e-18, 1e18)
 """Smallest and largest amplitude [m] of the search."""
@@ -60,7 +60,6 @@ class DrivenPlant:
     @cached_property
     def stuck(self) -> float:
         """Return an amplitude [m] so small that bristles do not slip."""
-        settings = FrequencySettings.current()
         friction = Imposition.of(self.flat, np.ones(1), np.ones(1), self.rtol)
         return float(
             np.min(
@@ -75,7 +74,6 @@ class DrivenPlant:
         Both have the shape (forces, frequencies). They lie well beyond the amplitudes of a stuck and of a free cart,
         and do not depend on other forces.
         """
-        settings = FrequencySettings.current()
         rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
         with np.errstate(over="ignore"):
             bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *LIMITS)
@@ -93,7 +91,6 @@ class DrivenPlant:
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
         """Return amplitudes moved until they need less force (`side` -1) or more (1) than `forces`."""
-        settings = FrequencySettings.current()
         amplitudes = np.clip(amplitudes, *LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
         for _ in range(settings.most_decades):
@@ -111,7 +108,6 @@ class DrivenPlant:
         The third result, shape (forces, frequencies, points - 1), marks the cells of the grid in which an amplitude for
         a force is searched.
         """
-        settings = FrequencySettings.current()
         low, high = self.ends(forces)
         first = np.floor(settings.amplitudes_per_decade * np.log10(low)).astype(int)
         last = np.ceil(settings.amplitudes_per_decade * np.log10(high)).astype(int)
@@ -165,7 +161,6 @@ def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndar
     `ends` are the lower and upper ends, `values` the functions there. The method takes the secant of the bracket, and
     halves the value at an end that stays (Illinois).
     """
-    settings = FrequencySettings.current()
     (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)
     best, left = low.copy(), np.full(len(low), np.inf)
     open_ = np.arange(len(low))

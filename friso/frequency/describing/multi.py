@@ -17,7 +17,7 @@ import numpy as np
 
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke, receptance
 from friso.frequency.describing.waveform import FrictionAnswer, OneStateLaw, friction_answer
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 
 DONE, REST, OPEN = "done", "only the rest at the reference was found", "no series was found near the known motion"
 
@@ -50,7 +50,6 @@ class HarmonicSeries:
 
     def over_period(self, harmonics: np.ndarray) -> np.ndarray:
         """Return a signal with these harmonics, (orders,), at many times of a period."""
-        settings = FrequencySettings.current()
         angles = np.linspace(
             0,
             2 * np.pi,
@@ -111,7 +110,6 @@ def balanced(
     friction force is computed in `intervals` per period (None: as the settings say). Raises InputError for a stage
     without friction or for a law with more than one state of its own.
     """
-    settings = FrequencySettings.current()
     law, size = (
         OneStateLaw.of(flat),
         intervals or max(settings.least_intervals, settings.samples_per_harmonic * harmonics),
@@ -136,7 +134,6 @@ def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> s
     It is none in three cases: Newton's method did not converge; the limiter would be touched; or the amplitude is tiny
     against `length` [m], that of the known motion, so that the stage rests.
     """
-    settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST
     if series.step > settings.series_step:
@@ -207,7 +204,6 @@ class _Problem:
 
     def solve(self) -> tuple[np.ndarray, float]:
         """Solve the equations by Newton's method; return the unknowns and the size of the last step."""
-        settings = FrequencySettings.current()
         state, size = np.append(self.start, 0.0), np.inf
         for _ in range(settings.series_newton_steps):
             left = self.residual(state)
@@ -224,7 +220,6 @@ class _Problem:
 
         `state` are the unknowns, and `left` is the size of the residuals there.
         """
-        settings = FrequencySettings.current()
         shares = [0.5**halving for halving in range(settings.series_halvings)]
         return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])
 

@@ -17,7 +17,7 @@ from friso.frequency.describing.driven import DrivenPlant, Roots, driven_amplitu
 from friso.frequency.describing.function import checked_positive
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke
 from friso.frequency.describing.steady import RTOL
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
 
@@ -164,7 +164,6 @@ def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, u
 
     `branches` has the quantities over force, frequency and branch. `unknown` marks where friction was not found.
     """
-    settings = FrequencySettings.current()
     present, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
     count = np.sum(present, axis=2)
     last = np.take_along_axis(lasting, np.maximum(count - 1, 0)[:, :, None], axis=2)[:, :, 0]

@@ -20,7 +20,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.imposed import FREQUENCY, imposed_form
 from friso.equations.roles import Role
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 
 RTOL = 1e-9
 """Default relative tolerance of the runs."""
@@ -103,7 +103,6 @@ class Imposition:
         Each begins at the law's own states, `inner`, (count, inner). There are `samples` per period. Yields the numbers
         of the motions, and their results.
         """
-        settings = FrequencySettings.current()
         starts = np.zeros((self.count, len(self.kernel.states)))
         starts[:, self.kernel.position] = self.flat["motion.displacement"]
         starts[:, self.inner] = inner
@@ -119,7 +118,6 @@ def periodic_gap(rtol: float) -> float:
 
     It is relative to the state's scale, and depends on the tolerance of the runs.
     """
-    settings = FrequencySettings.current()
     return min(settings.gap_tolerances * rtol, settings.widest_gap)
 
 
@@ -141,7 +139,6 @@ def steady(friction: Imposition) -> PeriodicStates:
 
     For a symmetric law half a period suffices.
     """
-    settings = FrequencySettings.current()
     count, size = friction.count, len(friction.inner)
     inner, gap, done = np.zeros((count, size)), np.zeros(count), np.ones(count, bool)
     width = friction.scales[:, friction.inner].copy()

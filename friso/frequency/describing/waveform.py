@@ -22,7 +22,7 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import DIRECTION, direction
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.stage.tables import friction_law
 
 
@@ -133,7 +133,6 @@ def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sig
     Velocities are taken at the middles of M intervals, each an `interval` [s] long. After these the motion is back at
     its start (`sign` 1), or at the mirror image (-1).
     """
-    settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)
     chain, pushed = None, np.zeros(0)
     for _ in range(settings.state_newton_steps if law.remembers else 0):

@@ -13,7 +13,7 @@ import numpy as np
 
 from friso.engine.allowance import Exhausted
 from friso.hunting.attractors.rounds import TIGHT, typical_period
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
@@ -70,7 +70,6 @@ class Attractors:
     @property
     def target(self) -> Target:
         """Return the motion that marks a run as hunting, shape (count,); NaN for stages without one."""
-        settings = SurveySettings.current()
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         observed = np.zeros(len(self.decided), bool)
         for motion in self.motions:
@@ -209,7 +208,7 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     starts = Starts(stages, TIGHT)
     starts.spread(thorough=False)
     observed = [motion for motion in first.motions if motion.stage not in proved]
-    shares = np.array(SurveySettings.current().beside_motion_shares)
+    shares = np.array(settings.beside_motion_shares)
     for motion in observed:
         distances = np.full((stages.count, len(shares)), np.nan)
         distances[motion.stage] = shares * motion.distance

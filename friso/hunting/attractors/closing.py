@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting.attractors.rounds import Pending
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, described
 from friso.hunting.cycle.shooting import Orbits, close
@@ -21,7 +21,6 @@ def close_orbits(
     cycle is not `closed` where no orbit of the run's size was reached. An orbit that passes through a simpler one
     several times is replaced by the simpler one.
     """
-    settings = SurveySettings.current()
     states = _where_they_stick(runs, times)
     parts = []
 
@@ -63,7 +62,7 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
         return np.zeros(0, bool)
     ends = stages.run(orbits.states, orbits.times * fewer / orbits.swings, rtol).ends[:, stages.sticking]
     sign, sticks = -1.0 if fewer % 2 else 1.0, orbits.states[:, stages.sticking]
-    return np.abs(sign * ends - sticks) < SurveySettings.current().repeated_orbit_share * np.abs(sticks)
+    return np.abs(sign * ends - sticks) < settings.repeated_orbit_share * np.abs(sticks)
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
@@ -71,7 +70,6 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
 
     Compared are the sticking distance, in the state numbered `sticking`, and the time of return.
     """
-    settings = SurveySettings.current()
     distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
     return (np.abs(distances - 1) < settings.repeated_orbit_share) & (
         np.abs(passes * once.times / orbits.times - 1) < settings.repeated_orbit_share
@@ -85,7 +83,6 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
     the one after the longest standstill is taken; if there is none, the state at the start. `pending` are the runs, and
     `times` has the shape (runs,).
     """
-    settings = SurveySettings.current()
     stages, size = pending.stages, len(pending.stages.kernel.states)
     numbers, ahead = np.arange(stages.count), np.zeros(stages.count)
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
@@ -105,7 +102,6 @@ def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
     standstill before it counts; 0 is returned if there is none. `place` [m] is the position that sticks. Both arrays
     have the shape (samples,).
     """
-    settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed
         return 0.0
     standing = np.abs(np.diff(place)) < settings.still_move_share * np.nanmax(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.rows import ArrayRows
 
 
@@ -42,7 +42,6 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
     the first. Where `mirrored`, shape (runs,), a motion may also repeat as its mirror image, after an odd number of
     swings.
     """
-    settings = SurveySettings.current()
     runs, room = values.shape
     legs = np.abs(np.diff(values, axis=1))
     mean = np.nansum(legs, axis=1) / np.maximum(np.isfinite(legs).sum(axis=1), 1)

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Status
-from friso.engine.settings import RoomSettings
+from friso.engine.settings import room_settings
 from friso.hunting.attractors.recurrence import Recurrence, recurrence
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import COARSE_RTOL
 from friso.hunting.cycle.rest import wait
 from friso.hunting.cycle.return_map import trace_returns
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings as orbit_settings
 from friso.hunting.cycle.swings import last_swings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
@@ -63,8 +63,7 @@ class Ends(ArrayRows):
     @property
     def swing(self) -> np.ndarray:
         """Return which runs swing at the end of the round, shape (runs,), periodically or not."""
-        settings = SurveySettings.current()
-        return (self.repeats.swings > 0) | (np.isfinite(self.values).sum(axis=1) >= settings.least_turns)
+        return (self.repeats.swings > 0) | (np.isfinite(self.values).sum(axis=1) >= survey_settings.least_turns)
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
@@ -72,8 +71,7 @@ def typical_period(stages: Ensemble) -> np.ndarray:
 
     The estimate is based on the sticking time and the loop's frequency.
     """
-    settings = SurveySettings.current()
-    return 2 * (wait(stages, settings.typical_distance * stages.length) + 2 * np.pi / stages.number("rate"))
+    return 2 * (wait(stages, survey_settings.typical_distance * stages.length) + 2 * np.pi / stages.number("rate"))
 
 
 def loose_from(stages: Ensemble) -> np.ndarray:
@@ -81,12 +79,11 @@ def loose_from(stages: Ensemble) -> np.ndarray:
 
     From smaller distances it creeps home. If it overshoots from none, the result is the largest tested distance.
     """
-    settings = SurveySettings.current()
-    shares = np.geomspace(*settings.creep_distances)
+    shares = np.geomspace(*survey_settings.creep_distances)
     distances = shares * stages.length[:, None]
     sides = (1.0,) if stages.symmetric.all() else (1.0, -1.0)
     returns = np.max([trace_returns(stages, distances, COARSE_RTOL, side).returns for side in sides], axis=0)
-    breaks = returns > settings.least_overshoot_share * distances
+    breaks = returns > survey_settings.least_overshoot_share * distances
     first = np.where(breaks.any(axis=1), breaks.argmax(axis=1), len(shares) - 1)
     return distances[np.arange(stages.count), first]
 
@@ -96,9 +93,9 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 
     Returns the runs at their new states and how they ended.
     """
-    settings, room = SurveySettings.current(), RoomSettings.current().first_turning_points
+    room = room_settings.first_turning_points
     stages, count = runs.stages, runs.stages.count
-    least = settings.least_swing * stages.length
+    least = survey_settings.least_swing * stages.length
     results = stages.run(
         runs.states,
         runs.durations,
@@ -107,15 +104,15 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
         window=0.5,
         record_from=np.inf,
         least_swing=least,
-        room=max(room, min(settings.run_turning_points, settings.turning_point_room // count)),
-        budget=int(min(budget, settings.round_step_limit)),
+        room=max(room, min(survey_settings.run_turning_points, survey_settings.turning_point_room // count)),
+        budget=int(min(budget, survey_settings.round_step_limit)),
     )
     completed, away = done(results), np.equal(results.statuses, Status.DIVERGED)
     high, low, steps = (
         results.statistics[:, STATISTICS.index(name)] for name in ("deviation_max", "deviation_min", "attempted")
     )
     values, times = last_swings(
-        results, np.maximum(settings.swing_leg_share * (high - low), least), settings.kept_swings
+        results, np.maximum(survey_settings.swing_leg_share * (high - low), least), survey_settings.kept_swings
     )
     standing = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
@@ -133,11 +130,14 @@ def _stands_still(
     `ends` are the final states, `swing` [m] the peak-to-peak deviations over half of the `durations` [s]. `loose` [m]
     is the distance from which a stage breaks away.
     """
-    settings = SurveySettings.current()
     distances = np.abs(ends[:, stages.sticking])
-    home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > settings.rest_waits * wait(stages, loose))
-    aside = (swing < 2 * settings.least_swing * stages.length) & (
-        durations / 2 > 2 * OrbitSettings.current().breakaway_waits * wait(stages, distances)
+    home = (
+        (swing < loose / 2)
+        & (distances < loose / 2)
+        & (durations / 2 > survey_settings.rest_waits * wait(stages, loose))
+    )
+    aside = (swing < 2 * survey_settings.least_swing * stages.length) & (
+        durations / 2 > 2 * orbit_settings.breakaway_waits * wait(stages, distances)
     )
     return home | aside
 
@@ -148,12 +148,12 @@ def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
     `swing`, shape (runs,), marks runs that swing. For any other run the round is long enough to show that it rests or
     swings slowly. But it is not so long that a run which starts to swing does so for most of the round.
     """
-    settings = SurveySettings.current()
     least = np.where(
         swing,
         0.0,
         np.minimum(
-            settings.longest_waits * wait(runs.stages, runs.loose), settings.quiet_round_factor * runs.durations
+            survey_settings.longest_waits * wait(runs.stages, runs.loose),
+            survey_settings.quiet_round_factor * runs.durations,
         ),
     )
-    return replace(runs, durations=np.maximum(settings.next_round_factor * runs.durations, least))
+    return replace(runs, durations=np.maximum(survey_settings.next_round_factor * runs.durations, least))

@@ -233,3 +233,6 @@ class SurveySettings(Settings):
 
     steady_swing_share: float = setting(0.8, "")
     """Fraction of the swing that a motion must keep over the last round to count as a cycle."""
+
+
+settings = SurveySettings.live()

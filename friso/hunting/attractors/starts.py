@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.equations.roles import Steady
 from friso.hunting.attractors.rounds import RTOL, Pending, loose_from, typical_period
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.cycle.rest import bent, pushed, spread_over, stuck
@@ -36,7 +36,6 @@ class Starts:
         Symmetric stages get one side only. Stages that are `thorough`, (count,) or all, get twice as many distances,
         and pushes as well.
         """
-        settings = SurveySettings.current()
         controller = self.stages.structure.controller
         limited = controller is not None and controller.anti_windup is not None
         for side, more in product((1.0, -1.0), (False, True)):
@@ -64,7 +63,6 @@ class Starts:
 
         `which` are the numbers of the stages, which have a force limit; `side` is 1 or -1.
         """
-        settings = SurveySettings.current()
         span, times = settings.wound_up_starts
         distances = spread_over(span)
         stages = self.stages.take(np.repeat(which, len(distances)))
@@ -82,7 +80,6 @@ class Starts:
         are pushed. Others stick, after one of three pasts: a travel outward over the distance itself, a long travel out
         or back, or random travels to and fro. A `thorough` survey gets more distances.
         """
-        settings = SurveySettings.current()
         units = spread_over(settings.remembering_starts[thorough])
         rng = np.random.default_rng(0)
         shares = np.exp(rng.uniform(np.log(settings.least_bend_back_share), 0.0, (2, len(units))))
@@ -104,7 +101,6 @@ class Starts:
 
     def beside(self, cycles: Cycles) -> None:
         """Add runs that begin on both sides of unstable cycles."""
-        settings = SurveySettings.current()
         which = np.flatnonzero(cycles.closed & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
         owners, away = (
             np.repeat(which, len(settings.beside_cycle_shares)),
@@ -128,7 +124,6 @@ class Starts:
         `state`, shape (kept,), is the final state of that run, and `owner` the number of its stage. A run from that
         state itself could stay on a weakly unstable cycle.
         """
-        settings = SurveySettings.current()
         states = np.outer(1 + np.array(settings.beside_cycle_shares), state[: self.stages.kernel.initial_size])
         self._add(np.full(len(states), owner), states)
 
@@ -142,7 +137,6 @@ class Starts:
 
         There is one group if `at_once`, otherwise several, because a few runs suffice for most stages that hunt.
         """
-        settings = SurveySettings.current()
         if not self.owners:
             return
         owners, states = np.concatenate(self.owners), np.concatenate(self.states)
@@ -164,7 +158,6 @@ class Starts:
 
         `owners`, shape (runs,), are the numbers of their stages, `states` (runs, states) their initial states.
         """
-        settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)
         return Pending(

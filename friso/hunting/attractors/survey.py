@@ -9,7 +9,7 @@ import numpy as np
 from friso.hunting.attractors.closing import close_orbits
 from friso.hunting.attractors.recurrence import Recurrence
 from friso.hunting.attractors.rounds import Ends, Pending, lengthened, one_round
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.rows import ArrayRows
 
@@ -43,7 +43,6 @@ class Swinging:
 
         Motions of different stages differ, and so do a closed orbit and a motion without one.
         """
-        settings = SurveySettings.current()
         if self.stage != other.stage:
             return False
         same = (
@@ -91,7 +90,6 @@ class _Beside(ArrayRows):
 
         They are among those farthest from the cycle, which leave it first. The result is true for them, shape (runs,).
         """
-        settings = SurveySettings.current()
         chosen, far, sides = np.zeros(len(self.cycles), bool), np.abs(self.offsets), np.sign(self.offsets)
         for cycle, side in {*zip(self.cycles.tolist(), sides.tolist(), strict=True)} - {(-1, 0.0)}:
             group = np.flatnonzero((self.cycles == cycle) & (sides == side))
@@ -106,7 +104,6 @@ def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
 
     `owners`, shape (runs,), are the numbers of the runs' stages.
     """
-    settings = SurveySettings.current()
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
         motions_of.setdefault(stage, []).append((size, time))
@@ -175,7 +172,6 @@ class Survey:
         return len(self.unbounded)
 
     def __post_init__(self) -> None:
-        settings = SurveySettings.current()
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
         self.left = np.full(
             self.count, float(settings.thorough_step_limit if self.decides else settings.quick_step_limit)
@@ -206,7 +202,6 @@ class Survey:
 
     def note_unstable_cycles(self, numbers: np.ndarray, cycles: Cycles) -> None:
         """Store the unstable cycles of numbered stages, because runs take long to leave them."""
-        settings = SurveySettings.current()
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
             size, time = 2 * float(cycles.amplitude[k]), float(cycles.orbits.times[k])
@@ -217,7 +212,6 @@ class Survey:
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
         """Follow runs round by round to their attractors; `owners`, (runs,), number their stages."""
-        settings = SurveySettings.current()
         before, begun = np.full(len(owners), np.nan), np.abs(runs.states[:, runs.stages.sticking])
         for number in range(settings.most_rounds):
             enough = settings.enough_rounds if self.thorough else 0
@@ -270,7 +264,7 @@ class Survey:
         ready = swinging & (ends.repeats.swings > 0)
         if early:
             leave = self._repels(owners, ends) & ~self._stay(owners, ends)
-            ready &= (ends.repeats.deviation < SurveySettings.current().settled_swing_share) & ~leave
+            ready &= (ends.repeats.deviation < settings.settled_swing_share) & ~leave
         if not self.prove:
             ready &= ~self._exact(owners, ends)
         self._close(runs, owners, ends, np.flatnonzero(ready))
@@ -291,7 +285,6 @@ class Survey:
 
         The number follows from the solver steps that its stage has left, and is never below `most_kinds`.
         """
-        settings = SurveySettings.current()
         runs = np.bincount(owners, minlength=self.count)
         steps = np.bincount(owners, ends.steps, minlength=self.count) / np.maximum(runs, 1)
         most = np.where(self.attracted, 0, self.left / (settings.next_round_cost * np.maximum(steps, 1)))
@@ -314,7 +307,6 @@ class Survey:
 
         A run that resembles none gets the number -1 and an offset of 0.
         """
-        settings = SurveySettings.current()
         cycles, offsets = np.full(len(owners), -1), np.full(len(owners), np.inf)
         for number, kind in enumerate(self._closed):
             offset = np.where(_like([kind], owners, ends), ends.repeats.size / kind[1] - 1, np.inf)
@@ -340,7 +332,7 @@ class Survey:
 
         Runs of one kind have equal period and size.
         """
-        most, repeats = SurveySettings.current().orbits_per_round if self.thorough else 1, ends.repeats
+        most, repeats = settings.orbits_per_round if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # a slow approach to a symmetric cycle also repeats in pairs
         tries = (
@@ -375,7 +367,6 @@ class Survey:
         A run that may still be leaving an unstable cycle is first followed for as long as that takes. `before` [m] has
         the mean swing one round earlier.
         """
-        settings = SurveySettings.current()
         kinds = self._kinds(owners, ends, settings.orbits_per_round)
         leave = settings.leaving_time_constants * self.slowest[owners]
         slow = kinds[leave[kinds] > runs.durations[kinds]]
@@ -394,7 +385,6 @@ class Survey:
 
         Run, stage number in `owners`, and cycle belong together row by row.
         """
-        settings = SurveySettings.current()
         _, ends = one_round(runs)
         size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < settings.same_motion_share
         stays = size & (np.abs(ends.repeats.time / cycles.orbits.times - 1) < settings.same_motion_share)
@@ -407,7 +397,6 @@ class Survey:
         `before` [m], shape (runs,), has the mean swing one round earlier. Runs that resemble an unstable cycle, or a
         motion without a stable orbit, are left out.
         """
-        settings = SurveySettings.current()
         same = np.abs(ends.repeats.mean / before - 1) < settings.unchanged_swing_share
         return same & (ends.repeats.deviation < settings.settled_swing_share) & ~self._repels(owners, ends)
 
@@ -417,7 +406,6 @@ class Survey:
         A run that resembles an unstable cycle counts only if attraction must be proved and the run lies on another
         cycle beside that one (`_stay`). If no proof is needed, runs that clearly approach a repetition count as well.
         """
-        settings = SurveySettings.current()
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
         if self.prove:
             return (unlike & (repeats.deviation < settings.exact_repetition_share)) | self._stay(owners, ends)
@@ -431,7 +419,6 @@ class Survey:
 
         Such a run repeats with an error far smaller than its offset from the unstable cycle. The shape is (runs,).
         """
-        settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
 
@@ -440,7 +427,6 @@ class Survey:
 
         The stages of other runs are marked unknown. `before` [m] has the mean swing one round earlier.
         """
-        settings = SurveySettings.current()
         repeats = ends.repeats
         begun = (before == 0) & ~(
             repeats.deviation < settings.converged_swing_share
@@ -475,7 +461,6 @@ def _slope(repeats: Recurrence, times: np.ndarray) -> float:
     of the repetition shrinks over the last swings. Where rounding hides that, the error has become so small within the
     round.
     """
-    settings = SurveySettings.current()
     (time,), (error,), (earlier,) = repeats.time, repeats.deviation, repeats.earlier
     shrinks = (error / earlier) ** (time / (times[-1] - times[-1 - settings.compared_swings]))
     if shrinks < 1:
@@ -492,7 +477,6 @@ def _kinds(
     Runs that do not repeat are of one kind only if they are very close. A few runs `beside` an unstable cycle stand for
     all on that side.
     """
-    settings = SurveySettings.current()
     limits, beside = np.broadcast_to(most, (len(owners),)), beside or _Beside.nothing(len(owners))
     chosen: dict[int, list[int]] = {}
     surplus: list[int] = []

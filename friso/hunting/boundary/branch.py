@@ -15,11 +15,11 @@ from itertools import pairwise
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
-from friso.hunting.boundary.settings import ContinuationSettings
+from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, described
 from friso.hunting.cycle.shooting import Border, Condition, ConditionSearch, Family, Followed, close_along
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.settings import tolerance_settings
 
 END_OF_RANGE = "end of the range"
 """Reason for the end of a branch: it reached the end of the range."""
@@ -104,18 +104,17 @@ class Tracer:
         steepest: float | None = None,
         first: float | None = None,
     ) -> None:
-        settings = ContinuationSettings.current()
         self.family, self.sign, self.farthest, self.swings = family, sign, farthest, swings
         beginning = family(np.zeros(1, np.int64), np.zeros(1))
         self.rtol, self.chatters = beginning.searching_rtol(rtol), beginning.chatters
         self.first, self.longest, self.smooth = (
-            first or pace * settings.first_branch_step,
-            pace * settings.longest_branch_step,
-            pace * settings.multiplier_change_per_step,
+            first or pace * continuation_settings.first_branch_step,
+            pace * continuation_settings.longest_branch_step,
+            pace * continuation_settings.multiplier_change_per_step,
         )
         self.hundredth = hundredth
-        self.shortest = settings.shortest_branch_step if shortest is None else shortest
-        self.steepest = settings.steepest_multiplier if steepest is None else steepest
+        self.shortest = continuation_settings.shortest_branch_step if shortest is None else shortest
+        self.steepest = continuation_settings.steepest_multiplier if steepest is None else steepest
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -214,7 +213,7 @@ class Tracer:
 
     def shift(self, condition: Condition, point: Point) -> float:
         """Return how far the place of a cycle that meets a condition moves at a hundredth of the tolerance."""
-        tight, place = self.rtol * ToleranceSettings.current().check_rtol_factor, np.array([point.place])
+        tight, place = self.rtol * tolerance_settings.check_rtol_factor, np.array([point.place])
         again = ConditionSearch(condition, self._on_line, point.cycle.orbits, place, tight, point.jacobians)
         return abs(float(again.moved()[0]))
 
@@ -226,9 +225,8 @@ class Tracer:
         `ahead` is 1 or -1. The walk ends with the first point for which `until` holds, given the point before it and
         the point itself. Without `until`, a branch of asymmetric cycles also ends where it meets the symmetric cycle.
         """
-        settings = ContinuationSettings.current()
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
-        while len(points) <= settings.most_branch_steps:
+        while len(points) <= continuation_settings.most_branch_steps:
             last = points[-1]
             target, states = continued(points[-3:], step, direction)
             point = self.solve(last, target, direction, states)
@@ -238,7 +236,11 @@ class Tracer:
             ahead = float(moved @ direction) / length if near else 0.0
             if near and (ahead > 0 or len(points) == 1):
                 direction = moved / length
-            if point is None or not near or (ahead < np.cos(settings.branch_turn_per_step) and len(points) > 1):
+            if (
+                point is None
+                or not near
+                or (ahead < np.cos(continuation_settings.branch_turn_per_step) and len(points) > 1)
+            ):
                 step /= 3  # and along the direction estimated from the points
                 points[-1] = replace(last, jacobians=None)  # the old Jacobian may have misled the search
                 if step < self.shortest:
@@ -246,7 +248,7 @@ class Tracer:
                 continue
             coarse = (
                 abs(point.multiplier - last.multiplier) > self.smooth
-                and abs(last.multiplier) < settings.steep_multiplier
+                and abs(last.multiplier) < continuation_settings.steep_multiplier
             )
             if coarse and step > self.first:
                 step /= 2
@@ -295,7 +297,7 @@ class Tracer:
     def _stop(self, point: Point) -> str:
         """Return the reason why a branch is not followed beyond a point; "" if it is followed on."""
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
-        if point.cycle.amplitude[0] < ContinuationSettings.current().vanished_amplitude * stages.length[0]:
+        if point.cycle.amplitude[0] < continuation_settings.vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
         if abs(point.multiplier) > self.steepest:
             return f"the cycle repels {self.steepest:g}-fold and more per return"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from friso.hunting.boundary.settings import ContinuationSettings
+from friso.hunting.boundary.settings import continuation_settings
 
 
 class Crossing(NamedTuple):
@@ -32,7 +32,7 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
 
     Returns None if there are too few values, if no zero counts, or if the error exceeds half of the range of places.
     """
-    if len(places) < ContinuationSettings.current().least_cubic_values:
+    if len(places) < continuation_settings.least_cubic_values:
         return None
     trend, curve = (np.polynomial.Polynomial.fit(places, values, degree) for degree in (1, 3))
     slopes, roots = curve.deriv(), curve.roots()
@@ -69,7 +69,7 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
     cubic. Returns None if there are too few places, or if the cubic does not turn within the lengths. Returns None as
     well if the error exceeds half of the range of places.
     """
-    if len(places) < ContinuationSettings.current().least_cubic_values:
+    if len(places) < continuation_settings.least_cubic_values:
         return None
     curve = np.polynomial.Polynomial.fit(lengths, places, 3)
     turns = curve.deriv().roots()

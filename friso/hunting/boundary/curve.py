@@ -17,7 +17,7 @@ from numpy.polynomial.polynomial import polyder, polyfit, polyval
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
 from friso.hunting.boundary.locate import ALONG, Bifurcation, LocatedPoint, met, met_by_secants
-from friso.hunting.boundary.settings import ContinuationSettings
+from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL
 
@@ -116,7 +116,7 @@ class CurveTracer:
             size, states = expected.size, expected.states
         direction, far = ALONG, reach
         if self.kind == "fold":
-            direction, far = special.direction * [0.0, 1.0, 1.0], ContinuationSettings.current().fold_search_depth
+            direction, far = special.direction * [0.0, 1.0, 1.0], continuation_settings.fold_search_depth
             direction = direction / np.linalg.norm(direction)
         search = (tracer, special, np.concatenate([[0.0], size]), direction, far, states)
         located = met_by_secants(*search, self._slope(near, across, expected)) if tracer.chatters else met(*search)
@@ -136,19 +136,18 @@ class CurveTracer:
             return near.special.slope / float(near.special.direction[0])
         normal = expected.direction[::-1] * [-1.0, 1.0]
         crossing = float(normal @ near.across)
-        if abs(crossing) < ContinuationSettings.current().grazing_sine:
+        if abs(crossing) < continuation_settings.grazing_sine:
             return np.nan
         return near.special.slope * float(normal @ across) / crossing / float(near.special.direction[0])
 
     def curve(self, first: Spot) -> Curve | None:
         """Follow the whole curve through a point; None if no second point is found next to it."""
-        settings = ContinuationSettings.current()
         aside = first.across[::-1] * [1.0, -1.0]
-        for side in (settings.second_point_distance, -settings.second_point_distance):
+        for side in (continuation_settings.second_point_distance, -continuation_settings.second_point_distance):
             neighbour = first.at + side * aside
             if np.any((neighbour < 0) | (neighbour > 1)):
                 continue
-            second = self.on_line(neighbour, first.across, first, 20 * settings.second_point_distance)
+            second = self.on_line(neighbour, first.across, first, 20 * continuation_settings.second_point_distance)
             if second is not None:
                 break
         else:
@@ -161,10 +160,9 @@ class CurveTracer:
 
     def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:
         """Follow a curve from its first points, two or more; return all points, and why it ends."""
-        settings = ContinuationSettings.current()
-        start, step = spots[0], settings.first_curve_step
+        start, step = spots[0], continuation_settings.first_curve_step
         direction = unit_vector(spots[1].at - spots[0].at)
-        while len(spots) <= settings.most_curve_steps:
+        while len(spots) <= continuation_settings.most_curve_steps:
             last = spots[-1]
             ahead = last.at + step * direction
             if np.any((ahead < 0) | (ahead > 1)):
@@ -172,15 +170,17 @@ class CurveTracer:
                 return [*spots, *side], END_OF_RANGE if side else self._lost(last)
             across, expected = direction[::-1] * [-1.0, 1.0], Expected.beyond(spots, step)
             ahead = ahead + (expected.at - ahead) @ across * across
-            spot = self.on_line(ahead, across, last, settings.aside_of_prediction * step, expected)
+            spot = self.on_line(ahead, across, last, continuation_settings.aside_of_prediction * step, expected)
             moved = np.zeros(2) if spot is None else spot.at - last.at
-            if spot is None or moved @ direction < np.cos(settings.curve_turn_per_step) * np.linalg.norm(moved):
+            if spot is None or moved @ direction < np.cos(continuation_settings.curve_turn_per_step) * np.linalg.norm(
+                moved
+            ):
                 step /= 2
-                if step < settings.shortest_curve_step:
+                if step < continuation_settings.shortest_curve_step:
                     return spots, self._lost(last)
                 continue
             spots = [*spots, spot]
-            direction, step = unit_vector(moved), min(1.4 * step, settings.longest_curve_step)
+            direction, step = unit_vector(moved), min(1.4 * step, continuation_settings.longest_curve_step)
             if len(spots) > 7 and np.linalg.norm(spot.at - start.at) < step:
                 return spots, CLOSED
         return spots, "it was followed for as many steps as there may be"

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import LocatedPoint, special_points
-from friso.hunting.boundary.settings import ContinuationSettings
+from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
@@ -72,8 +72,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     The cycles are those that the return map suggests, and those in which simulations end, of any number of swings. Of
     the latter, at most `other_branches` (a setting) are followed. Orbits are closed to the relative tolerance `rtol`.
     """
-    settings = ContinuationSettings.current()
-    places = np.linspace(0, 1, settings.range_stages if seeds is None else seeds)
+    places = np.linspace(0, 1, continuation_settings.range_stages if seeds is None else seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
     sought = families(stages, stages.searching_rtol(rtol))
@@ -103,7 +102,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
         follow(k, cycles.take(np.array([k])))
     for motion in surveyed.motions:
         tally.add(1, BRANCHES)
-        if motion.cycles is not None and skipped < settings.other_branches:
+        if motion.cycles is not None and skipped < continuation_settings.other_branches:
             skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     once = each_once(special, hundredth)
     attracting = sought[0].attracting & ~_in_doubt(once, places)
@@ -122,11 +121,10 @@ def each_once(
     changes by one per cent. Where a limiter chatters, multipliers scatter, and cycles are followed over short,
     overlapping stretches. The error of a merged point includes the difference between the points.
     """
-    settings = ContinuationSettings.current()
     once: list[tuple[int, LocatedPoint]] = []
     for number, own in enumerate(special):
         for spot in own:
-            close = settings.same_point_hundredths * hundredth(spot.point.place)
+            close = continuation_settings.same_point_hundredths * hundredth(spot.point.place)
             twins = (k for k, (on, other) in enumerate(once) if _same(other, spot, close if on != number else 0.0))
             twin = next(twins, None)
             if twin is None:
@@ -144,16 +142,14 @@ def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
     Kind, sign and swings of the cycle must be equal. The points must be no farther apart than `close` or their errors,
     and their cycles of almost equal size.
     """
-    settings = ContinuationSettings.current()
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])
     apart = np.abs(first.point.vector - second.point.vector)
     kinds = [(spot.kind, spot.point.cycle.sign, spot.point.cycle.swings) for spot in (first, second)]
-    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < settings.same_cycle_log)
+    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < continuation_settings.same_cycle_log)
 
 
 def _passes(branch: Branch, point: Point) -> bool:
     """Tell whether a branch passes through a cycle or its mirror image."""
-    settings = ContinuationSettings.current()
     if (branch.sign, branch.points[0].cycle.swings) != (point.cycle.sign, point.cycle.swings):
         return False
     path = np.array([passed.vector for passed in branch.points])
@@ -163,8 +159,8 @@ def _passes(branch: Branch, point: Point) -> bool:
             share = (point.place - first[0]) / (second[0] - first[0]) if high > low else 0.0
             between = first + share * (second - first)
             if (
-                np.abs(between - point.vector)[1:].max() < settings.same_cycle_log
-                or abs(between[2] - point.time) < settings.same_cycle_log / 4
+                np.abs(between - point.vector)[1:].max() < continuation_settings.same_cycle_log
+                or abs(between[2] - point.time) < continuation_settings.same_cycle_log / 4
             ):
                 return True
     return False

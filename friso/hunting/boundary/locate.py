@@ -14,7 +14,7 @@ import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.crossing import crossing, turn
-from friso.hunting.boundary.settings import ContinuationSettings
+from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.cycle.multipliers import decisive_of
 from friso.hunting.cycle.shooting import Condition
 
@@ -47,9 +47,10 @@ class LocatedPoint:
         The result is true if the cycle lies within the error of the special point and has almost its size. It is false
         if that error is not known (infinite).
         """
-        settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
-        return bool(np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < settings.same_cycle_log)
+        return bool(
+            np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < continuation_settings.same_cycle_log
+        )
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
@@ -124,7 +125,7 @@ def _enclosed(
     """
     direction, length = towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     points: dict[float, Point] = {0.0: first, length: second}
-    for tries in range(ContinuationSettings.current().special_point_tries):
+    for tries in range(continuation_settings.special_point_tries):
         places = np.array(sorted(points))
         distances = np.array([distance_to(kind, points[place]) for place in places.tolist()])
         passed = int(np.flatnonzero(distances[:-1] * distances[1:] <= 0)[0])
@@ -172,15 +173,14 @@ def _last_step(tracer: Tracer, kind: Bifurcation, place: float) -> float:
     Steps are in the space of place, log distance and log time. Where a limiter chatters, multipliers scatter, and those
     of several orbits decide in the end: the search need not come nearer than a fraction of their distances.
     """
-    settings = ContinuationSettings.current()
     if not tracer.chatters:
-        return settings.special_point_step
-    return settings.chattering_step_share * _reach(tracer, kind, place)
+        return continuation_settings.special_point_step
+    return continuation_settings.chattering_step_share * _reach(tracer, kind, place)
 
 
 def _reach(tracer: Tracer, kind: Bifurcation, place: float) -> float:
     """Return how far beside a special point the orbits lie whose multipliers or places are fitted."""
-    return ContinuationSettings.current().chattering_fold_reach if kind == "fold" else tracer.hundredth(place)
+    return continuation_settings.chattering_fold_reach if kind == "fold" else tracer.hundredth(place)
 
 
 def _special_point(
@@ -251,7 +251,7 @@ def _beside(tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, d
     The `guess` and the `direction`, (3,), are in the space of place, log distance and log time. The orbits are closed
     at once, from the cycle `near` them.
     """
-    reach, count = _reach(tracer, kind, float(guess[0])), ContinuationSettings.current().cubic_values
+    reach, count = _reach(tracer, kind, float(guess[0])), continuation_settings.cubic_values
     return tracer.solve_all(near, guess + np.linspace(-reach, reach, count)[:, None] * direction, direction)
 
 
@@ -295,10 +295,10 @@ def met_by_secants(
     The secant method closes an orbit for every trial of the place, and ends where the scatter begins. `slope` is about
     the change of the multiplier along the direction.
     """
-    settings, kind = ContinuationSettings.current(), near.kind
+    kind = near.kind
     last_step = _last_step(tracer, kind, float(origin[0]))
     places, points = [0.0], [tracer.solve(near.point, origin, direction, states)]
-    for _ in range(settings.special_point_tries):
+    for _ in range(continuation_settings.special_point_tries):
         if (latest := points[-1]) is None:
             return None
         if len(points) > 1:
@@ -308,7 +308,7 @@ def met_by_secants(
             special = _special_point(tracer, kind, latest, direction, slope)
             return special if np.isfinite(special.error) else None
         if first and not last_step <= abs(step) <= reach:
-            step = max(settings.slope_step, last_step)
+            step = max(continuation_settings.slope_step, last_step)
         elif not abs(places[-1] + step) <= reach:
             return None
         places.append(places[-1] + step)

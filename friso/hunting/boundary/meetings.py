@@ -16,7 +16,7 @@ import numpy as np
 
 from friso.hunting.boundary.branch import END_OF_RANGE
 from friso.hunting.boundary.curve import CLOSED, Curve, CurveTracer, Spot, unit_vector
-from friso.hunting.boundary.settings import MeetingSettings
+from friso.hunting.boundary.settings import meeting_settings
 from friso.hunting.boundary.space import Space
 
 MeetingKind = Literal["cross", "together", "end"]
@@ -62,7 +62,7 @@ def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
     path = np.vstack([meeting.places, meeting.places[-1:]])
     shares = leg_shares(path, place)
     away = np.linalg.norm(path[:-1] + shares[:, None] * np.diff(path, axis=0) - place, axis=1).min()
-    return bool(away < MeetingSettings.current().end_distance)
+    return bool(away < meeting_settings.end_distance)
 
 
 def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
@@ -120,7 +120,7 @@ def _alike(one: np.ndarray, other: np.ndarray) -> bool:
     A cycle of twice the period counts as the same.
     """
     size, period = np.abs(one - other)
-    return bool(max(size, min(period, abs(period - np.log(2)))) < MeetingSettings.current().same_cycle_log)
+    return bool(max(size, min(period, abs(period - np.log(2)))) < meeting_settings.same_cycle_log)
 
 
 def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Meeting]:
@@ -129,15 +129,14 @@ def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Mee
     This happens where a curve was lost and then followed again. A curve that crosses at an angle stays near over a
     shorter stretch.
     """
-    settings = MeetingSettings.current()
     on: list[np.ndarray] = []
     for spot in (*curves[second].spots, None):
         near = None if spot is None else _nearest(curves[first], spot.at)
-        if spot and near and near.away < settings.together_distance and _alike(near.cycle, _size(spot)):
+        if spot and near and near.away < meeting_settings.together_distance and _alike(near.cycle, _size(spot)):
             on.append(spot.at)
             continue
-        if len(on) > 1 and np.linalg.norm(on[-1] - on[0]) > settings.together_length:
-            error = np.full(2, settings.together_distance)
+        if len(on) > 1 and np.linalg.norm(on[-1] - on[0]) > meeting_settings.together_length:
+            error = np.full(2, meeting_settings.together_distance)
             yield Meeting((first, second), "together", np.array([on[0], on[-1]]), error, True)
         on = []
 
@@ -158,7 +157,7 @@ def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], 
     for k, m in zip(*(index.tolist() for index in np.nonzero(crossed)), strict=True):
         place = path[k] + shares[0][k, m] * legs[k]
         pairs = spots[k : k + 2], other_spots[m : m + 2]
-        if ring and np.linalg.norm(place - path[0]) < MeetingSettings.current().end_distance:
+        if ring and np.linalg.norm(place - path[0]) < meeting_settings.end_distance:
             continue  # the start of the ring, which was followed a little beyond its end
         yield _refined(space, curves, numbers, place, pairs, rtol)
 
@@ -182,14 +181,14 @@ def _refined(
     cross. The first guess is returned if a cycle is lost on the way. It is also returned if a limiter chatters, because
     one point then costs as much as many.
     """
-    settings, place = MeetingSettings.current(), guess
-    refinements = 0 if space.stages(guess[None]).chatters else settings.crossing_refinements
+    place = guess
+    refinements = 0 if space.stages(guess[None]).chatters else meeting_settings.crossing_refinements
     ways = [unit_vector(last.at - first.at) for first, last in pairs]
     spots = [min(pair, key=lambda spot: float(np.linalg.norm(spot.at - guess))) for pair in pairs]
     tracers = [CurveTracer(space, curves[number].kind, curves[number].sign, rtol) for number in numbers]
     for _ in range(refinements):
         near = [
-            tracer.on_line(place, way[::-1] * [-1.0, 1.0], spot, settings.crossing_reach)
+            tracer.on_line(place, way[::-1] * [-1.0, 1.0], spot, meeting_settings.crossing_reach)
             for tracer, way, spot in zip(tracers, ways, spots, strict=True)
         ]
         one, other = near
@@ -199,10 +198,10 @@ def _refined(
         ways = [_turned(way, chord) for way, chord in zip(ways, chords, strict=True)]
         spots, before = [one, other], place
         place = one.at + _cross(other.at - one.at, ways[1]) / _cross(*ways) * ways[0]
-        if not np.abs(place - guess).max() < settings.crossing_reach:
+        if not np.abs(place - guess).max() < meeting_settings.crossing_reach:
             break
         moved = np.abs(place - before)
-        if moved.max() < settings.crossing_precision:
+        if moved.max() < meeting_settings.crossing_precision:
             error = moved + one.error + other.error
             return Meeting(numbers, "cross", place[None], error, _alike(_size(one), _size(other)))
     sizes = [_nearest(curves[number], guess).cycle for number in numbers]
@@ -216,8 +215,11 @@ def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
     the curve. Directions have length one, shape (2,).
     """
     along, length = abs(float(chord @ way)), float(np.linalg.norm(chord))
-    settings = MeetingSettings.current()
-    return unit_vector(chord) if along > max(settings.crossing_precision, settings.chord_along * length) else way
+    return (
+        unit_vector(chord)
+        if along > max(meeting_settings.crossing_precision, meeting_settings.chord_along * length)
+        else way
+    )
 
 
 def _ends_on(curves: Sequence[Curve], number: int, other: int) -> Iterator[Meeting]:
@@ -229,5 +231,5 @@ def _ends_on(curves: Sequence[Curve], number: int, other: int) -> Iterator[Meeti
     for how, spot in zip(curve.ends, (curve.spots[0], curve.spots[-1]), strict=True):
         if how not in (END_OF_RANGE, CLOSED):
             near = _nearest(curves[other], spot.at)
-            if near.away < MeetingSettings.current().end_distance and _alike(near.cycle, _size(spot)):
+            if near.away < meeting_settings.end_distance and _alike(near.cycle, _size(spot)):
                 yield Meeting((number, other), "end", spot.at[None], np.full(2, near.away), True)

@@ -14,13 +14,13 @@ from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
-from friso.hunting.boundary.settings import ContinuationSettings
+from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families, symmetric_cycles, whole_cycles
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
-from friso.hunting.settings import EdgeSettings
+from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import attractors_beside
 from friso.progress import Progress, Tally, silent
 
@@ -67,7 +67,7 @@ class _Grid:
 
     @classmethod
     def of(cls, space: Space, nodes: int | None) -> _Grid:
-        nodes = ContinuationSettings.current().grid_stages if nodes is None else nodes
+        nodes = continuation_settings.grid_stages if nodes is None else nodes
         points = space.grid(nodes)
         allowed = np.flatnonzero(space.allowed(points))
         return cls(nodes, points, allowed, space.stages(points[allowed]))
@@ -207,11 +207,10 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 
     `start` and `end` are their coordinates in the box.
     """
-    settings = ContinuationSettings.current()
     points, mesh = curve.points, float(np.linalg.norm(end - start))
     for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):
         nearest = points[:-1] + leg_shares(points, at)[:, None] * np.diff(points, axis=0)
-        if np.linalg.norm(nearest - at, axis=1).min() < settings.explained_distance * mesh:
+        if np.linalg.norm(nearest - at, axis=1).min() < continuation_settings.explained_distance * mesh:
             return True
     return False
 
@@ -222,7 +221,6 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     `start` and `end` are the coordinates of both stages in the box of the keys. Returns the point of change (None:
     there is none, or it could not be located), and whether the cycle reaches the neighbour unchanged.
     """
-    settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))
     across = (end - start) / mesh
     tracer = Tracer(
@@ -230,13 +228,15 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
         cycle.sign,
         rtol,
         farthest=mesh,
-        pace=EdgeSettings.current().edge_pace,
+        pace=edge_settings.edge_pace,
         hundredth=space.hundredth(start, across),
     )
     first = Point.of(space.stages(start[None]), 0.0, cycle)
     steps = count(1)
     points, reason = tracer.walk(
-        first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= settings.most_points_between
+        first,
+        1.0,
+        lambda last, point: bool(changes(last, point)) or next(steps) >= continuation_settings.most_points_between,
     )
     last, point = [first, first, *points][-2:]
     if not (kinds := changes(last, point)):

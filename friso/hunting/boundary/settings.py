@@ -144,3 +144,7 @@ class MeetingSettings(Settings):
 
     same_cycle_log: float = setting(0.05, "")
     """Largest difference in interpolated log amplitude and log period between points of one cycle."""
+
+
+continuation_settings = ContinuationSettings.live()
+meeting_settings = MeetingSettings.live()

@@ -15,8 +15,8 @@ from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations.motion import without_motion
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, carrying_force, shared_structure
-from friso.hunting.cycle.settings import OrbitSettings
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.cycle.settings import settings
+from friso.hunting.settings import tolerance_settings
 from friso.stage.transmission import BACKLASH
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
@@ -81,7 +81,7 @@ class Ensemble:
 
     def searching_rtol(self, rtol: float) -> float:
         """Return the relative tolerance at which many cycles are closed: `rtol`, or a wider one if they may chatter."""
-        return max(rtol, ToleranceSettings.current().chattering_rtol) if self.chatters else rtol
+        return max(rtol, tolerance_settings.chattering_rtol) if self.chatters else rtol
 
     @property
     def remember(self) -> bool:
@@ -134,7 +134,7 @@ class Ensemble:
     @cached_property
     def scales(self) -> np.ndarray:
         """Return the magnitudes of the states, shape (count, states)."""
-        size = np.where(self.length > 0, self.length, OrbitSettings.current().frictionless_size)
+        size = np.where(self.length > 0, self.length, settings.frictionless_size)
         values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
         return columns(self.kernel.module.scales(values), self.count)
 

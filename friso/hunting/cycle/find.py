@@ -12,7 +12,7 @@ from friso.hunting.cycle.guess import Guess, symmetric_guess, whole_guess
 from friso.hunting.cycle.multipliers import decisive, multipliers
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 from friso.hunting.cycle.shooting import Orbits, close, swings_of_simplest
 from friso.hunting.cycle.swings import swings
 from friso.hunting.rows import ArrayRows
@@ -157,7 +157,6 @@ def asymmetric_cycles(
     `positive` is the return map, which suggests the cycle. The other cycle of the pair is its mirror image. Stages for
     which `which`, shape (count,), is false are left out, as if nothing suggested a cycle.
     """
-    settings = OrbitSettings.current()
     guess = whole_guess(stages, positive, positive, settings.least_asymmetry_share)
     if which is not None:
         guess.times[~which] = np.nan
@@ -191,7 +190,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
         np.zeros(count, bool),
         swings_of_simplest(sign),
     )
-    for distance, time in OrbitSettings.current().guess_variants:
+    for distance, time in settings.guess_variants:
         missing = guess.numbers[~orbits.closed[guess.numbers]]
         if not missing.size:
             break
@@ -206,7 +205,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
 
 def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
     """Return which orbits stick near the guessed `distances` [m], shape (count,)."""
-    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < OrbitSettings.current().kept_distance_share
+    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < settings.kept_distance_share
 
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
@@ -221,7 +220,6 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
 
     The closed ones are copied into `orbits`.
     """
-    settings = OrbitSettings.current()
     missing = guess.numbers[~orbits.closed[guess.numbers]]
     if not missing.size:
         return

@@ -9,7 +9,7 @@ import numpy as np
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
 from friso.hunting.cycle.return_map import ReturnMap, trace_returns
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,6 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
     It is the largest distance from which a stage lands equally far on the other side. There the return map falls
     through its diagonal.
     """
-    settings = OrbitSettings.current()
     low, high = _falling(positive.distances, positive.returns - positive.distances)
     numbers = np.flatnonzero(np.isfinite(low))
     distances, times = np.full(stages.count, np.nan), np.full(stages.count, np.nan)
@@ -56,7 +55,6 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
     Of several guesses, the one with the smallest difference is taken if `apart` is 0, else the one with the largest.
     `positive` and `negative` are the return maps of stages that stick on the positive and on the negative side.
     """
-    settings = OrbitSettings.current()
     guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
     for k in range(stages.count):
         start, far = positive.distances[k], positive.returns[k]
@@ -89,7 +87,7 @@ def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.nd
         i = crosses[differ.argmax() if apart else differ.argmin()]
         return float(np.interp(0.0, *_ascending(rise[i : i + 2], start[i : i + 2])))
     change = np.abs(np.log(end[goes] / start[goes]))
-    if not goes.size or change.min() >= OrbitSettings.current().almost_return_log:
+    if not goes.size or change.min() >= settings.almost_return_log:
         return None
     nearest = goes[change.argmin()]
     towards = nearest + int(side[nearest])  # the side on which the symmetric fixed point lies

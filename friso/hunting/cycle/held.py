@@ -7,9 +7,9 @@ import numpy as np
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles
 from friso.hunting.cycle.multipliers import returns_of
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 from friso.hunting.cycle.shooting import Orbits
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.settings import tolerance_settings
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -20,8 +20,6 @@ def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndar
     The map is interpolated, so a simulation has to decide whether the motions are attractors. The result is NaN where a
     limiter chatters, because the map is too rough.
     """
-    settings = OrbitSettings.current()
-    tolerances = ToleranceSettings.current()
     distances = np.full((stages.count, settings.held_starts), np.nan)
     if stages.chatters:
         return distances
@@ -29,7 +27,10 @@ def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndar
     if not which.size:
         return distances
     heights = _returns(
-        stages.take(which), cycles.orbits.take(which), cycles.direction[which], tolerances.held_rtol_factor * rtol
+        stages.take(which),
+        cycles.orbits.take(which),
+        cycles.direction[which],
+        tolerance_settings.held_rtol_factor * rtol,
     )
     sticks = cycles.states[which, stages.sticking]
     for k, sticks_at, swings in zip(which, sticks, heights, strict=True):
@@ -48,7 +49,6 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
     Starts are displaced along `direction`, shape (count, states). They are first spread evenly over a range about the
     orbit. On either side, more starts are added where the next return begins to leave the range.
     """
-    settings = OrbitSettings.current()
     away = np.linspace(-settings.held_range_share, settings.held_range_share, settings.held_runs)
     heights = returns_of(stages, orbits, direction, away[None, :], settings.held_returns, rtol)
     middle = settings.held_runs // 2
@@ -67,7 +67,6 @@ def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     is empty if no motion lasts. A motion that grew at every return is left out: near a multiplier of 1 or -1 it merely
     leaves slowly.
     """
-    settings = OrbitSettings.current()
     inside = (np.abs(before) <= settings.held_range_share) & (np.abs(after) <= settings.held_range_share)
     breaks = before[~inside & np.isfinite(before)]
     low, high = np.max(breaks[breaks < 0], initial=-np.inf), np.min(breaks[breaks > 0], initial=np.inf)

@@ -21,7 +21,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 from friso.hunting.loop import LowerGains, far_beyond_a_limit, lags, surely_calm
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
@@ -292,7 +292,6 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
     A text is "" without a reason. `farther`, (count,), marks stages that may keep swinging from larger distances than
     were tried.
     """
-    settings = OrbitSettings.current()
     if stages.outer_integrals:
         why = np.full(stages.count, OUTER_INTEGRALS, dtype=object)
     else:
@@ -313,7 +312,6 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
     cases. In the first, the ratio falls as small swings grow, and takes values in that range. In the second, friction
     falls too little for the survey to find all cycles, but steeply enough to feed one.
     """
-    settings = OrbitSettings.current()
     possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)
     for first in range(0, len(rub), settings.friction_stages_at_once):
         part = rub[first : first + settings.friction_stages_at_once]
@@ -326,7 +324,6 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
     All stages must have friction. The result is true for all of them if the law has no steady force.
     """
-    settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]
     sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)
     small = np.outer(stages.length * stages.number("rate"), sizes)
@@ -381,7 +378,6 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
 
     The result is NaN if too few deviations stay small.
     """
-    settings = OrbitSettings.current()
     away = np.array([[0.0, settings.beside_cycle_share, -settings.beside_cycle_share]])
     heights = returns_of(
         stages, cycles.orbits, cycles.direction, away, settings.beside_cycle_returns, COARSE_RTOL / 100
@@ -398,7 +394,6 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
 
 def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
     """Return the signals of one period of a cycle, by name."""
-    settings = OrbitSettings.current()
     period = float(cycles.period[0])
     results = stages.run(cycles.states, cycles.period, COARSE_RTOL / 100, interval=period / settings.trace_samples)
     time = np.arange(results.samples.shape[1]) * (period / settings.trace_samples)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 from friso.hunting.cycle.shooting import Orbits, Shot, shoot
 from friso.hunting.cycle.swings import swings
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.settings import tolerance_settings
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,7 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 
     Runs start beside the orbits along a direction (count, states); a straight line is fitted to their returns.
     """
-    settings, tolerances = OrbitSettings.current(), ToleranceSettings.current()
-    coarser = min(tolerances.slope_rtol_factor * rtol, max(rtol, tolerances.chattering_rtol))
+    coarser = min(tolerance_settings.slope_rtol_factor * rtol, max(rtol, tolerance_settings.chattering_rtol))
     away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]
     heights = returns_of(stages, orbits, direction, away, 2, coarser)
     return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])
@@ -99,7 +98,6 @@ def _straight(pairs: np.ndarray) -> float:
 
     The slope is NaN if too few pairs are left. A stage that does not break away makes an outlier.
     """
-    settings = OrbitSettings.current()
     if len(pairs) < settings.least_slope_runs:
         return np.nan
     first, second = (pairs - np.median(pairs, axis=0)).T

@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 from friso.stage.standstill import integral_leak
 
 
@@ -54,7 +54,6 @@ def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     The stage sticks meanwhile, at a `displacement` [m]. If the integrator pauses, the result is one period of the
     loop's natural frequency. With a leak it is at most a few time constants of the leak.
     """
-    settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)
     with np.errstate(divide="ignore"):
         winding = np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))

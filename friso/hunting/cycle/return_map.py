@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck, wait
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 from friso.hunting.cycle.swings import swings
 
 
@@ -34,7 +34,6 @@ def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
 
     The map is finer where a stage may land as far off as it started.
     """
-    settings = OrbitSettings.current()
     coarse = np.geomspace(*settings.map_range, settings.map_points)[None, :] * stages.length[:, None]
     first = trace_returns(stages, coarse, rtol, side)
     gain = np.argmax(first.returns / first.distances, axis=1)
@@ -57,7 +56,6 @@ def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: fl
 
     Distances ascend; `side` is 1 or -1, the side of the reference from which stages start.
     """
-    settings = OrbitSettings.current()
     shape = distances.shape
     several = stages.take(np.repeat(np.arange(stages.count), shape[1]))
     starts = stuck(several, side * distances.ravel())

@@ -165,3 +165,6 @@ class OrbitSettings(Settings):
 
     swing_leg_share: float = setting(0.5, "of the distance")
     """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing of a stage that sticks."""
+
+
+settings = OrbitSettings.live()

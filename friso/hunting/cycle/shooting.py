@@ -14,9 +14,9 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS
 from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 from friso.hunting.rows import ArrayRows
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.settings import tolerance_settings
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,6 @@ class _Shooting:
         rtol: float,
         places: np.ndarray | None = None,
     ) -> None:
-        tolerances = ToleranceSettings.current()
         self.family, self.sign, self.rtol = family, sign, rtol
         self.states, self.times = states.copy(), times.copy()
         count = len(times)
@@ -193,18 +192,21 @@ class _Shooting:
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
         self.finest = (
-            tolerances.finest_gap_chattering
+            tolerance_settings.finest_gap_chattering
             if self.chatters
-            else max(tolerances.finest_gap, min(tolerances.gap_rtol_factor * rtol, tolerances.closed_gap))
+            else max(
+                tolerance_settings.finest_gap,
+                min(tolerance_settings.gap_rtol_factor * rtol, tolerance_settings.closed_gap),
+            )
         )
         self.limit, self.stalled = (
-            tolerances.closed_gap_chattering if self.chatters else tolerances.closed_gap,
-            OrbitSettings.current().stalled_steps,
+            tolerance_settings.closed_gap_chattering if self.chatters else tolerance_settings.closed_gap,
+            settings.stalled_steps,
         )
 
     def advance(self) -> bool:
         """Take one step of all active orbits, and tell whether any is still active."""
-        renewed = self.gaps > OrbitSettings.current().fresh_jacobian_gap if self.chatters else ~self.serves
+        renewed = self.gaps > settings.fresh_jacobian_gap if self.chatters else ~self.serves
         for renew in (False, True):
             if (which := np.flatnonzero(self.active & (renewed == renew))).size:
                 self._advance(which, renew)
@@ -215,7 +217,6 @@ class _Shooting:
 
         With `renew` a new Jacobian is computed, otherwise the last one is used again.
         """
-        settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         shot = shoot(stages, states, times, self.sign, self.rtol) if renew or self.condition else None
         if shot:
@@ -272,9 +273,9 @@ class _Shooting:
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         far, near, closed = self.stalled
         patience = np.where(
-            self.gaps[which] > OrbitSettings.current().fresh_jacobian_gap,
+            self.gaps[which] > settings.fresh_jacobian_gap,
             far,
-            np.where(self.gaps[which] > max(ToleranceSettings.current().closed_gap, self.rtol), near, closed),
+            np.where(self.gaps[which] > max(tolerance_settings.closed_gap, self.rtol), near, closed),
         )
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
@@ -285,7 +286,6 @@ class _Shooting:
         `residual` has the closing errors and the phase error, `scales` the magnitudes of the states. `sticking` is the
         index of the state that is constant while the stage sticks.
         """
-        settings = OrbitSettings.current()
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
         far = abs(step[sticking]) / (settings.newton_stride * abs(self.states[k, sticking]))
         late = abs(step[size]) / (settings.newton_stride * self.times[k])
@@ -312,18 +312,16 @@ class _Following(_Shooting):
     border: Border
 
     def __init__(self, *arguments: Any) -> None:
-        tolerances = ToleranceSettings.current()
         super().__init__(*arguments)
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
-        settings = OrbitSettings.current()
         self.stalled = settings.followed_stalled_steps
         self.nudge = settings.place_nudge_chattering if self.chatters else settings.place_nudge
         if self.chatters:
-            self.finest = tolerances.followed_gap
+            self.finest = tolerance_settings.followed_gap
         else:
-            self.finest, self.limit = max(self.finest, tolerances.closed_gap), tolerances.followed_gap
+            self.finest, self.limit = max(self.finest, tolerance_settings.closed_gap), tolerance_settings.followed_gap
         # for each orbit, its last step and the residual that the step should have removed
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
@@ -381,7 +379,6 @@ class _Following(_Shooting):
         The errors are those of closing, of the phase and of the distance from the border. Where a limiter chatters, the
         column of the place is kept from earlier for as long as the closing error shrinks.
         """
-        settings = OrbitSettings.current()
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)
         serves = self.chatters & np.isfinite(self.gaps[which]) & (gaps < settings.old_jacobian_share * self.gaps[which])
@@ -431,9 +428,11 @@ class ConditionSearch(_Following):
         jacobians: np.ndarray | None = None,
     ) -> None:
         super().__init__(family, orbits.states, orbits.times, orbits.sign, rtol, places)
-        tolerances = ToleranceSettings.current()
         self.condition, self.swings = condition, orbits.swings
-        self.limit, self.finest = tolerances.closed_gap, tolerances.gap_rtol_factor * tolerances.closed_gap
+        self.limit, self.finest = (
+            tolerance_settings.closed_gap,
+            tolerance_settings.gap_rtol_factor * tolerance_settings.closed_gap,
+        )
         if jacobians is not None:
             self.jacobians = jacobians.copy()
             self.inverses = [_inverse(jacobian) for jacobian in jacobians]
@@ -452,7 +451,7 @@ class ConditionSearch(_Following):
         before = self.places.copy()
         self.advance()
         self.advance()
-        near = (self.gaps < OrbitSettings.current().fresh_jacobian_gap) & np.isfinite(self.places)
+        near = (self.gaps < settings.fresh_jacobian_gap) & np.isfinite(self.places)
         return np.where(near, self.places - before, np.inf)
 
     def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
@@ -469,7 +468,7 @@ class ConditionSearch(_Following):
         along = np.array([_null(rows) for rows in jacobians[:, :-1]])
         sizes = np.stack([self.states[which, stages.sticking], self.times[which], np.ones(len(which))], axis=1)
         along /= np.max(np.abs(along[:, [stages.sticking, -2, -1]] / sizes), axis=1, keepdims=True)
-        off, (least, most) = self.condition(stages, shot), OrbitSettings.current().branch_nudges
+        off, (least, most) = self.condition(stages, shot), settings.branch_nudges
         with np.errstate(all="ignore"):
             needed = np.abs(off / np.einsum("ki,ki->k", before, along))
         along *= np.clip(np.nan_to_num(needed, nan=most), least, most)[:, None]
@@ -490,7 +489,7 @@ class ConditionSearch(_Following):
 
 def _iterated(shooting: _S) -> _S:
     """Take Newton steps until all orbits are closed or stall."""
-    for _ in range(OrbitSettings.current().newton_steps):
+    for _ in range(settings.newton_steps):
         if not shooting.advance():
             break
     return shooting

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.engine.arrays import Results
 from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.cycle.settings import settings
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
     has come back by a fraction of its start's distance, or the run is over.
     """
     position = starts[:, stages.kernel.position]
-    legs = OrbitSettings.current().swing_leg_share * np.abs(position)
+    legs = settings.swing_leg_share * np.abs(position)
     results = stages.run(starts, durations, rtol, least_swing=0.1 * legs)
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]

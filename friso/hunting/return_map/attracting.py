@@ -12,13 +12,13 @@ import numpy as np
 from friso.hunting.attractors.closing import close_orbits
 from friso.hunting.attractors.rounds import RTOL as RUN_RTOL
 from friso.hunting.attractors.rounds import Pending
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.return_map.landing_map import MapAttractor
 from friso.hunting.return_map.mapped import Mapped, map_stages, remembered
-from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.return_map.settings import settings as return_map_settings
 
 UNCLOSED = "an attractor of the map was not closed as an orbit that attracts"
 LOST = "runs were not completed"
@@ -45,7 +45,6 @@ class MapSurvey:
 
         A text is "" if the map decides.
         """
-        settings = ReturnMapSettings.current()
         why = np.full(self.mapped.stages.count, "", dtype=object)
         for stage, landing_map in enumerate(self.mapped.maps):
             scatter, _ = landing_map.scatter
@@ -53,7 +52,7 @@ class MapSurvey:
                 why[stage] = UNCLOSED
             elif landing_map.lost:
                 why[stage] = LOST
-            elif scatter > settings.map_scatter_share:
+            elif scatter > return_map_settings.map_scatter_share:
                 why[stage] = f"{SCATTERS} ({remembered(self.mapped, stage)})"
         return why
 
@@ -84,19 +83,17 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
 
     Orbits are closed to the relative tolerance `rtol`.
     """
-    settings = ReturnMapSettings.current()
-    survey_settings = SurveySettings.current()
     mapped = map_stages(stages)
     motions: list[Swinging] = []
     repelling: list[Swinging] = []
-    for _ in range(settings.attractor_tries):
+    for _ in range(return_map_settings.attractor_tries):
         proposals = _left(mapped, motions, repelling)
         if not proposals:
             break
         runs = np.array([proposal.run for proposal in proposals])
         most = max(
             survey_settings.most_repeating_swings,
-            settings.followed_repetitions * max(_swings(p.attractor) for p in proposals),
+            return_map_settings.followed_repetitions * max(_swings(p.attractor) for p in proposals),
         )
         before = len(mapped.owners)
         mapped = mapped.gone_on(runs, most)
@@ -165,7 +162,7 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
         size = float(distances.max())
     else:
         size = float(distances[::2].max() + distances[1::2].max()) / 2
-    alike = abs(size / motion.amplitude - 1) < ReturnMapSettings.current().same_orbit_distance_share
+    alike = abs(size / motion.amplitude - 1) < return_map_settings.same_orbit_distance_share
     return bool(alike and (not attractor.periodic or motion.swings % len(distances) == 0))
 
 
@@ -200,12 +197,13 @@ def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
     Repetitions after fewer than `least` swings do not count. `path`, shape (landings,), has the signed landings; those
     of a `symmetric` stage may repeat on the other side.
     """
-    settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path
     for swings in range(1 if symmetric else 2, len(path) // 2 + 1, 1 if symmetric else 2):
         last = min(max(swings, 2), len(path) - swings)
         again = sizes[-last:] / sizes[-last - swings : len(path) - swings]
-        share = settings.simple_closing_share if swings <= 2 - symmetric else settings.closing_share
+        share = (
+            return_map_settings.simple_closing_share if swings <= 2 - symmetric else return_map_settings.closing_share
+        )
         if swings >= least and np.all(np.abs(again - 1) < share):
             return swings
     return 0

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.rest import stuck
 from friso.hunting.return_map.attracting import MapSurvey
 from friso.hunting.return_map.landings import RTOL, find_landings
-from friso.hunting.return_map.settings import ReturnMapSettings
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.return_map.settings import settings as return_map_settings
+from friso.hunting.settings import tolerance_settings
 
 
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
@@ -23,7 +23,7 @@ def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])
     right = np.ones(len(numbers), bool)
-    for rtol in (RTOL, ToleranceSettings.current().check_rtol_factor * RTOL):
+    for rtol in (RTOL, tolerance_settings.check_rtol_factor * RTOL):
         lands = _land_as_foretold(survey, numbers[owners], np.concatenate(begun), rtol)
         right[owners[~lands]] = False
     return right
@@ -34,16 +34,16 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
 
     They are in deflections of the loop by the break-away force.
     """
-    settings, mapped = ReturnMapSettings.current(), survey.mapped
+    mapped = survey.mapped
     runs = np.flatnonzero((mapped.owners == stage) & np.isfinite(mapped.starts))
     runs = runs[np.argsort(mapped.starts[runs], kind="stable")]
     starts, landings = mapped.starts[runs], mapped.landings
     last = landings.distances[runs, landings.count[runs]] / mapped.stages.length[stage]
     goes_on = ~landings.rest[runs] & mapped.maps[stage].goes_on(last)
     kinds = [which for which in map(np.flatnonzero, (goes_on, ~goes_on)) if which.size]
-    shares = np.array(settings.checked_start_shares)
+    shares = np.array(return_map_settings.checked_start_shares)
     chosen = np.concatenate([which[(shares * len(which)).astype(int)] for which in kinds])
-    near = np.abs(starts) <= settings.near_starts[-1][1]
+    near = np.abs(starts) <= return_map_settings.near_starts[-1][1]
     gaps = np.flatnonzero(near[:-1] & near[1:] & (starts[:-1] * starts[1:] > 0))
     widest = gaps[np.abs(np.log(starts[gaps + 1] / starts[gaps])).argmax()]
     between = np.sign(starts[widest]) * np.sqrt(starts[widest] * starts[widest + 1])
@@ -57,10 +57,8 @@ def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray,
     `owners` are the numbers of the runs' stages in the `survey`. Runs begin stuck at `starts`, in deflections of the
     loop by the break-away force.
     """
-    settings = ReturnMapSettings.current()
-    survey_settings = SurveySettings.current()
     stages = survey.mapped.stages.take(owners)
-    landed = find_landings(stages, stuck(stages, starts * stages.length), settings.confirmed_landings, rtol)
+    landed = find_landings(stages, stuck(stages, starts * stages.length), return_map_settings.confirmed_landings, rtol)
     distances = landed.distances / stages.length[:, None]
     lands = ~landed.lost
     for k, owner in enumerate(owners.tolist()):
@@ -71,6 +69,9 @@ def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray,
         foretold = np.abs(survey.mapped.maps[owner].foretold(before))
         apart = np.abs(foretold - after) / np.maximum(foretold, survey_settings.least_swing)
         lands[k] &= bool(
-            np.all((apart < settings.map_scatter_share) | (np.maximum(foretold, after) < survey_settings.least_swing))
+            np.all(
+                (apart < return_map_settings.map_scatter_share)
+                | (np.maximum(foretold, after) < survey_settings.least_swing)
+            )
         )
     return lands

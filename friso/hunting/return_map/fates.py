@@ -17,7 +17,7 @@ from friso.equations.structure import shared_structure
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import RTOL, find_landings
-from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.return_map.settings import settings
 
 
 def motions_go_on(
@@ -48,7 +48,6 @@ def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tup
 
     Runs begin from the states `starts`; where they land decides.
     """
-    settings = ReturnMapSettings.current()
     count = len(starts)
     ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
     states, most = starts, settings.first_landings

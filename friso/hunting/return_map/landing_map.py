@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.return_map.landings import Landings
-from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.return_map.settings import settings as return_map_settings
 
 OTHER_SIDE = 1e3
 """Shift of a landing's coordinate on the map, its log distance, on the negative side."""
@@ -66,7 +66,6 @@ class LandingMap:
         The starts are left out, because the landing after a start depends on how the run began. `length` [m] is the
         deflection of the loop by the break-away force. If the stage is `symmetric`, distances lose their signs.
         """
-        settings = SurveySettings.current()
         distances = landings.distances / length
         ended = np.where(landings.rest, 0.0, np.where(landings.away, np.inf, np.nan))
         distances, count = _without_excursions(np.abs(distances) if symmetric else distances, landings.count)
@@ -75,8 +74,8 @@ class LandingMap:
             here = distances[:, k]
             ahead = distances[:, min(k + 1, distances.shape[1] - 1)]
             following = np.where(k < count, ahead, ended)
-            following = np.where(np.abs(following) < settings.least_swing, 0.0, following)
-            which = np.flatnonzero((np.abs(here) >= settings.least_swing) & ~np.isnan(following) & (k <= count))
+            following = np.where(np.abs(following) < survey_settings.least_swing, 0.0, following)
+            which = np.flatnonzero((np.abs(here) >= survey_settings.least_swing) & ~np.isnan(following) & (k <= count))
             columns.append((here[which], following[which], which, k + 1 == count[which]))
         before, after, run, final = (np.concatenate(part) for part in zip(*columns, strict=True))
         order = np.argsort(before, kind="stable")
@@ -108,7 +107,6 @@ class LandingMap:
         Coordinates are logarithms of distance (see `_place`), and ascend. Where the map breaks off between two points,
         each half has the gain of the nearer point.
         """
-        settings = ReturnMapSettings.current()
         lines = [np.array([[-np.inf], [REST], [0.0]])]
         for side in self.sides:
             points = self.points(side)
@@ -118,7 +116,8 @@ class LandingMap:
             with np.errstate(all="ignore"):
                 slope = np.log(two / one) / (high - low)
                 joined = (one * two > 0) & (
-                    np.abs(slope) < settings.break_jump_log / (high - low) + settings.break_steepness
+                    np.abs(slope)
+                    < return_map_settings.break_jump_log / (high - low) + return_map_settings.break_steepness
                 )
             broken = ~joined
             pieces = np.array([low, *_beside(low, one)])
@@ -127,7 +126,9 @@ class LandingMap:
             pieces = np.hstack([pieces, [middle, *_beside(high[broken], two[broken])]])
             pieces = pieces[:, np.argsort(pieces[0], kind="stable")]
             if k.size and k[0] == 0:
-                pieces[0, 0] -= settings.scatter_range_log  # the first line continues a little nearer to home
+                pieces[0, 0] -= (
+                    return_map_settings.scatter_range_log
+                )  # the first line continues a little nearer to home
             if len(points):
                 ends = after[-1:] if abs(after[-1]) < abs(self.before[points[-1]]) else np.zeros(1)
                 pieces = np.hstack([pieces, [places[-1:], *_beside(places[-1:], ends)]])
@@ -170,7 +171,7 @@ class LandingMap:
     @cached_property
     def _nearest(self) -> float:
         """Return the coordinate of the nearest landing that is told from rest."""
-        return float(np.log(SurveySettings.current().least_swing))
+        return float(np.log(survey_settings.least_swing))
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
@@ -184,15 +185,13 @@ class LandingMap:
 
         The result holds coordinates (see `_place`), shape (points, landings).
         """
-        settings = ReturnMapSettings.current()
-        survey_settings = SurveySettings.current()
-        iterations, before, paths = settings.map_iterations, np.full(len(at), np.inf), at[:, None]
-        for _ in range(settings.iteration_doublings):
+        iterations, before, paths = return_map_settings.map_iterations, np.full(len(at), np.inf), at[:, None]
+        for _ in range(return_map_settings.iteration_doublings):
             earlier = np.full(len(at), np.inf)
             for number in range(iterations):
-                if number % settings.checked_landings == 0:
+                if number % return_map_settings.checked_landings == 0:
                     at = self._on_cycles(at)
-                    if np.all((np.abs(at - earlier) < settings.exact_repetition_share) | (at <= REST)):
+                    if np.all((np.abs(at - earlier) < return_map_settings.exact_repetition_share) | (at <= REST)):
                         break
                     earlier = at
                 at = self.next(at)
@@ -204,8 +203,8 @@ class LandingMap:
             paths = np.array(orbits).T
             strays = _strays(paths)
             if not np.any(
-                (strays > settings.arrived_share) & (strays > before)
-                | ((strays > settings.same_landing_share) & ~np.isfinite(before))
+                (strays > return_map_settings.arrived_share) & (strays > before)
+                | ((strays > return_map_settings.same_landing_share) & ~np.isfinite(before))
             ):
                 break
             at, iterations, before = orbits[-1], 2 * iterations, strays
@@ -225,7 +224,7 @@ class LandingMap:
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """Return the coordinates on the map (see `_place`) of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
-        moves = np.isfinite(at) & (np.abs(at) >= SurveySettings.current().least_swing)
+        moves = np.isfinite(at) & (np.abs(at) >= survey_settings.least_swing)
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
@@ -233,13 +232,15 @@ class LandingMap:
 
         Paths are coordinates on the map (see `_place`), shape (points, landings).
         """
-        settings = ReturnMapSettings.current()
         left = np.all(paths > REST, axis=1)
         while left.any():
             number = int(np.flatnonzero(left)[0])
             first = paths[number]
             swings = _repeats_after(first, self.symmetric)
-            near = np.abs(paths[:, :, None] - first[None, None, : max(swings, 1)]) < settings.same_attractor_share
+            near = (
+                np.abs(paths[:, :, None] - first[None, None, : max(swings, 1)])
+                < return_map_settings.same_attractor_share
+            )
             same = left & (near.any(axis=1).all(axis=1) if swings else _mixed(paths, first))
             same[number] = True
             yield MapAttractor(_distance(first[: swings or len(first)]), np.flatnonzero(same), swings > 0)
@@ -262,7 +263,6 @@ class LandingMap:
         alike after both neighbours of it, or the reverse. It is 0, and the place NaN, if no three points are close
         together. Only points whose next landing is at more than half of their distance count.
         """
-        settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
         for side in self.sides:
             points = self.points(side)
@@ -274,9 +274,9 @@ class LandingMap:
                 v = np.log(np.abs(after))
                 share = (u[1:-1] - u[:-2]) / np.maximum(u[2:] - u[:-2], 1e-12)
                 off = np.abs(v[1:-1] - (1 - share) * v[:-2] - share * v[2:])
-                alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > settings.break_jump_log)
+                alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > return_map_settings.break_jump_log)
             off = np.where(goes[1:-1] & goes[:-2] & goes[2:], off, np.where(goes[:-2] != goes[1:-1], np.inf, 0.0))
-            off = np.where(alike & (u[2:] - u[:-2] < settings.scatter_range_log), off, 0.0)
+            off = np.where(alike & (u[2:] - u[:-2] < return_map_settings.scatter_range_log), off, 0.0)
             off[np.fmax(v[1:-1] - u[1:-1], v[2:] - u[2:]) < np.log(0.5)] = 0.0
             if off.max() > worst:
                 k = int(off.argmax())
@@ -313,7 +313,7 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
     are in each run, without the start.
     """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
-    near = (np.abs(distances) <= ReturnMapSettings.current().farthest_sticking) & (order <= count[:, None])
+    near = (np.abs(distances) <= return_map_settings.farthest_sticking) & (order <= count[:, None])
     last = np.where(near.any(axis=1), distances.shape[1] - 1 - near[:, ::-1].argmax(axis=1), -1)
     kept = (near | (order > last[:, None]) | (order == 0)) & (order <= count[:, None])
     kept_first = np.argsort(~kept, axis=1, kind="stable")
@@ -327,9 +327,9 @@ def _strays(paths: np.ndarray) -> np.ndarray:
     Every landing is compared with the one some swings earlier, and the number of swings that fits best counts. Paths
     are coordinates on the map, shape (points, landings).
     """
-    settings = SurveySettings.current()
     return np.min(
-        [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, settings.most_repeating_swings + 1)], axis=0
+        [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, survey_settings.most_repeating_swings + 1)],
+        axis=0,
     )
 
 
@@ -338,10 +338,8 @@ def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
 
     `path`, shape (landings,), has coordinates on the map. Landings of a `symmetric` stage may repeat on the other side.
     """
-    settings = ReturnMapSettings.current()
-    survey_settings = SurveySettings.current()
     for swings in range(1 if symmetric else 2, survey_settings.most_repeating_swings + 1, 1 if symmetric else 2):
-        if np.all(np.abs(path[swings:] - path[:-swings]) < settings.same_landing_share):
+        if np.all(np.abs(path[swings:] - path[:-swings]) < return_map_settings.same_landing_share):
             return swings
     return 0
 
@@ -351,7 +349,6 @@ def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
 
     Paths are on it if they spread over the same range.
     """
-    settings = ReturnMapSettings.current()
-    return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (
-        paths.max(axis=1) < first.max() + 10 * settings.same_attractor_share
+    return (paths.min(axis=1) > first.min() - 10 * return_map_settings.same_attractor_share) & (
+        paths.max(axis=1) < first.max() + 10 * return_map_settings.same_attractor_share
     )

@@ -10,11 +10,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from friso.equations.roles import Role
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.rest import wait
-from friso.hunting.cycle.settings import OrbitSettings
-from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.cycle.settings import settings as orbit_settings
+from friso.hunting.return_map.settings import settings as return_map_settings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
@@ -60,9 +60,6 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
     A stage lands where it sticks after a swing. Runs have the relative tolerance `rtol`. They go on in rounds, each as
     long as a sticking stage may take to wind up and to cross its reference.
     """
-    orbit_settings = OrbitSettings.current()
-    settings = ReturnMapSettings.current()
-    survey_settings = SurveySettings.current()
     count, position, sticking = len(starts), stages.kernel.position, stages.sticking
     speeds = stages.kernel.having(Role.VELOCITY)
     states = stages.kernel.with_modes(starts, np.zeros(3), stages.values)
@@ -70,15 +67,22 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
     rest, away, lost = (np.zeros(count, bool) for _ in range(3))
     passed, left, landed = np.zeros(count), np.arange(count), np.zeros(count, np.int64)
     where, when = values, times
-    for _ in range(most + settings.extra_rounds):
+    for _ in range(most + return_map_settings.extra_rounds):
         some, begun = stages.take(left), states[left]
         sticks = np.abs(begun[:, sticking])
         small = survey_settings.least_swing * some.length
-        moves = np.abs(begun[:, speeds]).max(axis=1) > settings.standing_speed * some.number("rate") * some.length
+        moves = (
+            np.abs(begun[:, speeds]).max(axis=1)
+            > return_map_settings.standing_speed * some.number("rate") * some.length
+        )
         from_where = np.maximum(sticks, np.where(moves, survey_settings.typical_distance * some.length, small))
-        durations = orbit_settings.breakaway_waits * wait(some, from_where) + settings.flight_time / some.number("rate")
-        legs = np.maximum(settings.ringing_share * sticks, small)
-        results = some.run(begun, durations, rtol, with_modes=True, least_swing=legs, budget=settings.round_step_limit)
+        durations = orbit_settings.breakaway_waits * wait(
+            some, from_where
+        ) + return_map_settings.flight_time / some.number("rate")
+        legs = np.maximum(return_map_settings.ringing_share * sticks, small)
+        results = some.run(
+            begun, durations, rtol, with_modes=True, least_swing=legs, budget=return_map_settings.round_step_limit
+        )
         fine, room = done(results), results.turn_values.shape[1]
         held = (np.arange(room) < results.turn_counts[:, None]) & fine[:, None]
         more, at = np.full((2, count, room + 1), np.nan)
@@ -89,13 +93,13 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         away[left], lost[left] = ~fine & (np.abs(results.ends[:, position]) > 1e5 * some.length), ~fine
         before = landed[left]
         speed = np.abs(results.ends[:, speeds]).max(axis=1)
-        stands = speed < settings.standing_speed * some.number("rate") * np.maximum(
+        stands = speed < return_map_settings.standing_speed * some.number("rate") * np.maximum(
             np.abs(results.ends[:, position]), small
         )
         where, when, landed = _landings(values, times, most)
         ends = np.abs(results.ends[:, sticking])
         rest[left] = fine & stands & (landed[left] == before) & (before < most)
-        rest[left] &= np.abs(ends - sticks) < np.maximum(settings.resting_move_share * sticks, small)
+        rest[left] &= np.abs(ends - sticks) < np.maximum(return_map_settings.resting_move_share * sticks, small)
         last = np.abs(where[left, landed[left]])
         rest[left] |= fine & stands & (ends < small) & (last < small)
         unfinished = ~stands & (landed[left] == most) & (before < most)

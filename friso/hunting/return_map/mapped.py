@@ -10,12 +10,12 @@ from functools import cached_property
 
 import numpy as np
 
-from friso.hunting.attractors.settings import SurveySettings
+from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import spread_over, stuck
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
-from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.return_map.settings import settings as return_map_settings
 from friso.stage.controllers import FORCE_LIMIT
 
 
@@ -84,7 +84,7 @@ class Mapped:
         Starts are signed, in deflections of the loop by the break-away force. A run lands at most `most` times (None:
         as the settings say).
         """
-        most = ReturnMapSettings.current().run_landings if most is None else most
+        most = return_map_settings.run_landings if most is None else most
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
@@ -114,7 +114,7 @@ class Mapped:
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
         seen = self.landings.distances[which] / length
         seen = np.abs(seen) if symmetric else seen
-        for place in gaps(landing_map)[: ReturnMapSettings.current().runs_added]:
+        for place in gaps(landing_map)[: return_map_settings.runs_added]:
             start = _start_that_lands(self.starts[which], seen, place)
             if start is not None and not np.isclose(start, self.starts[which], rtol=1e-6).any():
                 starts.append(start)
@@ -135,15 +135,16 @@ def map_stages(
     the settings say). Up to `rounds` times, runs are added where a map
     is too coarse. A `sparse` map has every third of the farther starts only.
     """
-    settings = ReturnMapSettings.current()
-    far = spread_over(settings.far_starts, *([settings.limited_starts] if FORCE_LIMIT in stages.flat else []))
-    units = np.concatenate([spread_over(*(near or settings.near_starts)), far[1::3] if sparse else far])
+    far = spread_over(
+        return_map_settings.far_starts, *([return_map_settings.limited_starts] if FORCE_LIMIT in stages.flat else [])
+    )
+    units = np.concatenate([spread_over(*(near or return_map_settings.near_starts)), far[1::3] if sparse else far])
     sides = [(np.arange(stages.count), 1.0), (np.flatnonzero(~stages.symmetric), -1.0)]
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
     starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
-    landings = _stuck_at(stages, owners, starts, settings.run_landings, rtol)
+    landings = _stuck_at(stages, owners, starts, return_map_settings.run_landings, rtol)
     mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), landings, rtol)
-    for _ in range(settings.refining_rounds if rounds is None else rounds):
+    for _ in range(return_map_settings.refining_rounds if rounds is None else rounds):
         mapped = mapped.finer()
     return mapped
 
@@ -153,13 +154,12 @@ def remembered(mapped: Mapped, stage: int) -> str:
 
     That state, given by its name, carries the stage's past. Returns "" if no landings show one.
     """
-    settings = ReturnMapSettings.current()
     landing_map = mapped.maps[stage]
     _, place = landing_map.scatter
     with np.errstate(all="ignore"):
         apart = np.log(landing_map.before / place)  # NaN on the other side, or if nothing scatters
     near = np.flatnonzero(
-        (np.abs(apart) < settings.coarse_gap_log) & landing_map.final & np.isfinite(landing_map.after)
+        (np.abs(apart) < return_map_settings.coarse_gap_log) & landing_map.final & np.isfinite(landing_map.after)
     )
     if near.size < 2:
         return ""
@@ -187,7 +187,6 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
     A distance lies in the middle of a gap that is too wide, in the unit of the map and with the sign of its side.
     """
-    settings = ReturnMapSettings.current()
     places, excess = [], []
     for side in landing_map.sides:
         points = landing_map.points(side)
@@ -199,13 +198,13 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
             u, gain = np.log(before), np.log(across / before)
             apart = np.diff(u)
             lower, upper = np.minimum(gain[:-1], gain[1:]), np.maximum(gain[:-1], gain[1:])
-            crosses = (lower < settings.diagonal_gain_log) & (upper > -settings.diagonal_gain_log)
+            crosses = (lower < return_map_settings.diagonal_gain_log) & (upper > -return_map_settings.diagonal_gain_log)
             away = np.isinf(across[:-1]) & np.isinf(across[1:])
-            breaks = ~(np.abs(np.diff(np.log(across))) < settings.break_jump_log) & (upper > -1.0) & ~away
+            breaks = ~(np.abs(np.diff(np.log(across))) < return_map_settings.break_jump_log) & (upper > -1.0) & ~away
         limit = np.where(
             crosses & ~breaks,
-            settings.fine_gap_log,
-            np.where(breaks, 2 * settings.fine_gap_log, settings.coarse_gap_log),
+            return_map_settings.fine_gap_log,
+            np.where(breaks, 2 * return_map_settings.fine_gap_log, return_map_settings.coarse_gap_log),
         )
         limit = np.where((upper < -1.0) | away, np.inf, limit)
         wide = np.flatnonzero(apart > limit)
@@ -220,12 +219,11 @@ def unclosed(landing_map: LandingMap) -> list[int]:
     It must be extended if, from the nearest or farthest point, the next landing is not much nearer to the reference.
     The result has the numbers of those runs, and is empty if there are none.
     """
-    settings = ReturnMapSettings.current()
     runs = []
     for side in landing_map.sides:
         points = landing_map.points(side)
         for end in points[-1:], points[landing_map.after[points] != 0][:1]:
-            if end.size and np.log(max(landing_map.gain[end[0]], 1e-300)) > -settings.outermost_loss_log:
+            if end.size and np.log(max(landing_map.gain[end[0]], 1e-300)) > -return_map_settings.outermost_loss_log:
                 runs.append(int(landing_map.run[end[0]]))
     return runs
 
@@ -250,16 +248,15 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
     An attractor may reach up to such a break of the map. `starts`, shape (runs,), ascend; `landings`, (runs,), are the
     first landings. All are in deflections of the loop by the break-away force. The list may be empty.
     """
-    settings = ReturnMapSettings.current()
-    lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing
+    lands = np.abs(np.nan_to_num(landings)) >= survey_settings.least_swing
     sizes = np.where(lands, np.abs(landings), 1.0)
     breaks = (lands[:-1] != lands[1:]) | (
-        lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > settings.break_jump_log)
+        lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > return_map_settings.break_jump_log)
     )
-    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= settings.near_starts[-1][1]
-    apart = np.abs(np.diff(np.log(np.abs(starts)))) > settings.break_width_log
+    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= return_map_settings.near_starts[-1][1]
+    apart = np.abs(np.diff(np.log(np.abs(starts)))) > return_map_settings.break_width_log
     ends = np.flatnonzero(breaks & near & apart & (starts[:-1] * starts[1:] > 0))
-    shares = np.array(settings.break_shares)
+    shares = np.array(return_map_settings.break_shares)
     between = [starts[k] * (starts[k + 1] / starts[k]) ** shares for k in ends]
     return np.concatenate(between).tolist() if between else []
 
@@ -271,7 +268,7 @@ def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> flo
     (runs,) ascend; `seen` (runs, landings) are landings with the start first.
     """
     best, start = np.inf, None
-    for k in range(1, ReturnMapSettings.current().run_landings):
+    for k in range(1, return_map_settings.run_landings):
         low, high = seen[:-1, k], seen[1:, k]
         with np.errstate(all="ignore"):
             around = np.flatnonzero(((low - place) * (high - place) <= 0) & (low * high > 0))

@@ -153,3 +153,6 @@ class ReturnMapSettings(Settings):
 
     refining_rounds: int = setting(2, "")
     """Rounds of refinement. Further rounds change the map only where a search decides in any case."""
+
+
+settings = ReturnMapSettings.live()

@@ -11,8 +11,8 @@ from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 from friso.identification.output_error.parameters import CURVE, MASS, is_free
 from friso.identification.readings.common import by_direction, robust, stribeck_curve
 from friso.identification.readings.ramps import Ramps, force_ramps
-from friso.identification.readings.settings import ReadingSettings
-from friso.identification.settings import DoubtSettings
+from friso.identification.readings.settings import settings
+from friso.identification.settings import doubt_settings
 from friso.intervals import COVERAGE
 
 MEDIAN = 1.25
@@ -45,7 +45,7 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
     """
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
-    if static is None or len(ramps.forces) < ReadingSettings.current().fewest_ramps:
+    if static is None or len(ramps.forces) < settings.fewest_ramps:
         return None
     if not all(side.any() for side in sides):
         return None
@@ -65,7 +65,7 @@ def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
     The result has the shape (n,). Viscous friction may rise faster than the Stribeck curve falls.
     """
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
-    up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds
+    up_to = np.linspace(0, 1, doubt_settings.speeds_of_a_start)[:, None] * speeds
     exponent = flat.get("friction.stribeck_exponent", 2.0)
     curve = stribeck_curve(up_to, coulomb, static, flat["friction.stribeck_velocity"], exponent)
     viscous = flat["friction.viscous"] * (1 + abs(flat.get("friction.viscous_asymmetry", 0.0)))

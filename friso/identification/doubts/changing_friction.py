@@ -16,7 +16,7 @@ from friso.identification.output_error.effects import (
     reaching_over,
 )
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         ("Friction", changes.friction, "warming up?"),
         ("The constant force", changes.constant, "a drift of the force?"),
     ):
-        if changes.sure and size > DoubtSettings.current().friction_share_of_a_change * case.inverse.value("coulomb"):
+        if changes.sure and size > doubt_settings.friction_share_of_a_change * case.inverse.value("coulomb"):
             words = (
                 f"{what} changes by {size:.2g} {case.unit} during the record ({cause}): intervals reach from its least "
                 "to its largest"
@@ -85,8 +85,7 @@ def changing_forces(
     `velocity` [m/s] is the record's. Each force, shape (n,), changes along a straight line in either half of the
     record. Also returns the sizes [N] at which the forces are simulated, and the two shapes of change, (n,) each.
     """
-    settings = DoubtSettings.current()
-    unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
+    unit = doubt_settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
     bends = _bends(np.linspace(0.0, 1.0, len(velocity)), fit.problem.counted)
     forces = [base * bend for base in (-way_of(velocity), np.ones(len(velocity))) for bend in bends]
     return forces, [unit] * len(forces), bends

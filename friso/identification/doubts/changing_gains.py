@@ -10,7 +10,7 @@ from scipy.ndimage import minimum_filter1d
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.inverse_model import least_squares, motion
 from friso.identification.readings.common import low_pass, noise_of
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -20,16 +20,17 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     by speed of the reference, or by place. One linear controller has equal gains in all parts, whatever the machine
     does. With drifting clocks the phase of the law changes as well, but not its size.
     """
-    settings = DoubtSettings.current()
     if "reference" not in case.log:
         return
     signals, stretch, course = control_law(case)
-    fewest = settings.rows_for_each_gain * (signals.shape[1] - 1 + len(np.unique(stretch)))
+    fewest = doubt_settings.rows_for_each_gain * (signals.shape[1] - 1 + len(np.unique(stretch)))
     if len(signals) < 2 * fewest:
         return
     left = least_squares(*_deviations(signals, stretch))[1]
-    shares = np.linspace(min(settings.shares_of_a_part), max(settings.shares_of_a_part), settings.levels_of_a_part)
-    best, where, ratio = settings.power_left_by_changing_gains * float(left @ left), "", 1.0
+    shares = np.linspace(
+        min(doubt_settings.shares_of_a_part), max(doubt_settings.shares_of_a_part), doubt_settings.levels_of_a_part
+    )
+    best, where, ratio = doubt_settings.power_left_by_changing_gains * float(left @ left), "", 1.0
     for name, signal in course.items():
         for level in np.quantile(signal, shares):
             below = signal < level
@@ -40,7 +41,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
             if rest @ rest + other @ other < best:
                 best, where = float(rest @ rest + other @ other), name.format(level)
                 ratio = _ratio(two[0] @ law, two[1])
-    if not where or not abs(np.log(ratio)) > settings.logarithm_of_a_gain:
+    if not where or not abs(np.log(ratio)) > doubt_settings.logarithm_of_a_gain:
         return
     one_law, two_laws = (np.sqrt(squares / len(signals)) for squares in (left @ left, best))
     words = (
@@ -59,16 +60,16 @@ def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.
     second result numbers the stretches between them, shape (rows,). The third has time, speed and place by name, shape
     (rows,) each.
     """
-    settings, log, part = DoubtSettings.current(), case.log, case.log.longest
-    step, cutoff = log.sample_time, settings.bandwidths_of_a_controller * case.inverse.bandwidth
+    log, part = case.log, case.log.longest
+    step, cutoff = log.sample_time, doubt_settings.bandwidths_of_a_controller * case.inverse.bandwidth
     wanted = motion(log["reference"][part], step, cutoff)
     error = wanted.position - motion(log["position"][part], step, cutoff).position
     raw = np.abs(log["force"][part])
-    below_limit = raw < raw.max() - settings.deviations_at_a_limit * noise_of(log["force"][part])
+    below_limit = raw < raw.max() - doubt_settings.deviations_at_a_limit * noise_of(log["force"][part])
     inside = minimum_filter1d(below_limit, 2 * round(1 / (cutoff * step)) + 1)
     stretch = np.cumsum(np.diff(inside.astype(int), prepend=int(inside[0])) > 0)
     speed = np.abs(wanted.velocity)
-    creep = settings.speed_share_of_creeping * speed.max()
+    creep = doubt_settings.speed_share_of_creeping * speed.max()
     signals = (
         error,
         np.gradient(error, step),
@@ -103,7 +104,7 @@ def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, n
 def _ratio(usual: np.ndarray, force: np.ndarray) -> float:
     """Return the ratio of a force to the usual force, (rows,) [N]; 1 if their shapes differ."""
     likeness = float(usual @ force) / (float(np.linalg.norm(usual) * np.linalg.norm(force)) or 1.0)
-    if likeness < DoubtSettings.current().likeness_of_a_law:
+    if likeness < doubt_settings.likeness_of_a_law:
         return 1.0
     return float(usual @ force / (usual @ usual))
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.logs import checks
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.quantities import percent
 
 
@@ -16,7 +16,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     A clipped force is too small exactly where inertia is large, which distorts mass and friction.
     """
     share = checks.clipped_share(case.log["force"])
-    if share > LogSettings.current().share_of_clipped_samples:
+    if share > settings.share_of_clipped_samples:
         words = f"{percent(share)} of the force samples lie at its extremes: the channel clips"
         yield RaisedDoubt(words, share, spoils=True)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
@@ -28,15 +28,15 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield forces at several places along the way, then one sine with the best-fitting pitch."""
-    settings, problem = DoubtSettings.current(), case.fit.problem
+    problem = case.fit.problem
     position, counted = case.log["position"][case.log.longest], problem.counted > 0
     travel = float(np.ptp(position))
-    unit = settings.friction_share_of_a_tried_force * float(np.std(case.log["force"][case.log.longest]))
+    unit = doubt_settings.friction_share_of_a_tried_force * float(np.std(case.log["force"][case.log.longest]))
     along = places_along(position)
     yield TriedForces(along, [unit] * len(along))
     rest = case.fit.residual[counted]
-    low, high = settings.travels_of_a_pitch
-    pitches = travel / np.linspace(low, high, 1 + round(settings.pitches_for_each_travel * (high - low)))
+    low, high = doubt_settings.travels_of_a_pitch
+    pitches = travel / np.linspace(low, high, 1 + round(doubt_settings.pitches_for_each_travel * (high - low)))
     explained = [_explained_by(position[counted], pitch, rest) for pitch in pitches]
     pitch = float(pitches[int(np.argmax(explained))])
     yield TriedForces(_waves(position, pitch), [unit] * 2, pitch, len(pitches))
@@ -48,7 +48,7 @@ def places_along(position: np.ndarray) -> list[np.ndarray]:
     `position` [m] has the shape (n,). A function is 1 at its place, and 0 from the neighbouring places on. The first
     place has none.
     """
-    nodes = np.linspace(position.min(), position.max(), DoubtSettings.current().places_of_a_force_along)
+    nodes = np.linspace(position.min(), position.max(), doubt_settings.places_of_a_force_along)
     near = np.maximum(1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0]), 0.0)
     return [column - column.mean() for column in near[1:]]
 

@@ -10,7 +10,7 @@ from friso.identification.doubt import IMITATED, Doubt, FitCase, FittedCase, Rai
 from friso.identification.inverse_model import motion
 from friso.identification.output_error.effects import is_sure_beside_all
 from friso.identification.output_error.parameters import BRISTLES, MASS, is_free
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 from friso.quantities import percent
 
 
@@ -30,23 +30,23 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
             yield RaisedDoubt(fit=further)
             return
         share = -float(np.expm1(-lighter))
-        clear = case.leading is not None or explained.left <= DoubtSettings.current().power_left_by_an_effect
+        clear = case.leading is not None or explained.left <= doubt_settings.power_left_by_an_effect
         words = _sentence(share) if clear and case.may_name("coupling") else ""  # averaged motion looks like that, too
         yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the force that a coupling would add, scaled to the inertia, if a mass is fitted."""
-    fit, step, settings = case.fit, case.log.sample_time, DoubtSettings.current()
+    fit, step = case.fit, case.log.sample_time
     if MASS not in fit.fitted:
         return
-    cutoff = settings.bandwidths_of_a_coupling * case.inverse.bandwidth
+    cutoff = doubt_settings.bandwidths_of_a_coupling * case.inverse.bandwidth
     acceleration = motion(case.log["position"][case.log.longest], step, cutoff).acceleration
     force = np.gradient(np.gradient(acceleration, step), step)
     size = float(np.std(force))
     if size > 0:
         force *= fit.value(MASS) * float(np.std(acceleration)) / size
-        yield TriedForces([force], [settings.mass_share_of_a_tried_coupling])
+        yield TriedForces([force], [doubt_settings.mass_share_of_a_tried_coupling])
 
 
 def _sentence(share: float) -> str:

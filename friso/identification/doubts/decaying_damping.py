@@ -11,9 +11,9 @@ from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.parameters import BRISTLES, EXPONENT, MASS, RATIO
 from friso.identification.output_error.refine import refine_fit
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import deflections, stribeck_curve
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 STIFFNESS, DAMPING = BRISTLES
 NEEDED = {MASS, STIFFNESS, DAMPING, RATIO, EXPONENT, "friction.coulomb", "friction.stribeck_velocity"}
@@ -29,11 +29,11 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     constant damping it left at least 3 % more of the residual's power; on 7 of 8 logs of its own, at least 6 % less.
     Only a stage that follows the log is examined.
     """
-    fit, settings = case.fit, OutputErrorSettings.current()
+    fit = case.fit
     if not case.determined.keys() & {*BRISTLES} or fit.problem.closed or not {*fit.problem.names} >= NEEDED:
         return
     free, saved = np.isin(np.arange(len(fit.inner)), fit.free), _saved(fit)
-    for share in DoubtSettings.current().falling_dampings:
+    for share in doubt_settings.falling_dampings:
         damping, start = share * np.sqrt(fit.value(STIFFNESS) * fit.value(MASS)), fit.inner.copy()
         start[fit.problem.names.index(DAMPING)] = np.log(damping)
         inputs = replace(fit.problem.inputs, force=fit.problem.inputs.force + damping * saved)

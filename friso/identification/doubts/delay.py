@@ -9,7 +9,7 @@ import numpy as np
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.output_error.effects import is_sure_beside_all
 from friso.identification.readings.common import low_pass
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
@@ -20,11 +20,10 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     follows the log is examined. In slow motion a delay cannot be told from friction at the reversals, and is not named;
     nor is one that leaves much of the residual, as digits of an encoder do.
     """
-    settings = DoubtSettings.current()
     for tried, explained in case.explained(forces):
         late, words = -float(explained.sizes[0]), ""
-        long = abs(late) >= settings.samples_of_a_delay * case.log.sample_time
-        clear = long and explained.left <= settings.power_left_by_a_delay
+        long = abs(late) >= doubt_settings.samples_of_a_delay * case.log.sample_time
+        clear = long and explained.left <= doubt_settings.power_left_by_a_delay
         if clear and case.may_name("delay") and is_sure_beside_all(case.fit, tried.forces, tried.units):
             words = (
                 f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a "
@@ -41,12 +40,12 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     """
     force = delay_force(case)
     if not case.fit.problem.closed and force.any():
-        yield TriedForces([force], [DoubtSettings.current().samples_of_a_tried_delay * case.log.sample_time])
+        yield TriedForces([force], [doubt_settings.samples_of_a_tried_delay * case.log.sample_time])
 
 
 def delay_force(case: FittedCase) -> np.ndarray:
     """Return the derivative of the logged force [N/s], shape (n,), without noise."""
-    cutoff = DoubtSettings.current().bandwidths_of_a_delayed_force * case.inverse.bandwidth
+    cutoff = doubt_settings.bandwidths_of_a_delayed_force * case.inverse.bandwidth
     force = low_pass(case.log["force"][case.log.longest], case.log.sample_time, cutoff)
     return np.gradient(force, case.log.sample_time)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, RaisedDoubt, ValueCase
 from friso.identification.inverse_model import InverseModel, least_squares
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
@@ -50,16 +50,16 @@ def halves(inverse: InverseModel) -> list[Half]:
     They differ by more than chance, given the deviations of both. Friction is not compared between halves that move at
     very different speeds, which show different parts of its curve, nor mass at very different accelerations.
     """
-    settings, fits = DoubtSettings.current(), []
+    fits = []
     parts = np.array_split(np.arange(len(inverse.measured)), 2)
     sizes = np.array([np.linalg.norm(inverse.columns[part, :2], axis=0) / np.sqrt(len(part)) for part in parts])
-    unlike = (sizes.max(axis=0) > settings.ratio_of_comparable_halves * sizes.min(axis=0))[[0, 1, 1]]
+    unlike = (sizes.max(axis=0) > doubt_settings.ratio_of_comparable_halves * sizes.min(axis=0))[[0, 1, 1]]
     for part in parts:
         columns, force = inverse.columns[part], inverse.measured[part]
         solution, left = least_squares(columns, force)
         fits.append((solution, np.sqrt(np.diag(spread_of(columns, left)))))
     values, off = (np.array(rows) for rows in zip(*fits, strict=True))
-    apart = np.abs(values[0] - values[1]) > settings.deviations_of_differing_halves * np.hypot(*off)
+    apart = np.abs(values[0] - values[1]) > doubt_settings.deviations_of_differing_halves * np.hypot(*off)
     low, high = (values - COVERAGE * off).min(axis=0), (values + COVERAGE * off).max(axis=0)
     return [
         Half(name, *(float(number) for number in (*values[:, i], low[i], high[i])))

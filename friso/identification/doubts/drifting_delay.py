@@ -12,7 +12,7 @@ import numpy as np
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.doubts.delay import delay_force
 from friso.identification.output_error.effects import explained_by_forces
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
@@ -37,11 +37,10 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     force = delay_force(case)
     if case.fit.problem.closed or not force.any():
         return
-    settings = DoubtSettings.current()
-    units = [settings.samples_of_a_tried_delay * case.log.sample_time] * 2
+    units = [doubt_settings.samples_of_a_tried_delay * case.log.sample_time] * 2
     both = [force, force * np.linspace(0.0, 1.0, len(force))]
     alone, together = (explained_by_forces(case.fit, both[:count], units[:count]) for count in (1, 2))
-    if together is not None and together.left < settings.power_share_of_a_drift * (alone.left if alone else 1.0):
+    if together is not None and together.left < doubt_settings.power_share_of_a_drift * (alone.left if alone else 1.0):
         yield TriedForces(both, units)
 
 

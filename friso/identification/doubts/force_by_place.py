@@ -10,7 +10,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.inverse_model import inverse_model
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -30,8 +30,7 @@ def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
     A function is 1 at its place, and 0 from the neighbouring places on. The first place has none. The result is {} for
     a log with few `rows`.
     """
-    settings = DoubtSettings.current()
-    count = min(settings.places_of_a_force, rows // settings.rows_for_each_place)
+    count = min(doubt_settings.places_of_a_force, rows // doubt_settings.rows_for_each_place)
     if count < 3:
         return {}
     nodes = np.linspace(position.min(), position.max(), count)

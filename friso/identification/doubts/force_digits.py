@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.readings.common import digit_of
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 from friso.quantities import percent
 
 
@@ -18,9 +18,13 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     Noise of a digit or more dithers a coarse resolution, so the doubt is raised only if most steps of the force are
     zero.
     """
-    settings, force = DoubtSettings.current(), case.log["force"][case.log.longest]
+    force = case.log["force"][case.log.longest]
     digit, coulomb = digit_of(force), abs(case.inverse.value("coulomb"))
-    if digit < settings.friction_share_of_a_digit * coulomb or np.median(np.abs(np.diff(force))) > 0 or digit == 0:
+    if (
+        digit < doubt_settings.friction_share_of_a_digit * coulomb
+        or np.median(np.abs(np.diff(force))) > 0
+        or digit == 0
+    ):
         return
     words = (
         f"The force is logged in steps of {digit:.2g} {case.unit}, {percent(digit / coulomb)} of Coulomb friction: "

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
 from friso.identification.output_error.fit import everywhere, fits
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 from friso.intervals import COVERAGE
 from friso.progress import between
 
@@ -25,14 +25,14 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     something, starts spread over the whole ranges of the parameters, because the common fit may be far from either
     optimum.
     """
-    both, settings = case.fit, DoubtSettings.current()
+    both = case.fit
     if both.explains(case.quality.noise):
         return
     names = both.problem.names
     free = tuple(i for i in both.free if names[i] not in EITHER)
     counted = both.problem.counted
     ways = [counted * (way * case.velocity > 0) for way in (1, -1)]
-    if min(way.sum() for way in ways) < settings.sample_share_of_a_direction * counted.sum():
+    if min(way.sum() for way in ways) < doubt_settings.sample_share_of_a_direction * counted.sum():
         return
     problems = [replace(both.problem, counted=way, unsettled=()) for way in ways]
     starts = everywhere(both.problem, free, both.inner) if case.quality.lacks_something else both.inner[None]
@@ -41,7 +41,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / COVERAGE
     left = sum(one.cost for one in alone) * len(counted) / counted.sum()
     reaching = both.with_deviations(np.maximum(off, both.deviation))
-    if left >= settings.cost_share_of_either_direction * both.left**2:
+    if left >= doubt_settings.cost_share_of_either_direction * both.left**2:
         yield RaisedDoubt(fit=reaching)
         return
     less = float(np.sqrt(left))

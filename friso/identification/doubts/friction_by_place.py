@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
 from friso.identification.doubts.cogging import places_along
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
@@ -28,11 +28,10 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield friction that is larger at one place, for each of several places along the way."""
-    settings = DoubtSettings.current()
     if "friction.coulomb" not in case.fit.problem.names:
         return
     along = [-column * way_of(case.velocity) for column in places_along(case.log["position"][case.log.longest])]
-    unit = settings.friction_share_of_a_tried_force * case.fit.value("friction.coulomb")
+    unit = doubt_settings.friction_share_of_a_tried_force * case.fit.value("friction.coulomb")
     yield TriedForces(along, [unit] * len(along))
 
 

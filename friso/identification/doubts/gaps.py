@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -15,7 +15,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """
     part, step, count = case.log.longest, case.log.sample_time, len(case.log.time)
     share = (part.stop - part.start) / count
-    if share > DoubtSettings.current().share_of_a_whole_record:
+    if share > doubt_settings.share_of_a_whole_record:
         return
     words = (
         f"The record has gaps, and the longest stretch without one, {step * (part.stop - part.start):.3g} s of "

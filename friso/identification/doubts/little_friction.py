@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, RaisedDoubt, ValueCase
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: ValueCase) -> Iterator[RaisedDoubt]:
@@ -16,7 +16,7 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
     In a log with one direction of motion, friction and a constant force cannot be separated, and may cancel.
     """
     value, unit = case.inverse.value("coulomb"), case.unit
-    least = DoubtSettings.current().force_share_of_no_friction * float(np.std(case.inverse.measured))
+    least = doubt_settings.force_share_of_no_friction * float(np.std(case.inverse.measured))
     if value < least:
         yield RaisedDoubt(_sentence(case, value, least), value, unit)
 

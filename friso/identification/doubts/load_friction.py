@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 from friso.quantities import percent
 
 
@@ -19,11 +19,11 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     friction was identified as 3.13 to 3.36 kg and 5.44 to 5.60 N. The effect is named if it explains much of the
     residual, and more than a coupling, a delay, or friction that changes with time.
     """
-    settings, effect = DoubtSettings.current(), case.leading
+    effect = case.leading
     if effect is None or effect.doubt != "load-friction":
         return
     share = float(effect.explained.sizes[0])
-    if effect.explained.left > settings.power_left_by_a_load or share > settings.shares_of_a_load[1]:
+    if effect.explained.left > doubt_settings.power_left_by_a_load or share > doubt_settings.shares_of_a_load[1]:
         return
     words = (
         f"Friction grows with the force of the motor, by {percent(share)} of it, as that of worm gears, belts and "
@@ -35,10 +35,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield a force against the motion, in proportion to the motor's force."""
-    settings = DoubtSettings.current()
     force = case.log["force"][case.log.longest]
-    against, least = -np.abs(force) * way_of(case.velocity), settings.shares_of_a_load[0]
-    yield TriedForces([against], [settings.share_of_a_tried_load], least=least)
+    against, least = -np.abs(force) * way_of(case.velocity), doubt_settings.shares_of_a_load[0]
+    yield TriedForces([against], [doubt_settings.share_of_a_tried_load], least=least)
 
 
 DOUBT = Doubt(

@@ -11,7 +11,7 @@ from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.inverse_model import InverseModel, inverse_model, least_squares, motion, unit_of
 from friso.identification.logs.log import Log
-from friso.identification.settings import DoubtSettings, IdentificationSettings
+from friso.identification.settings import doubt_settings, identification_settings
 from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
@@ -67,9 +67,9 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
     differ by friction at low speed and by sticking. Feedforward could imitate both where the inverse model lacks them,
     but not where the stage slides.
     """
-    settings, speed = DoubtSettings.current(), np.abs(inverse.columns[:, 1])
-    fast = np.flatnonzero(speed > settings.speed_share_of_a_fast_stage * speed.max())
-    if len(fast) < 2 * settings.samples_of_a_reference:
+    speed = np.abs(inverse.columns[:, 1])
+    fast = np.flatnonzero(speed > doubt_settings.speed_share_of_a_fast_stage * speed.max())
+    if len(fast) < 2 * doubt_settings.samples_of_a_reference:
         return False
     columns = np.column_stack([inverse.columns, fed])
     for rows in np.array_split(fast, 2):
@@ -78,7 +78,7 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
             return False
     force = inverse.measured[fast]
     without, left = (least_squares(some[fast], force)[1] for some in (inverse.columns, columns))
-    return bool(np.linalg.norm(left) < settings.error_share_of_a_cause * np.linalg.norm(without))
+    return bool(np.linalg.norm(left) < doubt_settings.error_share_of_a_cause * np.linalg.norm(without))
 
 
 def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
@@ -86,13 +86,14 @@ def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
 
     The acceleration is filtered as for a motion of this `bandwidth` [Hz].
     """
-    settings = IdentificationSettings.current()
     if "reference" not in log:
         return {}
     columns = {name: np.zeros(len(log.time)) for name in (ACCELERATION, DIRECTION)}
     for part in log.segments:
-        if part.stop - part.start > DoubtSettings.current().samples_of_a_reference:
-            reference = motion(log["reference"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
+        if part.stop - part.start > doubt_settings.samples_of_a_reference:
+            reference = motion(
+                log["reference"][part], log.sample_time, identification_settings.smoothing_bandwidths * bandwidth
+            )
             columns[ACCELERATION][part] = reference.acceleration
             columns[DIRECTION][part] = np.sign(np.gradient(log["reference"][part]))
     return columns

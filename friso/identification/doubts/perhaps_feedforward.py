@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.doubts import missing_feedforward
 from friso.identification.inverse_model import unit_of
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -16,7 +16,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     The doubt is raised if the reference's acceleration explains much more of the force, but not clearly while the stage
     is fast.
     """
-    fed, share = missing_feedforward.fed_forward(case), DoubtSettings.current().error_share_of_a_cause
+    fed, share = missing_feedforward.fed_forward(case), doubt_settings.error_share_of_a_cause
     if fed is None or fed[0].error >= share * case.inverse.error:
         return
     if missing_feedforward.lacks_when_fast(case.inverse, fed[1]):

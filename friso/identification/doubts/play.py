@@ -11,7 +11,7 @@ from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, 
 from friso.identification.inverse_model import motion
 from friso.identification.output_error.parameters import MASS
 from friso.identification.readings.common import digit_of, runs
-from friso.identification.settings import DoubtSettings, IdentificationSettings
+from friso.identification.settings import doubt_settings, identification_settings
 from friso.quantities import percent
 
 
@@ -22,12 +22,12 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     quicker, such as bristles. If the play is hardly wider than the steps of the position, they may be it. No play is
     named then, but the intervals are widened.
     """
-    settings, effect = DoubtSettings.current(), case.led_by("play")
+    effect = case.led_by("play")
     if effect is None:
         return
     shares, width = effect.explained.sizes, effect.tried.label
     share = float(shares.max())
-    if share > settings.most_of_a_play:
+    if share > doubt_settings.most_of_a_play:
         return
     what = "mass" if share == shares[0] else "friction"
     words = (
@@ -36,7 +36,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
     named, digit = case.named(effect, words, width, "m"), digit_of(case.log["position"][case.log.longest])
-    unsure = np.isclose(width, settings.plays_tried).any() or width < settings.digits_of_a_play * digit
+    unsure = np.isclose(width, doubt_settings.plays_tried).any() or width < doubt_settings.digits_of_a_play * digit
     yield replace(named, words="", explains=False) if unsure else named
 
 
@@ -47,26 +47,26 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     Widths that the load crosses within a few samples are not tried, because motion between samples would look like
     play.
     """
-    settings, fit, step = DoubtSettings.current(), case.fit, case.log.sample_time
+    fit, step = case.fit, case.log.sample_time
     if not {MASS, "friction.coulomb"} <= {*fit.problem.names}:
         return
-    cutoff = settings.bandwidths_of_a_play * IdentificationSettings.current().smoothing_bandwidths
+    cutoff = doubt_settings.bandwidths_of_a_play * identification_settings.smoothing_bandwidths
     moved = motion(case.log["position"][case.log.longest], step, cutoff * case.inverse.bandwidth)
     mass, friction = fit.value(MASS), fit.value("friction.coulomb")
-    low, high = settings.plays_tried
-    widths = np.geomspace(low, high, 1 + round(np.log(high / low) / np.log(settings.ratio_of_plays)))
-    slowings = np.repeat([0.0, friction / (settings.mass_share_of_a_loose_load * mass)], len(widths))
+    low, high = doubt_settings.plays_tried
+    widths = np.geomspace(low, high, 1 + round(np.log(high / low) / np.log(doubt_settings.ratio_of_plays)))
+    slowings = np.repeat([0.0, friction / (doubt_settings.mass_share_of_a_loose_load * mass)], len(widths))
     both = np.tile(widths, 2)
     for width, slowing, speed in zip(
         both, slowings, loose_loads(moved.position, moved.velocity, step, both, slowings), strict=True
     ):
         loose = runs(speed != moved.velocity)
-        if sum(one.stop - one.start for one in loose) < settings.samples_of_a_crossing * len(loose):
+        if sum(one.stop - one.start for one in loose) < doubt_settings.samples_of_a_crossing * len(loose):
             continue
         acceleration = np.diff(speed, prepend=speed[0]) / step
         lacking = [mass * (moved.acceleration - acceleration)]
         lacking += [friction * (np.sign(moved.velocity) - np.sign(speed))] if slowing else []
-        sizes, least = [settings.mass_share_of_a_tried_play] * len(lacking), settings.mass_share_of_a_play
+        sizes, least = [doubt_settings.mass_share_of_a_tried_play] * len(lacking), doubt_settings.mass_share_of_a_play
         yield TriedForces(lacking, sizes, float(width), 2 * len(widths), least)
 
 

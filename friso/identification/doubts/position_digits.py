@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -18,7 +18,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     position = case.log["position"][case.log.longest]
     steps = np.abs(np.diff(position))
     digit, travel = float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
-    if digit * DoubtSettings.current().digits_of_a_fine_position < travel:
+    if digit * doubt_settings.digits_of_a_fine_position < travel:
         return
     words = f"the position has steps of {digit:.2g} m over a travel of {travel:.3g} m: log it with more digits"
     yield RaisedDoubt(words, digit, "m")

@@ -13,8 +13,8 @@ import numpy as np
 from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt, refused
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.parameters import stribeck_up_to
-from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.settings import DoubtSettings
+from friso.identification.output_error.settings import settings
+from friso.identification.settings import doubt_settings
 
 SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
 """Keys of friction beyond the Stribeck effect."""
@@ -30,7 +30,7 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     if "friction.stribeck_velocity" not in case.flat:
         return
     stribeck = case.determined.get("friction.stribeck_velocity")
-    enough = DoubtSettings.current().stribeck_velocities_of_sliding
+    enough = doubt_settings.stribeck_velocities_of_sliding
     top = float(np.abs(case.velocity).max())
     if top >= (enough * stribeck.high if stribeck else stribeck_up_to(case.flat)):
         return
@@ -51,7 +51,7 @@ def _bounded(estimates: Sequence[Estimate], coulomb: Estimate, rise: float, why:
     """
     (bounded,) = refused([coulomb], {coulomb.name: why}).values()
     bounded = replace(bounded, high=bounded.high + max(rise, 0.0))
-    highest = OutputErrorSettings.current().highest_friction_ratio * bounded.high
+    highest = settings.highest_friction_ratio * bounded.high
     static = [one for one in estimates if one.name == "friction.static" and not one.determined]
     return {
         coulomb.name: bounded,

@@ -11,8 +11,8 @@ from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import mean_square, refine_fit
 from friso.identification.output_error.repeated import simulated_log
-from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.settings import DoubtSettings
+from friso.identification.output_error.settings import settings
+from friso.identification.settings import doubt_settings
 
 STIFFNESS = "friction.bristle_stiffness"
 WHY = "errors of the position would leave as much force unexplained on stiffer bristles"
@@ -28,9 +28,9 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     fit = case.fit
     if STIFFNESS not in case.determined or fit.problem.closed:
         return
-    place, settings = fit.problem.names.index(STIFFNESS), OutputErrorSettings.current()
+    place = fit.problem.names.index(STIFFNESS)
     most = np.log(fit.problem.parameters[place].high) - fit.inner[place]
-    stiffer = np.array([more for more in np.log(DoubtSettings.current().stiffer_bristles) if more <= most])
+    stiffer = np.array([more for more in np.log(doubt_settings.stiffer_bristles) if more <= most])
     tried = np.repeat(fit.inner[None], 1 + len(stiffer), axis=0)
     tried[1:, place] += stiffer
     free = np.isin(np.arange(len(fit.inner)), [number for number in fit.free if number != place])

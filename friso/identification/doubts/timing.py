@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.inverse_model import InverseModel, inverse_model
 from friso.identification.logs.log import Log
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import doubt_settings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -21,7 +21,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
     Lags and widths of 1, 2, 4, ... samples are tried; the best is then refined once to either side.
     """
-    log, settings = case.log, DoubtSettings.current()
+    log = case.log
     fits: dict[tuple[int, int], InverseModel] = {(0, 1): case.inverse}
 
     def best(tried: Iterable[tuple[int, int]]) -> tuple[int, int]:
@@ -31,7 +31,10 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         return min(fits, key=lambda choice: fits[choice].error)
 
     period = 1 / (case.inverse.bandwidth * log.sample_time)
-    latest, widest = settings.motion_periods_of_a_shift * period, settings.motion_periods_of_an_average * period / 2
+    latest, widest = (
+        doubt_settings.motion_periods_of_a_shift * period,
+        doubt_settings.motion_periods_of_an_average * period / 2,
+    )
     lag, _ = best((sign * lag, 1) for lag in _doubling(latest) for sign in (1, -1))
     lag, _ = plain = best((lag + more, 1) for more in (-abs(lag) // 4, abs(lag) // 4) if more)
     _, width = best((lag, sign * (2 * half + 1)) for half in _doubling(widest) for sign in (1, -1))
@@ -39,7 +42,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     lag, width = best((lag, (1 if width > 0 else -1) * (abs(width) + sign * (wider - 1))) for sign in (-1, 1))
     lag, width = filtered = best((lag + more, width) for more in (-max(abs(lag) // 4, 1), max(abs(lag) // 4, 1)))
     simpler = min(fits[plain].error, _error_of_equal_averages(case, *filtered))
-    choice = filtered if fits[filtered].error < settings.error_share_of_a_cause * simpler else plain
+    choice = filtered if fits[filtered].error < doubt_settings.error_share_of_a_cause * simpler else plain
     if choice != (0, 1):
         size = choice[0] * log.sample_time
         yield RaisedDoubt(_sentence(*choice, log.sample_time), size, "s", fits[choice], spoils=True)

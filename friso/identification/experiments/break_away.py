@@ -17,7 +17,7 @@ from friso.identification.readings.common import by_direction
 from friso.identification.readings.course import Course
 from friso.identification.readings.ramps import Ramps, force_ramps
 from friso.identification.readings.rate_effect import static_friction
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings as reading_settings
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,13 @@ def _claims_together(courses: Sequence[Course]) -> str | None:
     Returns None unless every log has a ramp, and all logs together have enough.
     """
     ramps = [course.ramps for course in courses]
-    enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
+    enough = all(ramps) and sum(ramps) >= reading_settings.fewest_ramps
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
 
 
 def _partial(log: Log) -> bool:
     """Tell whether a log alone has too few ramps to determine static friction."""
-    return len(static_from_ramps(log).ramps.times) < ReadingSettings.current().fewest_ramps
+    return len(static_from_ramps(log).ramps.times) < reading_settings.fewest_ramps
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:

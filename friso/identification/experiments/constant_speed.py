@@ -17,7 +17,7 @@ from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
 from friso.identification.readings.friction_velocity import FrictionVelocity, distinct, friction_velocity
 from friso.identification.readings.passes import passes
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings as reading_settings
 from friso.stage import Stage
 
 
@@ -73,7 +73,7 @@ def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Corr
 def _partial(log: Log) -> bool:
     """Tell whether a log alone has too few speeds for a curve of friction over speed."""
     steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
-    return not steady or distinct(np.array(steady)) < ReadingSettings.current().speeds_of_a_line
+    return not steady or distinct(np.array(steady)) < reading_settings.speeds_of_a_line
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
@@ -82,11 +82,14 @@ def _claims_together(courses: Sequence[Course]) -> str | None:
     Most of their motion must be at constant speeds, enough for a curve of friction over speed. At the slowest speeds a
     body may stick and slip, so logs in one direction count too.
     """
-    settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]
     fitting = all(len(of_one) or course.one_way for of_one, course in zip(speeds, courses, strict=True))
     count = distinct(np.concatenate(speeds)) if fitting and any(map(len, speeds)) else 0
-    return f"most of the way goes at one of {count} constant speeds" if count >= settings.speeds_of_a_line else None
+    return (
+        f"most of the way goes at one of {count} constant speeds"
+        if count >= reading_settings.speeds_of_a_line
+        else None
+    )
 
 
 KIND = ExperimentKind[FrictionAtSpeeds](

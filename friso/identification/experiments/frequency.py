@@ -15,7 +15,7 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.course import Course
 from friso.identification.response.analysis import Bench, analyse, predicted
 from friso.identification.response.two_mass import TwoMass
-from friso.identification.settings import ExperimentSettings
+from friso.identification.settings import experiment_settings
 from friso.identification.stage_keys import shared_masses
 from friso.stage import Stage
 
@@ -33,11 +33,10 @@ def _claims(course: Course) -> str | None:
 
     The motion of such a log hardly rests, contains many frequencies, and turns often.
     """
-    settings = ExperimentSettings.current()
     repetition = None if course.reference_moves else course.repetition
-    if repetition is None or repetition.rests > settings.rests_of_moves:
+    if repetition is None or repetition.rests > experiment_settings.rests_of_moves:
         return None
-    if repetition.harmonics < settings.harmonics_of_an_excitation or repetition.turns < repetition.harmonics:
+    if repetition.harmonics < experiment_settings.harmonics_of_an_excitation or repetition.turns < repetition.harmonics:
         return None
     return f"{course.repeats}, with about {repetition.harmonics:.0f} harmonics"
 

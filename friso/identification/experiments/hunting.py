@@ -17,7 +17,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel
-from friso.identification.settings import ExperimentSettings
+from friso.identification.settings import experiment_settings
 from friso.stage import Stage
 
 
@@ -70,8 +70,7 @@ def swings_of(log: Log) -> HuntingLog:
         time, position, reference = time[start:], position[start:], reference[start:]
     deviation = position - (reference if "reference" in log else np.median(position))
     low, high = np.percentile(deviation[len(deviation) // 2 :], [1, 99])  # the later part, after the transient
-    settings = ExperimentSettings.current()
-    side = _sides(deviation - (low + high) / 2, settings.hysteresis_of_swings * (high - low) / 2)
+    side = _sides(deviation - (low + high) / 2, experiment_settings.hysteresis_of_swings * (high - low) / 2)
     ups = np.flatnonzero((side[1:] > 0) & (side[:-1] < 0)) + 1
     if len(ups) < 3:
         actual = f"{max(len(ups) - 1, 0)} whole cycles after the reference stands"
@@ -79,7 +78,7 @@ def swings_of(log: Log) -> HuntingLog:
     cycles = [slice(first, last) for first, last in pairwise(ups.tolist())]
     above, below = (np.array([way * (way * deviation[one]).max() for one in cycles]) for way in (1, -1))
     sizes = (above - below) / 2
-    settled = np.abs(sizes / np.median(sizes[len(sizes) // 2 :]) - 1) < settings.transient_swing_share
+    settled = np.abs(sizes / np.median(sizes[len(sizes) // 2 :]) - 1) < experiment_settings.transient_swing_share
     first = min(int(settled.argmax()), len(cycles) - 2)
     cycles, above, below, sizes = cycles[first:], above[first:], below[first:], sizes[first:]
     periods = np.diff(time[ups[first:]])

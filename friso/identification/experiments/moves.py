@@ -14,7 +14,7 @@ from friso.identification.kind import AnalysisSettings, ExperimentKind, Predicto
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
-from friso.identification.settings import ExperimentSettings
+from friso.identification.settings import experiment_settings
 from friso.identification.stage_file import made_up
 from friso.stage import Stage
 
@@ -49,7 +49,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     assert isinstance(whole, Log)
     if prior.from_user:
         check_roles(whole, ("force",))
-    log = whole.excerpt(ExperimentSettings.current().samples_of_moves)
+    log = whole.excerpt(experiment_settings.samples_of_moves)
     flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
     own_loop = prior.from_user and "reference" in log
@@ -63,7 +63,7 @@ def _in_newtons(log: Log) -> bool:
 
 def _around(log: Log) -> Stage | None:
     """Make a stage with assumed values for a log; None if its force is not in newtons."""
-    part = log.excerpt(ExperimentSettings.current().samples_of_moves)
+    part = log.excerpt(experiment_settings.samples_of_moves)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 
@@ -79,7 +79,6 @@ def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Corre
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
     """List notes on simplified drives, on loops not simulated, and on logs used only in part."""
-    settings = ExperimentSettings.current()
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
@@ -90,8 +89,8 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
         *(f"{result.log.name}: {OUT_OF_STEP}" for result in loops if not result.fit.problem.closed),
         *_play_that_looks_alike([result.estimates for result in results]),
         *(
-            f"{log.name}: of a log this long {settings.samples_of_moves} samples are used, {_span(log)}, where it "
-            "moves most"
+            f"{log.name}: of a log this long {experiment_settings.samples_of_moves} samples are used, {_span(log)}, "
+            "where it moves most"
             for log in long
         ),
     ]

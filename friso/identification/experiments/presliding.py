@@ -42,8 +42,8 @@ from friso.identification.readings.common import (
     solve_normal_equations,
 )
 from friso.identification.readings.course import Course
-from friso.identification.readings.settings import ReadingSettings
-from friso.identification.settings import ExperimentSettings
+from friso.identification.readings.settings import settings as reading_settings
+from friso.identification.settings import experiment_settings
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
 from friso.stage import Stage
@@ -119,7 +119,6 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     that friction falls with speed and that bristles of another law bend differently. With a large residual, or beside a
     spring to ground, nothing is determined. Raises InputError for missing channels.
     """
-    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     record = record_of(log, log.longest, between)
     if why := why_unseen(record, experiment_settings.samples_of_presliding):
         return _nothing(why)
@@ -150,10 +149,9 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
     """Low-pass and thin a record, as a fit of the force below `cutoff` [Hz] needs it."""
-    settings = ExperimentSettings.current()
     return record.seen(
-        settings.low_pass_of_the_motion * cutoff,
-        max(int(1 / (settings.samples_of_a_presliding_period * cutoff * record.interval)), 1),
+        experiment_settings.low_pass_of_the_motion * cutoff,
+        max(int(1 / (experiment_settings.samples_of_a_presliding_period * cutoff * record.interval)), 1),
     )
 
 
@@ -170,7 +168,6 @@ def _no_bristles(fit: _Fit, between: Between, held: bool, longest: float) -> str
     `held` is true if the joint counts as held; a stiffness like the joint's then contradicts that. Bristles bend by
     `longest` [m] at most before they slide.
     """
-    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if fit.left > reading_settings.share_left_unexplained:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
     if held and 0 < fit.values[KEYS.index(STIFFNESS)] < experiment_settings.stiffness_ratio_of_a_joint * between.joint:
@@ -186,8 +183,9 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     `error` is the standard error, to which `systematic` is added. The quantity is not determined if its interval
     reaches 0.
     """
-    settings = ReadingSettings.current()
-    estimate = by_t(key, UNITS[key], Mean(value, error, settings.blocks_of_a_mean - 1), METHOD, systematic, systematic)
+    estimate = by_t(
+        key, UNITS[key], Mean(value, error, reading_settings.blocks_of_a_mean - 1), METHOD, systematic, systematic
+    )
     if estimate.low > 0:
         return estimate
     why = (
@@ -211,15 +209,18 @@ def _spring_acts(fit: _Fit, longest: float) -> bool:
     Bristles softer than those that bend by `longest` [m] before they slide are a spring, if the motion is wide enough
     to tell. Beside a spring, bristles may be much stiffer than without.
     """
-    settings, equation = ExperimentSettings.current(), fit.equation
+    equation = fit.equation
     span, left = float(np.ptp(equation.body)), equation.squares_left(fit.bending)
-    if span > settings.bend_share_of_a_seen_spring * longest and fit.bending < 1 / longest:
-        return left < settings.share_left_by_soft_bristles * equation.squares_left(1 / longest)
-    if left <= (settings.share_of_a_seen_spring * np.linalg.norm(fit.force - fit.force.mean())) ** 2:
+    if span > experiment_settings.bend_share_of_a_seen_spring * longest and fit.bending < 1 / longest:
+        return left < experiment_settings.share_left_by_soft_bristles * equation.squares_left(1 / longest)
+    if left <= (experiment_settings.share_of_a_seen_spring * np.linalg.norm(fit.force - fit.force.mean())) ** 2:
         return False
-    tried = np.geomspace(settings.bending_range[0], settings.bending_beside_a_spring, 40) / span
+    tried = np.geomspace(experiment_settings.bending_range[0], experiment_settings.bending_beside_a_spring, 40) / span
     spring = equation.low_pass(equation.body - equation.body.mean())
-    return min(equation.squares_left(bending, spring) for bending in tried) < settings.share_left_by_a_spring * left
+    return (
+        min(equation.squares_left(bending, spring) for bending in tried)
+        < experiment_settings.share_left_by_a_spring * left
+    )
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
@@ -228,7 +229,6 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     The bending of the bristles, which is nonlinear, is searched. `mass` [kg] is the assumed moving mass; if `late`, the
     effect of a slightly larger delay is among the columns.
     """
-    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
     target, span = equation.target, float(np.ptp(equation.body))
     best: Any = minimize_scalar(

@@ -33,8 +33,8 @@ from friso.identification.readings.at_bearing import (
     why_unseen,
 )
 from friso.identification.readings.common import Mean, by_t, correlation_of, deflections, jackknife, stribeck_curve
-from friso.identification.readings.settings import ReadingSettings
-from friso.identification.settings import ExperimentSettings
+from friso.identification.readings.settings import settings as reading_settings
+from friso.identification.settings import experiment_settings
 from friso.quantities import percent
 
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
@@ -117,12 +117,11 @@ class _Equation:
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
         """Return the derivatives of the residual by the fitted numbers, shape (m, 5)."""
-        settings = ExperimentSettings.current()
         residuals_here = self.model(p)
         return np.stack(
             [
-                (self.model(p + step) - residuals_here) / settings.step_of_sliding
-                for step in settings.step_of_sliding * np.eye(len(p))
+                (self.model(p + step) - residuals_here) / experiment_settings.step_of_sliding
+                for step in experiment_settings.step_of_sliding * np.eye(len(p))
             ],
             axis=1,
         )
@@ -138,22 +137,25 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
     effect of the best-fitting delay, and the fraction of friction left unexplained; contact, mode and exponent are
     taken as exact. Raises InputError for missing channels.
     """
-    settings = ExperimentSettings.current()
     record = record_of(
         log,
-        slice(log.longest.start, min(log.longest.stop, log.longest.start + settings.samples_of_slow_sliding)),
+        slice(
+            log.longest.start, min(log.longest.stop, log.longest.start + experiment_settings.samples_of_slow_sliding)
+        ),
         between,
     )
-    why = why_unseen(record, settings.fewest_samples_of_sliding) or (DELAY if between.delay is None else "")
+    why = why_unseen(record, experiment_settings.fewest_samples_of_sliding) or (DELAY if between.delay is None else "")
     if why or contact is None:
         return _nothing(why or BRISTLES)
     cutoff = cutoff_of(record)
-    cutoff = min(cutoff, settings.low_pass_below_a_mode * between.mode.frequency) if between.mode else cutoff
+    cutoff = min(cutoff, experiment_settings.low_pass_below_a_mode * between.mode.frequency) if between.mode else cutoff
     sizes = _sizes(record, cutoff)
     equation = _equation(record, between, contact, cutoff, sizes)
-    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in settings.stribeck_starts])
+    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in experiment_settings.stribeck_starts])
     jacobian, residual = equation.derivatives(best), equation.residual(best)
-    lower = _fitted(_equation(record, between, contact, settings.low_pass_of_a_check * cutoff, sizes), [best])
+    lower = _fitted(
+        _equation(record, between, contact, experiment_settings.low_pass_of_a_check * cutoff, sizes), [best]
+    )
     shifts = [lower - best, _parameter_change(np.column_stack([jacobian, equation.late]), residual)[:5]]
     for other in _off(between, contact):
         shifts.append(_parameter_change(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
@@ -210,8 +212,7 @@ def _equation(
 
     `contact` has mass and bristles, and `sizes`, shape (5,), the scales of the fitted numbers.
     """
-    settings = ExperimentSettings.current()
-    seen, low_pass = record.seen(settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
+    seen, low_pass = record.seen(experiment_settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, contact.mass[0])
     velocity = rate_of(record.time, body)
     friction = force - contact.mass[0] * inertia - between.viscous[0] * velocity
@@ -224,8 +225,7 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
 
     A start may leave out its last numbers, which then begin at 0.
     """
-    settings = ExperimentSettings.current()
-    least, most = settings.sliding_bounds
+    least, most = experiment_settings.sliding_bounds
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
     scale = float(equation.friction.std())
 
@@ -243,8 +243,8 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
             start,
             jac=derived,
             bounds=(low, high),
-            ftol=settings.tolerance_of_sliding,
-            xtol=settings.tolerance_of_sliding,
+            ftol=experiment_settings.tolerance_of_sliding,
+            xtol=experiment_settings.tolerance_of_sliding,
         )
         for start in complete
     ]
@@ -259,14 +259,13 @@ def _estimates(
     `best`, shape (5,), are the fitted numbers, of which the first three count. They have a covariance, shape (3, 3).
     `shifts`, shape (m, 3), are their changes by systematic errors. `left` is the unexplained fraction of the friction.
     """
-    settings = ReadingSettings.current()
     coulomb, more, stribeck = np.exp(best[:3])
     values = (coulomb, coulomb + more, stribeck)
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
     covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
-    even, estimates = (left + settings.linearity_of_sensors) * np.array(values), []
+    even, estimates = (left + reading_settings.linearity_of_sensors) * np.array(values), []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
-        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), settings.blocks_of_a_mean - 1)
+        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), reading_settings.blocks_of_a_mean - 1)
         systematic = float(np.abs(shifts[:, i]).sum() + even[i])
         estimates.append(by_t(name, unit, mean, METHOD, systematic, systematic))
     return tuple(estimates), correlation_of(covariance, shifts, even)
@@ -277,7 +276,6 @@ def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.
 
     `left` is the unexplained fraction of the friction; `velocity` [m/s], shape (n,), is the body's.
     """
-    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
     if left > reading_settings.share_left_unexplained:

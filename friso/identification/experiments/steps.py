@@ -18,8 +18,8 @@ from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, S
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import Mean, block_mean, by_t, cart, channel, deflection, low_pass, runs
 from friso.identification.readings.course import Course
-from friso.identification.readings.settings import ReadingSettings
-from friso.identification.settings import ExperimentSettings
+from friso.identification.readings.settings import settings as reading_settings
+from friso.identification.settings import experiment_settings
 from friso.stage import Stage
 
 STARTS = np.linspace(0.1, 0.7, 7)
@@ -72,15 +72,14 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
     is unknown without two steps between settled windows. Raises InputError for a log without position or force in SI
     units.
     """
-    settings = ExperimentSettings.current()
     position, force = channel(log, "position"), channel(log, "force")
     measured = deflection(log)
     deflected = position if measured is None else measured
     smooth = [
-        np.concatenate([low_pass(x[s], log.sample_time, settings.low_pass_of_steps) for s in log.segments])
+        np.concatenate([low_pass(x[s], log.sample_time, experiment_settings.low_pass_of_steps) for s in log.segments])
         for x in (force, deflected)
     ]
-    spans = [s for part in log.segments for s in _plateaus(log, part, settings.low_pass_of_steps)]
+    spans = [s for part in log.segments for s in _plateaus(log, part, experiment_settings.low_pass_of_steps)]
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
     settled = [_settled_window(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)
@@ -149,7 +148,6 @@ def _settled_window(
     or a fraction of a step. `span` are the samples of the plateau, `scale` [m] is the usual step, and `secant` [N/m] a
     rough stiffness.
     """
-    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     length = span.stop - span.start
     margin = min(length // 10, int(1 / (experiment_settings.low_pass_of_steps * log.sample_time)))
     for allowed, share in product(
@@ -200,7 +198,7 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
-    linear = ReadingSettings.current().linearity_of_sensors * abs(slope)
+    linear = reading_settings.linearity_of_sensors * abs(slope)
     estimate = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
     if estimate.low > 0:
         return estimate
@@ -237,7 +235,7 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
         return None, ()
     marks = [slice(*np.searchsorted(log.time, (w.start, w.end))) for w in windows]
     followed, went = (np.ptp([x[m].mean() for m in marks]) for x in (moved, position))
-    if followed <= ExperimentSettings.current().travel_of_a_fixed_cart * went:
+    if followed <= experiment_settings.travel_of_a_fixed_cart * went:
         return True, ()
     finding = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
     return False, (f"{finding}; the deflection of the joint was measured nevertheless.",)

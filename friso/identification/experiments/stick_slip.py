@@ -29,9 +29,9 @@ from friso.identification.readings.common import (
 from friso.identification.readings.loading import METHOD as LOADED
 from friso.identification.readings.loading import stiffness_of_loading
 from friso.identification.readings.rate_effect import static_friction
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.readings.slips import slips
-from friso.identification.settings import ExperimentSettings
+from friso.identification.settings import experiment_settings
 from friso.intervals import COVERAGE
 from friso.stage import Stage
 
@@ -84,10 +84,9 @@ def static_from_stick_slip(
     `stroke` [m] of the joint do not count. Quantities that the record cannot show are unknown, with the reason. Raises
     InputError for missing channels or an unusable stiffness.
     """
-    settings = ExperimentSettings.current()
     deflected, pushed = (
-        _deflection(log, settings.low_pass_of_stick_slip),
-        _actuator(log, stage_mass, settings.low_pass_of_stick_slip),
+        _deflection(log, experiment_settings.low_pass_of_stick_slip),
+        _actuator(log, stage_mass, experiment_settings.low_pass_of_stick_slip),
     )
     pull, relative_error = _pull(log, stiffness, deflected, pushed)
     body = on_bearing(log)
@@ -95,24 +94,27 @@ def static_from_stick_slip(
     rows: list[tuple[float, ...]] = []
     shares, loads = [], []
     for part in log.segments:
-        breaks = slips(body[part], log.sample_time, settings.low_pass_of_stick_slip)
+        breaks = slips(body[part], log.sample_time, experiment_settings.low_pass_of_stick_slip)
         cart_velocity[part] = breaks.speed
         shares.append(breaks.share)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
         for onset, start, rest, top, direction in marks:
             at, force, before, rising, held = _peak(
-                direction * pull[part], log.sample_time, settings.low_pass_of_stick_slip, (rest, onset, start, top)
+                direction * pull[part],
+                log.sample_time,
+                experiment_settings.low_pass_of_stick_slip,
+                (rest, onset, start, top),
             )
             at += part.start
             bent = np.nan if deflected is None else float(direction * deflected[at])
             unseen = _unseen(direction * breaks.speed[onset + 1 : top + 1]) * log.sample_time
-            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / settings.low_pass_of_stick_slip)
+            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / experiment_settings.low_pass_of_stick_slip)
             place = (float(log.time[at]), float(body[at]), float(direction))
-            held = held or abs(bent) > (1 - settings.stroke_share_at_a_stop) * stroke
+            held = held or abs(bent) > (1 - experiment_settings.stroke_share_at_a_stop) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    joint_stiffness = _stiffness(log, deflected, loads, settings.low_pass_of_stick_slip)
+    joint_stiffness = _stiffness(log, deflected, loads, experiment_settings.low_pass_of_stick_slip)
     return _answer(table, pull, cart_velocity, relative_error, joint_stiffness, _why(shares))
 
 
@@ -186,16 +188,17 @@ def _peak(
     The last result is true if the pull had stopped rising. It then stayed within a hundredth of the peak for several
     times as long as its usual rate and the filter take.
     """
-    settings = ExperimentSettings.current()
     rest, onset, start, top = marks
     at = start + int(np.argmax(pull[start : top + 1]))
     begin = max(onset - max((onset - rest) // 3, 5), 0)
     rising = (pull[onset] - pull[begin]) / ((onset - begin) * sample_time)
     tenths = np.unique(np.linspace(rest, onset, 11).astype(int))
     usual = float(np.median(np.diff(pull[tenths]) / (np.diff(tenths) * sample_time)))
-    near = float((pull[rest : at + 1] > (1 - settings.share_near_a_peak) * pull[at]).sum()) * sample_time
+    near = float((pull[rest : at + 1] > (1 - experiment_settings.share_near_a_peak) * pull[at]).sum()) * sample_time
     held = (
-        near > settings.duration_near_a_peak * (settings.share_near_a_peak * abs(pull[at] / usual) + 1 / cutoff)
+        near
+        > experiment_settings.duration_near_a_peak
+        * (experiment_settings.share_near_a_peak * abs(pull[at] / usual) + 1 / cutoff)
         if usual > 0
         else True
     )
@@ -208,17 +211,16 @@ def _unseen(speed: np.ndarray) -> float:
     `speed`, shape (n,), runs from the first visible sample to the maximum. Before, it is taken to have doubled in equal
     times, as in its first visible doubling. An evenly accelerating body would be hidden for less.
     """
-    settings = ReadingSettings.current()
     first, top = float(speed[0]), float(speed[-1])
-    if not first > settings.speed_share_of_an_onset * top:
+    if not first > reading_settings.speed_share_of_an_onset * top:
         return 0.0
     doubled = int(np.argmax(speed >= min(2 * first, top)))
-    return doubled * float(np.log2(first / (settings.speed_share_of_an_onset * top)))
+    return doubled * float(np.log2(first / (reading_settings.speed_share_of_an_onset * top)))
 
 
 def _why(shares: list[float]) -> str:
     """Return why a log has no slips, from the fractions of time spent sliding."""
-    if shares and min(shares) > ReadingSettings.current().time_share_of_sliding:
+    if shares and min(shares) > reading_settings.time_share_of_sliding:
         return "the cart slides all the time"
     return "the cart shows no slips out of rest"
 
@@ -231,13 +233,12 @@ def _answer(
     `pull` [N] and `velocity` [m/s] are the cart's over time. `why` says why a direction may have no slips. Static
     friction has only a lower bound if, before most slips, the pull had stopped rising or the joint was at its stroke.
     """
-    settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
 
     def static(chosen: np.ndarray, words: str) -> Estimate:
         if not chosen.any():
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", f"{why}{words}", 0.0)
-        if held[chosen].mean() > settings.share_of_held_slips:
+        if held[chosen].mean() > experiment_settings.share_of_held_slips:
             low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * COVERAGE)))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
         used = chosen & (rates > 0)  # ranges of held mean values may be missing
@@ -360,10 +361,11 @@ def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
 
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
     """Tell whether a stiffness is the joint's, not that of a limiter that holds it."""
-    settings = ExperimentSettings.current()
     if stage is None or stage.joint is None or not stiffness.determined:
         return False
-    return bool(stiffness.value < settings.stiffness_share_of_a_limiter * stage.flat()["joint.limiter_stiffness"])
+    return bool(
+        stiffness.value < experiment_settings.stiffness_share_of_a_limiter * stage.flat()["joint.limiter_stiffness"]
+    )
 
 
 KIND = ExperimentKind[StickSlip](

@@ -18,7 +18,7 @@ from friso.errors import InputError
 from friso.identification.kind import Prior
 from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
 from friso.identification.laws.fit import LawFit, LawProblem
-from friso.identification.laws.settings import LawSettings
+from friso.identification.laws.settings import settings
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import believed_between
 from friso.progress import Progress, silent
@@ -66,12 +66,11 @@ class LawComparison:
     @property
     def explained(self) -> bool:
         """Tell whether the best law predicts the left-out parts of the record well enough."""
-        return self.predictions[0].error < LawSettings.current().error_of_a_prediction
+        return self.predictions[0].error < settings.error_of_a_prediction
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
         """Return the laws that predict about as well as the best; empty if no law predicts."""
-        settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:
             return ()
@@ -87,7 +86,6 @@ def _worse(differences: np.ndarray, level: float) -> bool:
     difference, and of the signs of the differences. One of them suffices; the mean, or the median for the signs, must
     also exceed the setting below which laws count as equal. A law that could not be run for a part is worse.
     """
-    settings = LawSettings.current()
     if not np.isfinite(differences).all():
         return True
     count, level = len(differences), level / 2  # of two tests
@@ -130,7 +128,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
         actual = f'"{model}", from which no fit can begin'
         raise InputError("friction.model", actual, f"one of {', '.join(comparable())}", 'model = "lugre"')
     mass = float(moving_mass(flat))
-    laws, parts = comparable(), blocks(records, LawSettings.current().parts_left_out)
+    laws, parts = comparable(), blocks(records, settings.parts_left_out)
     predictions = []
     for number, law in enumerate(laws):
         progress(number, len(laws), law)

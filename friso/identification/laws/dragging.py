@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
-from friso.identification.laws.settings import LawSettings
+from friso.identification.laws.settings import settings
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import Between, LowPass, at_bearing, cutoff_of, record_of, why_unseen
 from friso.stage.tables import friction_law
@@ -42,7 +42,6 @@ class DraggedRecord:
         The laws are of one kind, and differ in their numbers: `flat` has their keys with numbers or arrays of shape
         (runs,). Failed runs are NaN. The bristles start unbent.
         """
-        settings = LawSettings.current()
         law = flat["friction.model"]
         first = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
         shape = kernel(Dragged(law, friction_law(law).variant(first)))
@@ -67,7 +66,6 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
 
     Raises InputError for missing channels.
     """
-    settings = LawSettings.current()
     whole = record_of(log, log.longest, between)
     if why := why_unseen(whole, settings.samples_of_a_dragged_record):
         return why

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from friso.equations.friction.measured import MeasuredFriction
 from friso.identification.laws.dragging import DraggedRecord
-from friso.identification.laws.settings import LawSettings
+from friso.identification.laws.settings import settings
 from friso.stage.tables import friction_law
 
 FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "viscous": 100.0, "stiffness": 30.0,
@@ -49,7 +49,6 @@ class LawProblem:
     @property
     def start(self) -> np.ndarray:
         """Return the fitted numbers (logarithms) as assumed before the fit, shape (parameters,)."""
-        settings = LawSettings.current()
         levels, before = self.before.levels, self.before
         speed = levels.static / levels.stribeck_velocity
         beforehand = {
@@ -110,7 +109,6 @@ class LawProblem:
 
         The starts have the shape (starts, parameters), and `used` has a mask of shape (m,) for each record.
         """
-        settings = LawSettings.current()
         weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
 
         rows: dict[bytes, np.ndarray] = {}  # residual and derivatives from runs side by side
@@ -143,7 +141,6 @@ class LawProblem:
 
         All other numbers are the prior ones.
         """
-        settings = LawSettings.current()
         starts = np.tile(self.start, (len(settings.stiffness_factors), 1))
         starts[:, self.names.index("stiffness")] += np.log(settings.stiffness_factors)
         return starts
@@ -157,7 +154,6 @@ class LawProblem:
 
         `weights` has one array of shape (m,) per record. Residuals of a failed run are large but finite.
         """
-        settings = LawSettings.current()
         with np.errstate(invalid="ignore"):  # a failed run may be infinite where its weight is 0
             parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]
         return np.nan_to_num(

@@ -58,3 +58,6 @@ class LawSettings(Settings):
 
     residual_of_a_failed_run: float = setting(1.0, "")
     """Weighted residual of a failed run, much worse than without any model."""
+
+
+settings = LawSettings.live()

@@ -17,7 +17,7 @@ from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.read import file_format
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
 from friso.identification.logs.time_base import Track, resample_tracks, track
 from friso.quantities import percent, quoted
@@ -136,7 +136,7 @@ def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Note
     if stamps is None or stamps.size < 2 or not (np.diff(stamps) >= 0).all():
         return []
     usual = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
-    if abs(usual / specified - 1) <= LogSettings.current().difference_of_a_contradiction:
+    if abs(usual / specified - 1) <= settings.difference_of_a_contradiction:
         return []
     return [
         f"time: the time stamps are {usual:.4g} s apart, not {specified:.4g} s as specified: a mass follows from the "
@@ -183,7 +183,6 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
     Position, force and the `needed` roles should change. Raises LogError if not, and for samples implausibly close or
     far apart.
     """
-    settings = LogSettings.current()
     if base.time.size < settings.samples_of_a_log:
         raise LogError("log", f"{base.time.size} samples", f"at least {settings.samples_of_a_log} samples", "")
     if not 1e-9 <= base.period <= 3600:
@@ -203,7 +202,6 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
     Signals may be constant or clipped, and position may contradict velocity or lag behind the force. `base` has the
     common instants.
     """
-    settings = LogSettings.current()
     lines, parts, period = [], base.segments, base.period
     for role, values in signals.items():
         if checks.constant(role, values):

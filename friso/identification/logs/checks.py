@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.errors import LogError
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -79,7 +79,6 @@ def clipped_share(values: np.ndarray) -> float:
     least a fifth of the largest step), or hardly ever repeats a value elsewhere. A command that switches between two
     values is not clipped.
     """
-    settings = LogSettings.current()
     steps = np.abs(np.diff(values))
     if values.size < 5 or steps.max() == 0:
         return 0.0
@@ -99,7 +98,6 @@ def jumps(values: np.ndarray) -> tuple[float, int]:
 
     A jump is many times larger than nearly all other steps. Returns (0, 0) without one.
     """
-    settings = LogSettings.current()
     steps = np.diff(values)
     if steps.size < settings.number_of_large_steps:
         return 0.0, 0
@@ -119,7 +117,7 @@ def samples_held(values: np.ndarray) -> int:
         return 1
     gaps = np.diff(changes)
     n = int(np.gcd.reduce(gaps))
-    return n if 1 < n <= LogSettings.current().slowest_sampling else 1
+    return n if 1 < n <= settings.slowest_sampling else 1
 
 
 def interpolated(values: np.ndarray) -> int:
@@ -127,7 +125,6 @@ def interpolated(values: np.ndarray) -> int:
 
     A slower signal that was resampled bends only at every n-th sample, n up to 20.
     """
-    settings = LogSettings.current()
     bends = np.abs(np.diff(values, 2))
     if bends.size < 50 * settings.slowest_sampling or not bends.any():
         return 1

@@ -15,7 +15,7 @@ from typing import Any
 
 from friso.errors import LogError
 from friso.identification.logs import binary
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.platform.system import LIMITS_MEMORY
 
 CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
@@ -39,7 +39,6 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     `size` [B] and the time of the last change, `changed`, identify its state. Raises LogError for a file that cannot be
     read.
     """
-    settings = LogSettings.current()
     memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
     seconds = settings.time_of_reading + size / settings.speed_of_reading
     patience = settings.patience_with_a_busy_machine * seconds

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 
 
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
@@ -45,7 +45,7 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
     The lag is at the peak of the cross-correlation, interpolated by a parabola; NaN if the peak is below 0.5 or at a
     border of the search.
     """
-    longest = LogSettings.current().longest_delay_samples
+    longest = settings.longest_delay_samples
     first, second = first - first.mean(), second - second.mean()
     middle = first[longest:-longest]
     products = np.array([middle @ second[k : second.size - 2 * longest + k] for k in range(2 * longest + 1)])
@@ -58,7 +58,6 @@ def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
 
     The lag is unclear if a lag of 0 explains almost as much.
     """
-    settings = LogSettings.current()
     shares = _explained(effect, causes)
     none = 1 - shares[settings.longest_delay_samples]
     return _peak(shares) if 1 - shares.max() < settings.share_left_by_a_delay * none else np.nan
@@ -69,7 +68,7 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
 
     The effect has the shape (n,); lags run from the longest negative to the longest positive one.
     """
-    longest = LogSettings.current().longest_delay_samples
+    longest = settings.longest_delay_samples
     middle = effect[longest:-longest] - effect[longest:-longest].mean()
     energy = middle @ middle
     causes = causes / np.maximum(np.abs(causes).max(axis=0), np.finfo(float).tiny)
@@ -91,7 +90,7 @@ def _peak(heights: np.ndarray) -> float:
         return np.nan
     left, top, right = heights[i - 1 : i + 2]
     curve = left - 2 * top + right
-    return i - LogSettings.current().longest_delay_samples + (0.5 * (left - right) / curve if curve < 0 else 0.0)
+    return i - settings.longest_delay_samples + (0.5 * (left - right) / curve if curve < 0 else 0.0)
 
 
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
@@ -100,7 +99,6 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
     `estimate` takes the first and the last sample of a block, of a record of `size` samples. Both results are NaN for a
     short record, or if fewer than half of the blocks have an estimate.
     """
-    settings = LogSettings.current()
     from scipy.stats import t as student
 
     length = size // settings.blocks_of_a_delay
@@ -122,7 +120,7 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
     samples.
     """
     value, half = estimate
-    if not np.isfinite(value) or abs(value) <= max(half, LogSettings.current().shortest_delay_samples) or half > 1:
+    if not np.isfinite(value) or abs(value) <= max(half, settings.shortest_delay_samples) or half > 1:
         return ""
     late, early = (late, early) if value > 0 else (early, late)
     size = f"{abs(value) * period * 1e3:.3g} ms +/- {half * period * 1e3:.2g} ms (95 %)"
@@ -136,7 +134,6 @@ def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
 
     Values are sampled every `period` [s]; fewer than the filter needs are returned as they are.
     """
-    settings = LogSettings.current()
     from scipy.signal import savgol_filter
 
     if values.size <= 2 * settings.samples_of_a_derivative:

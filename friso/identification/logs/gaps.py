@@ -36,7 +36,7 @@ from friso.identification.logs.roles import (
     wanted_of,
     words,
 )
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, turning_names, unit_gap
 from friso.identification.logs.units import OTHERS, unit_factor
 from friso.quantities import quoted
@@ -85,7 +85,6 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
     Returns the best reading, then others that explain the force about as well; [] if nothing is open, or if no reading
     explains the force.
     """
-    settings = LogSettings.current()
     chosen, rivals = proposal.chosen, proposal.rivals
     if "position" not in needed or {"position", *({"force"} & {*needed})} <= chosen.keys():
         return []
@@ -279,7 +278,6 @@ def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Ch
 
 def _are_alike(one: Channel, other: Channel) -> bool:
     """Tell whether two channels correlate, as a position does with its reference."""
-    settings = LogSettings.current()
     if one.values.size != other.values.size:
         return False
     both = np.isfinite(one.values) & np.isfinite(other.values)

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.identification.logs.log import Log
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 
 
 def joinable(one: Log, other: Log) -> bool:
     """Tell whether two logs have the same roles in the same units, sample time and set-up."""
     same = one.signals.keys() == other.signals.keys() and dict(one.units) == dict(other.units)
     same = same and dict(one.setup) == dict(other.setup) and one.axis == other.axis
-    return same and abs(one.sample_time / other.sample_time - 1) <= LogSettings.current().sample_time_tolerance
+    return same and abs(one.sample_time / other.sample_time - 1) <= settings.sample_time_tolerance
 
 
 def join_logs(logs: Sequence[Log]) -> Log:

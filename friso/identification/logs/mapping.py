@@ -15,7 +15,7 @@ from friso.axis import KINDS, LINEAR, ROTARY, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.roles import role_of
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.platform.system import shell_word
 from friso.quantities import Bound, Quantity, as_toml, quoted
 from friso.stage.files import parsed, text_of
@@ -179,7 +179,6 @@ def sidecar(log: Path, folder: Path | None = None) -> Path:
     In a folder, logs with equal names from several folders, and those whose long names begin alike, have separate
     files.
     """
-    settings = LogSettings.current()
     if folder is None:
         return log.parent / f"{log.name}{SUFFIX}"
     own = hashlib.sha256(os.fsencode(os.path.abspath(log))).hexdigest()[:8]

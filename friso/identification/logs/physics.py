@@ -17,7 +17,7 @@ from scipy.signal import correlate
 
 from friso.identification.logs.channel import Channel
 from friso.identification.logs.checks import rises_evenly
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 
 KINDS = ("position", "velocity")
 """Kinds of motion channels, with the number of derivatives that lead to a velocity."""
@@ -57,7 +57,7 @@ def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, 
         values, moved = signals[id(force)], signals[id(motion)]
         if force is not motion and values is not None and moved is not None and len(values) == len(moved):
             readings.append(_reading(force, motion, kind, values, moved))
-    refuted = LogSettings.current().share_left_by_a_reading
+    refuted = settings.share_left_by_a_reading
     return sorted(readings, key=lambda one: (one.unexplained > refuted, one.doubt, one.unexplained))
 
 
@@ -66,7 +66,7 @@ def with_positions_first(readings: Sequence[MotionReading]) -> list[MotionReadin
 
     A position contains all that its derivative contains, and also the micrometres of bending bristles.
     """
-    best, refuted = readings[0], LogSettings.current().share_left_by_a_reading
+    best, refuted = readings[0], settings.share_left_by_a_reading
     as_good = [one for one in readings if one.doubt == best.doubt and one.unexplained <= refuted]
     first = [one for one in as_good if one.force is best.force and _is_integral(one, best)]
     return [*first, *(one for one in readings if one not in first)]
@@ -84,17 +84,17 @@ def _is_integral(one: MotionReading, best: MotionReading) -> bool:
     columns /= np.abs(columns).max(axis=0)
     solution, *_ = np.linalg.lstsq(columns, place, rcond=None)
     correlation = np.corrcoef(place - columns[:, 1:] @ solution[1:], columns[:, 0])[0, 1]
-    return bool(correlation > LogSettings.current().correlation_of_a_pair)
+    return bool(correlation > settings.correlation_of_a_pair)
 
 
 def is_ramp(channel: Channel) -> bool:
     """Tell whether a channel rises with every sample, as a counter or a clock with jitter does."""
     finite = channel.values[np.isfinite(channel.values)]
-    if len(finite) < LogSettings.current().samples_of_a_pair or not (np.diff(finite) > 0).all():
+    if len(finite) < settings.samples_of_a_pair or not (np.diff(finite) > 0).all():
         return False
     line = np.linspace(finite[0], finite[-1], len(finite))
     off = float(np.abs(finite - line).max())
-    return rises_evenly(finite) or off < LogSettings.current().range_share_off_a_clock * float(np.ptp(finite))
+    return rises_evenly(finite) or off < settings.range_share_off_a_clock * float(np.ptp(finite))
 
 
 def is_counter(channel: Channel) -> bool:
@@ -111,7 +111,7 @@ def leads(one: Channel, other: Channel) -> bool:
     size = len(one.values)
     if size != len(other.values) or any(signal is None for signal in signals):
         return False
-    width = LogSettings.current().samples_of_a_scale
+    width = settings.samples_of_a_scale
     first, second = (gaussian_filter1d(signal, width, order=1) for signal in signals if signal is not None)
     products = correlate(second - second.mean(), first - first.mean(), method="fft")
     shift = int(np.argmax(products[size - 1 - size // 10 : size + size // 10])) - size // 10
@@ -124,7 +124,7 @@ def _filled(channel: Channel) -> np.ndarray | None:
     Returns None for a channel with few values, or a constant one.
     """
     finite = np.isfinite(channel.values)
-    if finite.sum() < LogSettings.current().samples_of_a_reading or not np.ptp(channel.values[finite]) > 0:
+    if finite.sum() < settings.samples_of_a_reading or not np.ptp(channel.values[finite]) > 0:
         return None
     places = np.arange(len(channel.values))
     with np.errstate(all="ignore"):
@@ -139,7 +139,6 @@ def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, mov
     `values` and `moved`, shape (n,), are the samples of force and motion, without gaps. `kind` tells whether the motion
     is a position or a velocity.
     """
-    settings = LogSettings.current()
     rows = []
     while len(values) >= settings.samples_of_a_reading:
         rows += [row for row in [_fitted(values, moved, kind)] if row is not None]
@@ -161,7 +160,6 @@ def _fitted(values: np.ndarray, moved: np.ndarray, kind: str) -> tuple[float, fl
     Returns the remaining fraction of the variance, the sizes of inertia and friction with their signs, and the
     correlation of the force with the velocity.
     """
-    settings = LogSettings.current()
     width, order = settings.samples_of_a_scale, 1 - KINDS.index(kind)
     edge, step = int(4 * width), max(1, len(values) // settings.rows_of_a_scale)
     inner = slice(edge, -edge, step)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.identification.logs.units import is_unit, split_heading, unit_factor
 from friso.identification.logs.word_lists import channel_words
 
@@ -41,7 +41,6 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
 
     If lines state different sampling intervals, none is used.
     """
-    settings = LogSettings.current()
     lines = [line for line in lines if line.strip()]
     pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
     pairs |= {f"{name} {value}": (name, value) for name, value in _below_names(lines[-2:], delimiter)}

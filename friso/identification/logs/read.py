@@ -9,7 +9,7 @@ from friso.errors import LogError
 from friso.identification.logs.channel import ChannelTable
 from friso.identification.logs.format import FORMATS, FileHead
 from friso.identification.logs.measured_response import MeasuredResponse
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.platform.system import cause_of, once_free
 
 _SAVED = "the same saved as one of the formats that friso reads"
@@ -32,7 +32,6 @@ def file_format(path: Path) -> str:
     Raises LogError for a path that is missing or a folder, and for a file that is empty, too large, or of no known
     format.
     """
-    settings = LogSettings.current()
     try:
         if path.is_dir():
             raise LogError("log", "a folder", "a file", "friso identify log.csv", str(path))

@@ -161,3 +161,6 @@ class LogSettings(Settings):
     # Units.
     characters_of_a_unit: int = setting(100, "")
     """Longest text of a unit."""
+
+
+settings = LogSettings.live()

@@ -18,7 +18,7 @@ from friso.identification.logs.mapping import Mapping, guess, option
 from friso.identification.logs.physics import is_counter, is_ramp
 from friso.identification.logs.preamble import RATES, STEPS
 from friso.identification.logs.roles import AssignedRole, find, is_clock, words
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.identification.logs.text import with_times
 from friso.identification.logs.units import FOREIGN, RMS, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
@@ -126,7 +126,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     with np.errstate(all="ignore"):  # NaN is left to the time base
         values = values * value
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-    if most > LogSettings.current().largest_value:
+    if most > settings.largest_value:
         actual = f"values up to {most:.3g} {notes.units.get(role, reading.unit(role))}"
         raise LogError(role, actual, "values that an instrument can measure; is the file damaged?", "", reading.origin)
     return values

@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from friso.errors import LogError
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.identification.logs.units import is_unit, split_heading
 
 REMEMBERED = 4
@@ -69,7 +69,7 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
     Raises LogError for what is no text.
     """
     with path.open("rb") as file:
-        decoded = _decoded(file.read(LogSettings.current().bytes_of_a_head))
+        decoded = _decoded(file.read(settings.bytes_of_a_head))
     if decoded is None:
         raise LogError(
             "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
@@ -99,7 +99,7 @@ def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
     if odd > 0.02 * len(text):
         return None
     lines = re.split(r"\r\n|\n|\r", text)
-    is_cut = len(head) == LogSettings.current().bytes_of_a_head and len(lines) > 1
+    is_cut = len(head) == settings.bytes_of_a_head and len(lines) > 1
     return encoding, tuple(lines[:-1] if is_cut or not lines[-1] else lines)
 
 
@@ -151,7 +151,6 @@ def layout(path: Path) -> TextLayout:
 
     Words are accepted in its rows only if nearly all rows have some. Raises LogError if there is no table.
     """
-    settings = LogSettings.current()
     encoding, lines = decoded_head(path)
     lines = lines[: settings.lines_of_a_head]
     best = _best_fit(encoding, tuple(lines))

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from friso.errors import LogError
 from friso.identification.logs.checks import repeated_stamps
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.quantities import percent
 
 
@@ -38,7 +38,6 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     NaN and repeated stamps [s] are left out, a few lost samples are interpolated, and longer gaps split the track.
     Raises LogError for too few samples, decreasing time, stamps repeated with other values, and uneven sampling.
     """
-    settings = LogSettings.current()
     read: list[str] = []
     time, values, missing = _numbers_only(name, time, values)
     if missing:
@@ -81,7 +80,6 @@ def gaps(steps: np.ndarray) -> np.ndarray:
     After a gap the samples stay late. A step that is long only because a stamp is late has short neighbours, and is no
     gap.
     """
-    settings = LogSettings.current()
     usual = float(np.median(steps))
     if steps.size >= settings.steps_averaged:
         usual = (
@@ -130,7 +128,6 @@ def _evened(name: str, raw: Track) -> Track:
     Stamps are replaced by even ones if they scatter little, or only by their resolution; otherwise the values are
     interpolated, with a warning.
     """
-    settings = LogSettings.current()
     order, about = np.empty_like(raw.time), np.empty_like(raw.time)
     for part in raw.segments:
         count = part.stop - part.start
@@ -174,7 +171,6 @@ def _rounded(raw: Track, even: np.ndarray) -> float:
     than one resolution: half for the rounding, half for the error of the estimated offset and rate. Returns 0 if the
     stamps scatter in another way.
     """
-    settings = LogSettings.current()
     bridges = raw.bridged[1:] | raw.bridged[:-1]
     inside = np.ones(raw.time.size - 1, bool)
     inside[[part.start - 1 for part in raw.segments[1:]]] = False
@@ -195,7 +191,6 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
     Returns the common instants as a track, and the values by name. Finer tracks are interpolated linearly within their
     own segments. Raises LogError if the tracks have no time in common.
     """
-    settings = LogSettings.current()
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
     base = tracks[base_name]
     read, warnings, values = [], [], {}
@@ -242,7 +237,6 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
 
 def _same_instants(first: Track, second: Track) -> bool:
     """Tell whether two tracks have the same instants, to a hundredth of a sample time."""
-    settings = LogSettings.current()
     same = first.time.size == second.time.size and first.segments == second.segments
     return same and bool(np.all(np.abs(first.time - second.time) <= settings.scatter_of_even_stamps * second.period))
 
@@ -252,13 +246,13 @@ def _coincident(base: Track, other: Track) -> bool:
     part = other.segments[0]
     inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
     steps = (inside - other.time[part.start]) / other.period
-    return bool(np.all(np.abs(steps - np.round(steps)) <= LogSettings.current().scatter_of_even_stamps))
+    return bool(np.all(np.abs(steps - np.round(steps)) <= settings.scatter_of_even_stamps))
 
 
 def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
     """Return values of a track, (n,), at the instants of the base; NaN outside its segments."""
     resampled = np.full(base.time.size, np.nan)
-    slack = LogSettings.current().scatter_of_even_stamps * other.period
+    slack = settings.scatter_of_even_stamps * other.period
     for part in other.segments:
         time = other.time[part]
         a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))

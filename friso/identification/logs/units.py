@@ -10,7 +10,7 @@ from functools import lru_cache
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.identification.logs.word_lists import channel_words, read_lists
 from friso.quantities import Quantity, any_sign, quoted
 
@@ -76,7 +76,7 @@ def spelled(text: str) -> str:
 
     "m/s2" becomes "m/s^2", "µm" "um", "sec" "s". A text too long for a unit stays.
     """
-    if len(text) > LogSettings.current().characters_of_a_unit:
+    if len(text) > settings.characters_of_a_unit:
         return text
     text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.inverse_model import FilteredMotion
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import turns_of
 
 
@@ -31,7 +31,6 @@ class Coverage:
         Friction falls around the Stribeck velocity; steady motion on one side of this velocity alone does not show the
         fall.
         """
-        settings = OutputErrorSettings.current()
         below = (self.steady >= speed / settings.speed_factor_of_coverage) & (self.steady < speed)
         above = (self.steady > speed) & (self.steady <= speed * settings.speed_factor_of_coverage)
         return bool(below.any() and above.any())
@@ -53,7 +52,6 @@ class Coverage:
         The bend must stand out of the noise of the position over several samples of several starts, because one start
         may be chance.
         """
-        settings = OutputErrorSettings.current()
         passes = [
             np.sum((distance > settings.deviations_of_a_bend * self.resolution) & (distance < length))
             for distance in self.starts
@@ -68,7 +66,6 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
     counts as steady where inertia, by `mass` [kg], stays below a fraction of the friction `coulomb` [N] for long
     enough.
     """
-    settings = OutputErrorSettings.current()
     rough = position - moved.position
     steps = np.abs(np.diff(position))
     quantum = steps[steps > 0].min() if (steps > 0).any() else 0.0
@@ -98,7 +95,7 @@ def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, 
     show the bristles there. `mass_per_force` is the mass over the Coulomb friction [kg/N].
     """
     ends = np.unique([0, *turns_of(position, swing)])
-    calm = mass_per_force * np.abs(moved.acceleration) < OutputErrorSettings.current().friction_share_of_inertia
+    calm = mass_per_force * np.abs(moved.acceleration) < settings.friction_share_of_inertia
     pieces = zip(ends, [*ends[1:], len(position)], strict=True)
     return tuple(np.where(calm[a:b], np.abs(position[a:b] - position[a]), np.nan) for a, b in pieces)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, FitParameter
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.intervals import COVERAGE
 
 
@@ -22,7 +22,6 @@ def drawn_from(
     `correlation`. Quantities with a range only are uniform in it, or in its logarithm; a parameter without an estimate
     is sampled from its whole range of the fit.
     """
-    settings = OutputErrorSettings.current()
     rng = np.random.default_rng(settings.seed_of_draws)
     determined = [estimate for estimate in estimates if estimate.determined]
     sizes, ways = np.linalg.eigh(correlation)
@@ -50,7 +49,6 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
 
     The values are in SI units, and even in the logarithm for a logarithmic parameter.
     """
-    settings = OutputErrorSettings.current()
     return parameter.outer(
         rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), settings.machines_drawn)
     )

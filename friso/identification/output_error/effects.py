@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from friso.identification.output_error.fit import OutputErrorFit, spread_along
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.identification.spread import correlation_length
 from friso.intervals import COVERAGE
 
@@ -38,7 +38,7 @@ class ExplainedResidual:
         size = np.linalg.norm(self.slopes, axis=0)
         usable = np.isfinite(size) & (size > 0)
         covariance = spread_along(fit.problem, self.slopes[:, usable], self.rest)
-        chance = 1 - OutputErrorSettings.current().probability_of_an_effect
+        chance = 1 - settings.probability_of_an_effect
         deviations = np.sqrt(np.diag(covariance)[-len(self.sizes) :])
         return np.abs(self.sizes) > norm.isf(chance / 2) * deviations
 
@@ -64,7 +64,6 @@ def explained_by(
     samples, has the shape (n,). A number without effect, or with infinite derivatives, does not move. Returns None if
     the effects explain no more than the best of `searched` random ones.
     """
-    settings = OutputErrorSettings.current()
     every = np.column_stack([slopes, *effects])
     size = np.linalg.norm(every, axis=0)
     usable = np.isfinite(size) & (size > 0)
@@ -104,7 +103,7 @@ def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
     size = np.linalg.norm(slopes, axis=0)
     usable = np.isfinite(size) & (size > 0)
     scaled = slopes[:, usable] / size[usable]
-    solution = np.linalg.lstsq(scaled, -rest, rcond=OutputErrorSettings.current().smallest_singular_value)[0]
+    solution = np.linalg.lstsq(scaled, -rest, rcond=settings.smallest_singular_value)[0]
     return rest + scaled @ solution, slopes
 
 

@@ -15,7 +15,7 @@ from friso.engine.driven import Inputs
 from friso.identification.output_error.parameters import FitParameter, keys_of
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import bounds_of, refine_fit
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
 from friso.progress import Progress, Tally, share_of, silent
@@ -51,7 +51,6 @@ class OutputErrorFit:
         With `closely`, the limit is tighter. For a stage that follows the log, only a part of the noise passes into the
         residual.
         """
-        settings = OutputErrorSettings.current()
         times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
         return self.left < times * self.problem.noise_left(noise)
 
@@ -63,7 +62,7 @@ class OutputErrorFit:
     @property
     def bounded(self) -> set[int]:
         """Return the indices of fitted numbers whose intervals are narrow enough to be reported."""
-        settings, bounded = OutputErrorSettings.current(), set()
+        bounded = set()
         for number, deviation in zip(self.free, self.deviation, strict=True):
             parameter = self.problem.parameters[number]
             most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
@@ -166,7 +165,6 @@ def _fit(
     The quality of a start shows after a few iterations, on pieces of a long record: for a stage that sticks and slips
     the best starts often lead to worse optima.
     """
-    settings = OutputErrorSettings.current()
     mask = np.zeros(tried.shape[1], bool)
     mask[list(free)] = True
     rough = [problem] if problem.closed else [problem.part(piece) for piece in pieces]
@@ -190,7 +188,6 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     friction would hide which of the others is best. In the other half they start near the inverse model's values,
     because a first fit of them alone to stick-slip motion can end anywhere.
     """
-    settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
     core = np.array([parameter.core for parameter in problem.parameters])
     logarithmic = np.array([parameter.logarithmic for parameter in problem.parameters])
@@ -215,7 +212,6 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
     The result has the shape (starts, parameters). Starts spread several times as wide as the fit's covariance, because
     the closed loop of a hunting stage has other optima.
     """
-    settings = OutputErrorSettings.current()
     low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
     deviation = fit.deviation
     usable = np.isfinite(deviation) & (deviation > 0)
@@ -236,7 +232,6 @@ def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
     """Return the best starts of each problem, (tried, parameters), and always the first start."""
-    settings = OutputErrorSettings.current()
     if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
     sums = np.zeros((len(problems), len(starts) - 1))
@@ -256,7 +251,6 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
     A short record is used whole. Of a long one in closed loop the beginning is used, because its later state is
     unknown; otherwise stretches from all over it, because slow motion may come last.
     """
-    settings = OutputErrorSettings.current()
     count, most = len(problem.target), int(settings.samples_of_all_starts / starts)
     if count <= most or problem.closed:
         return [slice(0, min(count, most))]
@@ -279,7 +273,6 @@ def polished(
     are derivatives of the residual near them, if they are known. Standard deviations allow for correlated errors, and
     for the other inputs that the log allows (`problem.unsettled`).
     """
-    settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)
     best = refine_fit(
         [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress,
@@ -332,7 +325,6 @@ def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.nda
     `best`, shape (parameters,), are the numbers of the model, `rest` [N], (n,), their residual, and `slopes`, (n,
     free), its derivatives. The shift is 0 if the simulation with the other `inputs` fails.
     """
-    settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():
         return np.zeros(slopes.shape[1])

@@ -10,7 +10,7 @@ from dataclasses import replace
 from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit, polished_again
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 
 
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
@@ -34,7 +34,6 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     The worse fit is ruled out if it is clearly worse, and the better one explains the force to its `noise` [N].
     Otherwise both stay possible, and intervals allow for both.
     """
-    settings = OutputErrorSettings.current()
     problem = fit.problem
     other = next((inputs for inputs in problem.unsettled if inputs.held != problem.inputs.held), None)
     if other is None:

@@ -19,7 +19,7 @@ from friso.identification.output_error.holding import with_force_settled, with_s
 from friso.identification.output_error.parameters import BRISTLES, CURVE, EXPONENT, MASS, RATIO, SHARE, STRIBECK, bends
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.profile import WORSE, Profile, profile
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import low_pass
 from friso.progress import Progress, between, silent
 
@@ -144,7 +144,7 @@ def believed(
     """
     names = full.problem.names
     profiles: dict[str, Profile] = {}
-    again = OutputErrorSettings.current().better_fits_by_profiles
+    again = settings.better_fits_by_profiles
     while True:
         blurred = any(name in STRIBECK and not _sharp(full, seen) for name, seen in profiles.items())
         rest = {*names} - core - profiles.keys() - {*(CURVE if blurred else ())}
@@ -169,7 +169,6 @@ def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
     too small to slide steadily. A fit within the noise is no reason to stop: of small moves it was the second of
     three optima, and not yet right.
     """
-    settings = OutputErrorSettings.current()
     problem, free = full.problem, tuple(range(len(full.inner)))
     for _ in range(settings.further_searches):
         before = full
@@ -181,7 +180,6 @@ def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
     """Tell whether a fit with more parameters, `full`, is better than `plain` beyond chance."""
-    settings = OutputErrorSettings.current()
     more = len(full.free) - len(plain.free)
     return bool(
         plain.cost > full.cost * (1 + chi2.ppf(settings.probability_of_more_parameters, more) / full.independent)
@@ -196,7 +194,7 @@ def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -
     """
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
-    return bool(powers[0] <= OutputErrorSettings.current().residual_ratio_out_of_step ** 2 * powers[1])
+    return bool(powers[0] <= settings.residual_ratio_out_of_step**2 * powers[1])
 
 
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
@@ -238,7 +236,6 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
 
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
     """Tell whether a profile interval is closed on both sides and narrow."""
-    settings = OutputErrorSettings.current()
     parameter = next(one for one in full.problem.parameters if one.name == seen.name)
     closed = not (seen.open_low or seen.open_high)
     return closed and (not parameter.logarithmic or seen.high < settings.factor_of_a_sharp_profile * seen.low)
@@ -255,7 +252,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
     if name in BRISTLES:
         stiffness = full.value("friction.bristle_stiffness")
         swings = np.sqrt(stiffness / full.value(MASS)) / (2 * np.pi)
-        fast_enough = swings * full.problem.inputs.sample_time < OutputErrorSettings.current().sampled_bristle_frequency
+        fast_enough = swings * full.problem.inputs.sample_time < settings.sampled_bristle_frequency
         return bool(fast_enough and covered.shows_length(full.value("friction.coulomb") / stiffness))
     return True
 
@@ -266,7 +263,7 @@ def why_not_shown(name: str, covered: Coverage) -> str:
         low, high = covered.gap
         if not np.isfinite(high):
             return "no steady motion at all, in which the Stribeck effect would show"
-        if high > OutputErrorSettings.current().speed_factor_of_coverage ** 2 * low:
+        if high > settings.speed_factor_of_coverage**2 * low:
             return (
                 f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would "
                 "show"

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.axis import LINEAR, AxisKind, axis_of
 from friso.errors import InputError
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.stage.tables import friction_law, friction_laws
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
@@ -54,7 +54,6 @@ def bends(axis: AxisKind) -> tuple[float, float]:
 
     On a rotary axis they are angles [rad], which follow from the largest and smallest bearing radii.
     """
-    settings = OutputErrorSettings.current()
     if axis == LINEAR:
         return settings.shortest_bristle_bend, settings.longest_bristle_bend
     smallest, largest = settings.bearing_radii
@@ -66,7 +65,6 @@ def stribeck_up_to(flat: Mapping[str, Any]) -> float:
 
     On a rotary axis it is in rad/s, at a medium radius of bearings.
     """
-    settings = OutputErrorSettings.current()
     return (
         settings.highest_stribeck_velocity
         if axis_of(flat) == LINEAR
@@ -120,7 +118,6 @@ def _friction(
 
     `levels` has first values from the inverse model; `speed` [m/s] and `travel` [m] are the largest in the log.
     """
-    settings = OutputErrorSettings.current()
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     parameters = [
         FitParameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
@@ -149,7 +146,6 @@ def _exponent(stated: float) -> FitParameter:
 
     The fit starts slightly below the `stated` value, because 1 and 2 have simplified equations.
     """
-    settings = OutputErrorSettings.current()
     start, (least, most) = settings.exponent_share_of_a_start * stated, settings.stribeck_exponents
     return FitParameter(EXPONENT, "", start, min(least, start), max(most, start), logarithmic=False, core=False)
 

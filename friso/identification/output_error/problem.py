@@ -20,10 +20,10 @@ from friso.errors import InputError
 from friso.identification.inverse_model import motion, smoothed
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings as output_error_settings
 from friso.identification.readings.common import noise_of, robust
-from friso.identification.readings.settings import ReadingSettings
-from friso.identification.settings import IdentificationSettings
+from friso.identification.readings.settings import settings as reading_settings
+from friso.identification.settings import identification_settings
 from friso.stage.controllers import CONTROLLER
 
 CONTINUOUS = "the controller is simulated in continuous time"
@@ -94,8 +94,8 @@ class Problem:
             return noise
         omega = 2 * self.flat[KP] / self.flat[KD]
         passes = min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time))
-        linear = ReadingSettings.current().linearity_of_sensors * float(np.std(self.inputs.force[self.counted > 0]))
-        most = OutputErrorSettings.current().friction_share_of_linearity
+        linear = reading_settings.linearity_of_sensors * float(np.std(self.inputs.force[self.counted > 0]))
+        most = output_error_settings.friction_share_of_linearity
         linear = min([linear, *(most * one.start for one in self.parameters if one.name == "friction.coulomb")])
         return float(np.linalg.norm(np.array([noise * passes, self.shaking[0], linear])))
 
@@ -127,10 +127,9 @@ class Problem:
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
         """Simulate fitted numbers, (runs, parameters), in chunks; yield run numbers and records."""
-        settings = OutputErrorSettings.current()
         flat = stages(self.flat, self.parameters, inner)
         starts = self._starts(flat, len(inner))
-        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, settings.run_tolerance):
+        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, output_error_settings.run_tolerance):
             yield runs.numbers, self._record(flat, runs)
 
     def record(self, inner: np.ndarray) -> Simulated:
@@ -185,9 +184,10 @@ class Problem:
 
     def _step(self, inner: np.ndarray, i: int) -> float:
         """Return the step of number `i` by which derivatives are taken, towards its range's middle."""
-        settings = OutputErrorSettings.current()
         parameter = self.parameters[i]
-        size = settings.derivative_step * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
+        size = output_error_settings.derivative_step * (
+            1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low)
+        )
         return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
@@ -230,7 +230,7 @@ class Problem:
         reference = self.inputs.segments[0, :count, 1:].T[:, None, :]
         states = np.moveaxis(runs.states, 2, 0)
         force = np.empty(runs.states.shape[:2])
-        size = max(1, OutputErrorSettings.current().samples_of_outputs // len(runs.numbers))
+        size = max(1, output_error_settings.samples_of_outputs // len(runs.numbers))
         for first in range(0, count, size):
             part = slice(first, first + size)
             modes = self.kernel.modes(states[..., part], 0.0, reference[..., part], values)
@@ -278,7 +278,7 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
     if "drive.sample_time" not in flat:
         return ""
     step = flat["drive.sample_time"]
-    if abs(step / sample_time - 1) >= OutputErrorSettings.current().sample_time_tolerance:
+    if abs(step / sample_time - 1) >= output_error_settings.sample_time_tolerance:
         return f"{CONTINUOUS}: the drive samples every {1e3 * step:g} ms, the log every {1e3 * sample_time:g} ms"
     return ""
 
@@ -293,14 +293,15 @@ def tracking(
     interpolated, nor how smooth its motion was: these stay unsettled. Raises InputError for a log that never moves for
     long enough.
     """
-    identification_settings = IdentificationSettings.current()
-    settings = OutputErrorSettings.current()
-    omega = 2 * np.pi * min(bandwidth, settings.bandwidth_of_holding)
-    settling, step = settings.time_constants_of_settling / omega, log.sample_time
-    cutoffs = [identification_settings.smoothing_bandwidths * times * bandwidth for times in settings.smoothing_steps]
+    omega = 2 * np.pi * min(bandwidth, output_error_settings.bandwidth_of_holding)
+    settling, step = output_error_settings.time_constants_of_settling / omega, log.sample_time
+    cutoffs = [
+        identification_settings.smoothing_bandwidths * times * bandwidth
+        for times in output_error_settings.smoothing_steps
+    ]
     smooth, *sharper = (motion(log["position"][part], step, cutoff).position for cutoff in cutoffs)
     # the force is held from each sample to the next
-    held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < settings.sample_time_tolerance
+    held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < output_error_settings.sample_time_tolerance
     inputs = Inputs(smooth, log["force"][part], step, held)
     counted = _moving(log["position"][part], smooth, step, settling)
     counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # the smoothed signal lacks samples beyond the end
@@ -345,10 +346,9 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
     While a stage sticks, the guiding controller's force shows micrometres of distance to the log, not an unexplained
     force. So rests do not count, nor does the time `settling` [s] after each rest and after the beginning.
     """
-    settings = OutputErrorSettings.current()
-    window = max(3, round(settings.time_of_a_rest / sample_time))
+    window = max(3, round(output_error_settings.time_of_a_rest / sample_time))
     span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
-    resting = span <= settings.deviations_of_a_rest * blur_of(position, smooth)
+    resting = span <= output_error_settings.deviations_of_a_rest * blur_of(position, smooth)
     resting[0] = True
     late = round(settling / sample_time)
     recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
@@ -368,14 +368,14 @@ def _after_start(count: int, sample_time: float) -> np.ndarray:
 
     The first samples depend on the initial state of the loop, which a log shows only roughly.
     """
-    settings = OutputErrorSettings.current()
-    first = round(min(settings.time_of_a_start / sample_time, settings.record_share_of_a_start * count))
+    first = round(
+        min(output_error_settings.time_of_a_start / sample_time, output_error_settings.record_share_of_a_start * count)
+    )
     return np.where(np.arange(count) < first, 0.0, 1.0)
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:
     """Return initial position [m] and velocity [m/s], by a parabola through the first samples."""
-    settings = OutputErrorSettings.current()
-    time = np.arange(settings.samples_of_first_velocity) * log.sample_time
-    slope = np.polyfit(time, log["position"][part][: settings.samples_of_first_velocity], 2)[1]
+    time = np.arange(output_error_settings.samples_of_first_velocity) * log.sample_time
+    slope = np.polyfit(time, log["position"][part][: output_error_settings.samples_of_first_velocity], 2)[1]
     return float(log["position"][part.start]), float(slope)

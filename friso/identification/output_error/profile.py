@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.refine import Refined, bounds_of, mean_square, refine_fit
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 
 WORSE = float(chi2.ppf(0.95, 1))
 """Increase of -2 ln(likelihood) at the ends of a 95 % interval."""
@@ -41,7 +41,6 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     fit with which costs are compared. The values reach beyond the interval's ends, or over the whole range. Returns the
     profile and the fits behind it.
     """
-    settings = OutputErrorSettings.current()
     low, high = (float(end[number]) for end in bounds_of(fit.problem))
     centre = fit.inner[number]
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
@@ -66,7 +65,6 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
 
     The `others` are indices. A fit whose mean square would stay above `limit` is abandoned.
     """
-    settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
     if not others:
@@ -104,7 +102,7 @@ def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.
     along, across = slopes[:, fit.free.index(number)], slopes[:, [fit.free.index(other) for other in others]]
     size = np.linalg.norm(across, axis=0)
     size = np.where(size > 0, size, 1.0)
-    rcond = OutputErrorSettings.current().smallest_singular_value
+    rcond = settings.smallest_singular_value
     return -np.linalg.lstsq(across / size, along, rcond=rcond)[0] / size
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.output_error.problem import Problem
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.progress import Progress, silent
 
 LADDER = np.array([0.1, 1.0, 10.0, 100.0])
@@ -51,7 +51,6 @@ def refine_fit(
     derivatives near the starts, if they are known. A fit that would not fall to the mean square `aim` at the pace of
     its last iteration is abandoned. Only derivatives computed at its own numbers end or abandon a fit.
     """
-    settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
     margin = settings.range_share_inside * (high - low)
     low, high = low + margin, high - margin

@@ -12,9 +12,9 @@ from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import digit_of, noise_of
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.identification.spread import CONFIDENCE, binned
 from friso.intervals import COVERAGE
 from friso.progress import Progress
@@ -31,7 +31,6 @@ def as_far_off_as_repeated(
 
     If the residual of the log exceeds the residuals of the simulated logs, errors are scaled up by the ratio.
     """
-    settings = OutputErrorSettings.current()
     free, rng = np.isin(np.arange(len(once.inner)), once.free), np.random.default_rng(settings.seed_of_repetitions)
     again = []
     for number in range(settings.repetitions_of_a_fit):
@@ -112,8 +111,6 @@ def _rounding(force: np.ndarray, speed: np.ndarray, digit: float, rng: np.random
     motion is steady and do not average out as noise does. Rounding the force of the fit again would not show them: its
     levels are those that the rounded log has.
     """
-    levels = np.stack(
-        [np.rint(np.abs(force) / digit), binned(speed, IdentificationSettings.current().bins_of_place_and_speed)]
-    )
+    levels = np.stack([np.rint(np.abs(force) / digit), binned(speed, identification_settings.bins_of_place_and_speed)])
     alike = np.unique(levels, axis=1, return_inverse=True)[1].ravel()
     return digit * np.sign(force) * (rng.random(alike.max() + 1) - 0.5)[alike]

@@ -232,3 +232,6 @@ class OutputErrorSettings(Settings):
 
     factor_of_a_sharp_profile: float = setting(3.0, "")
     """Largest ratio of upper to lower end of the interval of a determined parameter."""
+
+
+settings = OutputErrorSettings.live()

@@ -12,8 +12,8 @@ from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import IdentifiableFit, why_not_shown
 from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, keys_of
 from friso.identification.output_error.profile import Profile
-from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.output_error.settings import settings as output_error_settings
+from friso.identification.readings.settings import settings as reading_settings
 from friso.intervals import COVERAGE
 
 METHOD = "output error"
@@ -25,8 +25,6 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     Intervals are at least as wide as the profiles' and allow for the linearity error of sensors. Quantities that the
     record does not determine have a range with the reason.
     """
-    reading_settings = ReadingSettings.current()
-    settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = fit.problem.parameters
     spread = np.zeros((len(parameters), len(parameters)))
@@ -37,7 +35,7 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
     shares = [
-        settings.static_error_of_following
+        output_error_settings.static_error_of_following
         if key == "friction.static" and not fit.problem.closed
         else reading_settings.linearity_of_sensors
         for key in keys

@@ -16,7 +16,7 @@ from scipy.signal import bilinear, lfilter, lfilter_zi
 from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 from friso.stage.transmission import moving_mass
 
 HELD = "The joint is assumed held, with the limiter's stiffness: no bending shows."
@@ -145,7 +145,7 @@ class LowPass:
     @property
     def inside(self) -> slice:
         """Return the samples that the filter's transients at the ends do not affect."""
-        edge = int(ReadingSettings.current().periods_of_an_edge / (self.cutoff * (self.time[1] - self.time[0])))
+        edge = int(settings.periods_of_an_edge / (self.cutoff * (self.time[1] - self.time[0])))
         return slice(edge, len(self.time) - edge)
 
     def __call__(self, signal: np.ndarray) -> np.ndarray:
@@ -169,7 +169,6 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
 
     `fewest` is the number of samples that it must have.
     """
-    settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
     if not np.ptp(record.force) > 0:
@@ -196,7 +195,6 @@ def cutoff_of(record: BearingRecord) -> float:
     The low-pass is at most a fraction of the sampling frequency, and at least so high that several of its periods fit
     into the record.
     """
-    settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
     return max(
         min(highest, settings.sampled_frequency / (2 * record.interval)),
@@ -230,7 +228,6 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
     Returns None if the deflection is not measured. Returns None as well if it hardly exceeds its noise, a fraction of
     the motion, or what the contact of a held joint `gives` [m].
     """
-    settings = ReadingSettings.current()
     measured = deflection(log)
     if measured is None or len(position) < settings.periods_of_a_record:
         return None
@@ -262,7 +259,6 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
 
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
     """Compute the acceleration [m/s^2] of a mode's mass from the acceleration of its base."""
-    settings = ReadingSettings.current()
     omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / settings.points_per_sample
     fine = CubicSpline(time, acceleration)(
         np.linspace(time[0], time[-1], (len(time) - 1) * settings.points_per_sample + 1)

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 from friso.intervals import COVERAGE
 
 ORDER = 2
@@ -127,7 +127,6 @@ def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
 
     The noise is taken to be white. Returns 0 if the position stands out nowhere.
     """
-    settings = ReadingSettings.current()
     rates, density = welch(
         np.diff(position, 2),
         1 / sample_time,
@@ -179,7 +178,6 @@ def digit_of(signal: np.ndarray) -> float:
     the smallest step. A stepped command has no resolution: it mostly stays at a few levels, or it changes seldom, by
     several common steps.
     """
-    settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
     dust = settings.rounding_of_a_signal * np.abs(signal).max(initial=0.0)
     changes = steps > dust
@@ -237,7 +235,7 @@ def block_mean(values: np.ndarray) -> Mean:
 
     Neighbouring samples are not independent.
     """
-    count = min(ReadingSettings.current().blocks_of_a_mean, len(values))
+    count = min(settings.blocks_of_a_mean, len(values))
     means = np.array([part.mean() for part in np.array_split(values, count)])
     error = float(means.std(ddof=1) / np.sqrt(count)) if count > 1 else np.inf
     return Mean(float(values.mean()), error, count - 1)
@@ -248,7 +246,6 @@ def correlated_mean(values: np.ndarray) -> Mean:
 
     The degrees of freedom follow from the equivalent number of independent values (first-order autoregression).
     """
-    settings = ReadingSettings.current()
     count = len(values)
     off = values - values.mean()
     power = float(off @ off)
@@ -292,7 +289,6 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     The target, shape (n,), is fitted by columns, shape (n, p).
     """
-    settings = ReadingSettings.current()
     parts = zip(
         np.array_split(columns, settings.blocks_of_a_mean),
         np.array_split(target, settings.blocks_of_a_mean),

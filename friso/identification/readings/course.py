@@ -15,9 +15,9 @@ from friso.identification.readings.common import runs
 from friso.identification.readings.friction_velocity import distinct
 from friso.identification.readings.passes import Pass, passes
 from friso.identification.readings.ramps import force_ramps
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 from friso.identification.response.period import find_periods
-from friso.identification.settings import ExperimentSettings
+from friso.identification.settings import experiment_settings
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,7 @@ class Course:
         """
         if self.reference_moves:
             return "its reference moves"
-        experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
-        if distinct(self.speeds) >= reading_settings.speeds_of_a_line or self.ramps >= reading_settings.fewest_ramps:
+        if distinct(self.speeds) >= settings.speeds_of_a_line or self.ramps >= settings.fewest_ramps:
             return None
         repetition = self.repetition
         if repetition is None:
@@ -95,7 +94,7 @@ class Course:
         position, force = self.log["position"][part], self.log["force"][part]
         if not (0 < np.ptp(position) < 2 * bends(self.log.axis)[1] and np.ptp(force) > 0):
             return False
-        least = ReadingSettings.current().variance_share_of_bristles
+        least = settings.variance_share_of_bristles
         return float(np.corrcoef(position, force)[0, 1]) > np.sqrt(least)
 
     @cached_property
@@ -104,7 +103,6 @@ class Course:
 
         The result is empty if they cover less of the way, if a reference moves, or if the position has no SI unit.
         """
-        settings = ReadingSettings.current()
         part, position = self.log.longest, self.log["position"]
         try:
             stretches = [] if self.reference_moves else passes(self.log.per_unit_of_force())
@@ -121,7 +119,6 @@ class Course:
 
         The result is 0 if ramps are a small part of the log, if a reference moves, or if the position has no SI unit.
         """
-        settings = ReadingSettings.current()
         log = self.log
         try:
             shown = None if self.reference_moves else force_ramps(log.per_unit_of_force())
@@ -138,7 +135,6 @@ class Course:
 
         The rise to `force` lasts for `lasts` [s].
         """
-        settings = ReadingSettings.current()
 
         def mean(first: float, last: float) -> float:
             """Return the mean force over a part of the rise, relative to the force at its end."""
@@ -154,7 +150,6 @@ class Course:
     @property
     def one_way(self) -> bool:
         """Tell whether most of the way goes in one direction, with or without stops."""
-        settings = ReadingSettings.current()
         position = uniform_filter1d(self.log["position"][self.log.longest], settings.samples_of_a_blur)
         return bool(np.ptp(position) > settings.share_of_most_of_a_way * np.abs(np.diff(position)).sum())
 
@@ -170,7 +165,6 @@ class Course:
     @cached_property
     def against_a_spring(self) -> bool:
         """Tell whether the position rests at several places, with a force that rises with it."""
-        settings = ReadingSettings.current()
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
         size = max(int(settings.log_share_of_a_rest * len(position)), 2)
@@ -209,7 +203,6 @@ class Course:
 
 def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
     """Tell whether forces at successive rest positions, shape (n,), rise as a spring's do."""
-    settings = ReadingSettings.current()
     if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
         return False
     order = np.argsort(places)
@@ -251,12 +244,12 @@ def _rest(position: np.ndarray, samples: int) -> float:
     """
     size = max(samples // 10, 2)
     moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)
-    return float(np.mean(moved < ReadingSettings.current().travel_share_of_a_rest * np.ptp(position)))
+    return float(np.mean(moved < settings.travel_share_of_a_rest * np.ptp(position)))
 
 
 def _turns(period: np.ndarray) -> int:
     """Count how often a signal turns back within one period by a fraction of its range."""
-    least, turns, direction, last = ReadingSettings.current().range_share_of_a_turn * np.ptp(period), 0, 1.0, period[0]
+    least, turns, direction, last = settings.range_share_of_a_turn * np.ptp(period), 0, 1.0, period[0]
     for value in period:
         if (value - last) * direction > 0:
             last = value

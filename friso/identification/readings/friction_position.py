@@ -17,7 +17,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import block_mean, by_t, channel, low_pass, on_bearing
 from friso.identification.readings.passes import Pass, passes
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 from friso.intervals import COVERAGE
 
 
@@ -70,7 +70,6 @@ class FrictionPosition:
     @property
     def repeats(self) -> bool:
         """Tell whether passes over the same places repeat the force, which then depends on the place."""
-        settings = ReadingSettings.current()
         return self.repeatability.determined and self.repeatability.value >= settings.correlation_of_passes
 
 
@@ -80,7 +79,6 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
     Inertia is `mass` [kg] times acceleration. With the loop's `crossover` [Hz] the verdict also considers whether the
     loop is fast enough for the variations seen. Raises InputError for missing channels.
     """
-    settings = ReadingSettings.current()
     stretches = passes(log)
     position, force = on_bearing(log), channel(log, "force")
     if not stretches:
@@ -114,7 +112,7 @@ def _map(
     A place may be passed several times where the motion goes back a little; places without samples are interpolated.
     """
     x, f = position[stretch.span], force[stretch.span]
-    smooth = low_pass(x, sample_time, ReadingSettings.current().low_pass_of_passes)
+    smooth = low_pass(x, sample_time, settings.low_pass_of_passes)
     f = f - mass * np.gradient(np.gradient(smooth, sample_time), sample_time)
     step = places[1] - places[0]
     bins = np.clip(np.round((x - places[0]) / step).astype(int), 0, len(places) - 1)
@@ -162,7 +160,6 @@ def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     autocorrelation falls to 1/e. The interval comes from simulated random fields with exponential correlation,
     detrended likewise: it allows for the ratio of estimated to true length.
     """
-    settings = ReadingSettings.current()
     name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
     if not np.ptp(flat) > 0:
         return Estimate.unknown(name, unit, method, "the force does not vary along the rail")
@@ -188,7 +185,7 @@ def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, .
     """
     rates, power = periodogram(flat, 1 / step, window="hann", scaling="spectrum")
     inner = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
-    best = inner[np.argsort(power[inner])[::-1][: ReadingSettings.current().harmonics_of_a_pass]]
+    best = inner[np.argsort(power[inner])[::-1][: settings.harmonics_of_a_pass]]
     return tuple(Harmonic(float(1 / rates[i]), float((2 * power[i]) ** 0.5), float(speed * rates[i])) for i in best)
 
 
@@ -265,7 +262,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
         reasons.append(f"the motion at {speeds} mm/s is not steady (it sticks and slips, or oscillates)")
     if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
-    elif repeatability.value < ReadingSettings.current().correlation_of_passes:
+    elif repeatability.value < settings.correlation_of_passes:
         reasons.append(
             f"repeated passes over the same places differ (correlation {repeatability.value:.2f}, 95 % interval "
             f"{repeatability.low:.2f} to {repeatability.high:.2f})"

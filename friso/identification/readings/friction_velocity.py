@@ -13,7 +13,7 @@ from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import Mean, by_direction, by_t, t_value
 from friso.identification.readings.passes import Pass, on_common_places, passes, places_of
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 from friso.identification.readings.stribeck import FittedStribeck, Forces, Possible, stribeck_fit
 from friso.intervals import COVERAGE
 
@@ -77,7 +77,7 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
     velocities, forces, errors, swings = np.array([_row(stretch, moved, off) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
     if used:
-        linear = np.full_like(size, ReadingSettings.current().linearity_of_sensors * size.max())
+        linear = np.full_like(size, settings.linearity_of_sensors * size.max())
         errors = np.linalg.norm([errors, linear, swings**2 * np.ptp(size)], axis=0)
     unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
     sides = {
@@ -139,7 +139,7 @@ def _together(
         reason = "fewer than two steady stretches in one of the directions"
         return Estimate.unknown(name, "N", method, reason), _nothing(reason), False
     columns = [sign, np.ones_like(sign)]
-    if np.abs(velocities).max() >= ReadingSettings.current().span_of_speeds * np.abs(velocities).min():
+    if np.abs(velocities).max() >= settings.span_of_speeds * np.abs(velocities).min():
         columns.insert(1, velocities)
     design = np.stack(columns, axis=1)
     even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # curvature cancels between forward and backward motion
@@ -219,7 +219,6 @@ def _direction(
     Friction [N] is positive against the motion, with half-widths `errors` [N]. `spent` is the number of degrees of
     freedom already used for the constant force; `exponent` is the stage's, if stated.
     """
-    settings = ReadingSettings.current()
     speeds = np.abs(velocities)
     method = f"{METHOD}, {words}"
     if len(speeds) < 3 + spent:
@@ -273,7 +272,6 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
 
 def distinct(speeds: np.ndarray) -> int:
     """Count the distinct speeds [m/s], shape (n,); speeds within a small ratio count as one."""
-    settings = ReadingSettings.current()
     return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(settings.ratio_of_distinct_speeds)).sum())
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, solve_normal_equations
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 
 KEY, UNIT = "joint.stiffness", "N/m"
 METHOD = "force over deflection while the cart sticks"
@@ -25,7 +25,6 @@ def stiffness_of_loading(
     joint. The error is by the jackknife over loads. Creep of the cart does not matter. With fewer than three loads the
     stiffness is unknown.
     """
-    settings = ReadingSettings.current()
     count = len(loads)
     if count < settings.fewest_loads:
         return Estimate.unknown(KEY, UNIT, METHOD, f"{count} loads between slips: {settings.fewest_loads} are needed")

@@ -10,7 +10,7 @@ from scipy.signal import detrend
 
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import Mean, block_mean, channel, low_pass, on_bearing, rate, robust, runs
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,6 @@ class Pass:
     @property
     def steady(self) -> bool:
         """Tell whether the velocity hardly swings, neither slowly nor fast."""
-        settings = ReadingSettings.current()
         return self.swing <= settings.swing_of_a_steady_pass * abs(
             self.velocity
         ) and self.quick_swing <= settings.quick_swing_of_a_steady_pass * abs(self.velocity)
@@ -43,7 +42,6 @@ def passes(log: Log) -> tuple[Pass, ...]:
     The reference decides where the velocity is constant; without a reference, the body's own motion. Each pass states
     whether its motion was steady. Raises InputError for missing position or force.
     """
-    settings = ReadingSettings.current()
     position, velocity = on_bearing(log), _velocity(log)
     channel(log, "force")
     stretches = []
@@ -63,7 +61,6 @@ def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
 
     Passes stay uncut if the common way is too short.
     """
-    settings = ReadingSettings.current()
     position, velocity = on_bearing(log), _velocity(log)
     covered = [(float(position[single.span].min()), float(position[single.span].max())) for single in stretches]
     low, high = max((span[0] for span in covered), default=0.0), min((span[1] for span in covered), default=0.0)
@@ -86,7 +83,6 @@ def places_of(log: Log, stretches: Sequence[Pass]) -> tuple[float, float]:
 
 def _velocity(log: Log) -> np.ndarray:
     """Return the velocity [m/s] of the body on the bearing, (n,); NaN in segments too short."""
-    settings = ReadingSettings.current()
     position = on_bearing(log)
     velocity = np.full(len(position), np.nan)
     for part in log.segments:
@@ -100,7 +96,6 @@ def _of_reference(log: Log, part: slice) -> list[slice]:
 
     `part` are the samples of a segment. Standstill does not count.
     """
-    settings = ReadingSettings.current()
     reference = channel(log, "reference")[part]
     velocity = np.gradient(low_pass(reference, log.sample_time, settings.low_pass_of_passes), log.sample_time)
     acceleration = np.abs(np.gradient(velocity, log.sample_time))
@@ -115,7 +110,6 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
     The acceleration is within the noise there, or small compared with the largest acceleration and with the velocity. A
     stretch that swings throughout counts as well.
     """
-    settings = ReadingSettings.current()
     smooth = low_pass(velocity, sample_time, settings.low_pass_of_passes / 2)
     acceleration, speed = np.abs(np.gradient(smooth, sample_time)), np.abs(smooth)
     noise, top = 5 * robust(np.gradient(smooth, sample_time)), float(speed.max())
@@ -140,7 +134,6 @@ def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
     Both ends are cut by the filter's settling time, and the start by a further fraction, `share`, for the axis to
     settle.
     """
-    settings = ReadingSettings.current()
     edge, least = (
         int(1 / (settings.low_pass_of_passes * sample_time)),
         max(int(settings.time_of_a_pass / sample_time), settings.samples_of_a_pass),
@@ -167,7 +160,6 @@ def _digit(position: np.ndarray) -> float:
 
     Otherwise, and for a position that never changes, the result is 0.
     """
-    settings = ReadingSettings.current()
     steps = np.abs(np.diff(position))
     steps = steps[steps > settings.rounding_of_a_step * steps.max(initial=0.0)]
     if not len(steps):
@@ -182,7 +174,6 @@ def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> floa
     The oscillation is faster than the low-pass of passes. Only spectral lines clear of the noise count. Motion by less
     than one `digit` [m] of the position does not count.
     """
-    settings = ReadingSettings.current()
     window = np.hanning(len(position))
     lines = np.abs(np.fft.rfft(detrend(position) * window)) ** 2 * 2 / (len(position) * np.sum(window**2))
     frequency = np.fft.rfftfreq(len(position), sample_time)

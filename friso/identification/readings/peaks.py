@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 
 LOSS = 2.2
 """Loss of a smoothed peak of a ramp that ends in a sudden fall, in units of its rise R w within one deviation w of the
@@ -36,7 +36,6 @@ def smoothed(values: np.ndarray, width: float) -> np.ndarray:
 
     Beyond its ends, the signal is continued by point reflection about its end values.
     """
-    settings = ReadingSettings.current()
     more = min(int(settings.deviations_of_a_kernel * width) + 1, len(values) - 1)
     longer = np.pad(values, more, mode="reflect", reflect_type="odd")
     return gaussian_filter1d(longer, width, truncate=settings.deviations_of_a_kernel)[more : len(longer) - more]
@@ -70,7 +69,6 @@ def peak(
     positive in the direction of motion. It is searched between two `marks` (indices); the body rests in the first half.
     The force rises at `rising` [N/s]; frequencies above `cutoff` [Hz] are filtered out.
     """
-    settings = ReadingSettings.current()
     begin, start = marks
     rest = slice(begin, (begin + start) // 2)
     noise = scatter(force[rest]), mass / sample_time**2 * scatter(position[rest])

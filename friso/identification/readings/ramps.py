@@ -9,7 +9,7 @@ import numpy as np
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, low_pass, on_bearing
 from friso.identification.readings.peaks import peak, smoothed
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 from friso.identification.readings.slips import slips
 
 
@@ -42,7 +42,6 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     the published definition. Without, it is the force at which motion becomes visible, which contains inertia. Raises
     InputError for a missing channel.
     """
-    settings = ReadingSettings.current()
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []
     threshold, quick, stops = 0.0, 0, 0
@@ -102,10 +101,10 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
 
 def _lowest(push: np.ndarray) -> float:
     """Return the smallest smoothed force [N] on a body during its rest before a motion."""
-    return float(smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp).min())
+    return float(smoothed(push, len(push) / settings.smoothing_of_a_ramp).min())
 
 
 def _half(push: np.ndarray) -> int:
     """Return the last sample at which a smoothed force is at most the mean of its end values."""
-    smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
+    smooth = smoothed(push, len(push) / settings.smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

@@ -14,7 +14,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, correlated_mean, stribeck_curve, t_value
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 from friso.quantities import percent
 
 _SPEEDS = np.geomspace(1e-4, 10, 2001)
@@ -40,7 +40,7 @@ def share_below(force_rate: float) -> float:
     The bound holds whatever the Coulomb friction is, if bristle stiffness times Stribeck velocity is at least the
     setting `least_bristle_rate`. Returns 1 for rates at which nothing can be concluded.
     """
-    return min(1 - break_away(force_rate, 1.0, 0.0, ReadingSettings.current().least_bristle_rate, 1.0), 1.0)
+    return min(1 - break_away(force_rate, 1.0, 0.0, settings.least_bristle_rate, 1.0), 1.0)
 
 
 def static_friction(
@@ -59,7 +59,7 @@ def static_friction(
         low = float(np.min(forces)) if len(forces) else 0.0
         return Estimate.unknown(name, "N", "break-away forces", f"{len(forces)} break-aways: 3 are needed", low)
     low, high = np.percentile(rates, [10, 90])
-    if high >= ReadingSettings.current().spread_of_rates * low > 0:
+    if high >= settings.spread_of_rates * low > 0:
         estimate = _extrapolated(name, forces, rates, relative_error)
     else:
         estimate = _bounded(name, forces, rates, relative_error)
@@ -72,7 +72,6 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: f
     Break-aways are too low by a bounded part, and the value is raised by half of it. Static friction is not determined
     if the bound is too large.
     """
-    settings = ReadingSettings.current()
     mean = correlated_mean(forces)
     share = share_below(float(np.median(rates)))
     method = "mean break-away force; at rate 0 it may be higher, which is allowed for"  # one sentence for many logs
@@ -93,7 +92,6 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: f
 
 def _slow_enough() -> float:
     """Return the highest force rate [N/s] at which ramps of a single rate show static friction."""
-    settings = ReadingSettings.current()
     rates = settings.least_bristle_rate * np.geomspace(1e-6, 1, 145)
     return float(max(rate for rate in rates if share_below(rate) <= 2 * settings.share_extrapolated))
 
@@ -128,7 +126,6 @@ def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_err
 
     The line is fitted at the lower rates. The interval is widened by half of the extrapolated distance.
     """
-    settings = ReadingSettings.current()
     rises = _rising(name, forces, rates)
     if rises is not None:
         return rises

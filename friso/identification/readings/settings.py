@@ -282,3 +282,6 @@ class ReadingSettings(Settings):
 
     ratio_above_the_fastest: float = setting(2.0, "")
     """Ratio by which a Stribeck velocity may lie above the fastest speed."""
+
+
+settings = ReadingSettings.live()

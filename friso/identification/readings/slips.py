@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.readings.common import rate, robust, runs
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,6 @@ def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
 
     A slip counts only after a rest of some length.
     """
-    settings = ReadingSettings.current()
     speed = rate(position, sample_time, cutoff)
     size = np.abs(speed)
     slow = speed[size <= np.percentile(size, 50)]

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings as output_error_settings
 from friso.identification.readings.common import t_value
-from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.settings import settings as reading_settings
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,6 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
     `plain` is the line's sum of squares over variances. A given `exponent` is used unless the forces refute it; too few
     forces leave all exponents possible.
     """
-    reading_settings = ReadingSettings.current()
-    settings = OutputErrorSettings.current()
     speeds = forces.speeds
     velocities = np.geomspace(
         speeds.min() / reading_settings.ratio_below_the_slowest,
@@ -81,7 +79,11 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
         reading_settings.grid_of_velocities,
     )
     shapes, left = (
-        np.linspace(settings.stribeck_exponents[0], settings.stribeck_exponents[1], reading_settings.grid_of_exponents),
+        np.linspace(
+            output_error_settings.stribeck_exponents[0],
+            output_error_settings.stribeck_exponents[1],
+            reading_settings.grid_of_exponents,
+        ),
         len(speeds) - 5 - forces.both,
     )
     apart = left < 1
@@ -113,9 +115,9 @@ def _better(plain: float, least: float, more: int, left: int) -> bool:
     `plain` and `least` are the sums of squares of line and curve. The curve has `more` parameters than the line, and
     leaves `left` degrees of freedom.
     """
-    settings = ReadingSettings.current()
     return least < plain and (
-        least == 0 or bool(fisher.sf((plain - least) / more * left / least, more, left) < settings.chance_of_a_curve)
+        least == 0
+        or bool(fisher.sf((plain - least) / more * left / least, more, left) < reading_settings.chance_of_a_curve)
     )
 
 
@@ -154,18 +156,23 @@ class _Grid:
 
         The new grid lies within this one. If no curve is possible, this grid is returned.
         """
-        settings = ReadingSettings.current()
         grid = self
-        for _ in range(settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
+        for _ in range(reading_settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
             inside, ends = grid.room(left) >= 0, []
             for points, here in ((grid.velocities, inside.any(axis=1)), (grid.shapes, inside.any(axis=0))):
                 at = np.flatnonzero(here)
                 ends += [
-                    points[max(at[0] - settings.margin_of_the_grid, 0)],
-                    points[min(at[-1] + settings.margin_of_the_grid, len(points) - 1)],
+                    points[max(at[0] - reading_settings.margin_of_the_grid, 0)],
+                    points[min(at[-1] + reading_settings.margin_of_the_grid, len(points) - 1)],
                 ]
-            shapes = np.linspace(ends[2], ends[3], settings.grid_of_exponents) if len(grid.shapes) > 1 else grid.shapes
-            grid = _Grid(grid.forces, np.geomspace(ends[0], ends[1], settings.grid_of_velocities), shapes, grid.apart)
+            shapes = (
+                np.linspace(ends[2], ends[3], reading_settings.grid_of_exponents)
+                if len(grid.shapes) > 1
+                else grid.shapes
+            )
+            grid = _Grid(
+                grid.forces, np.geomspace(ends[0], ends[1], reading_settings.grid_of_velocities), shapes, grid.apart
+            )
         return grid
 
     def room(self, left: int) -> np.ndarray:
@@ -184,7 +191,6 @@ class _Grid:
         `left` is the number of degrees of freedom, and `refuted` is stored in the result. Ranges that reach an `outer`
         Stribeck velocity or exponent are not closed.
         """
-        settings = OutputErrorSettings.current()
         forces, open_shape = self.forces, len(self.shapes) > 1
         best = np.unravel_index(int(np.argmin(self.cost)), self.cost.shape)
         scatter, t = max(float(self.cost[best]) / left, 1.0), t_value(left)
@@ -192,7 +198,7 @@ class _Grid:
         inside = room >= 0
         fast, shaped = np.asarray(inside.any(axis=1)), np.asarray(inside.any(axis=0))
         ends = [bool(self.velocities[fast][end] == outer[end]) for end in (0, -1)]
-        cut = any(float(self.shapes[shaped][end]) == settings.stribeck_exponents[end] for end in (0, -1))
+        cut = any(float(self.shapes[shaped][end]) == output_error_settings.stribeck_exponents[end] for end in (0, -1))
 
         def linear(place: int, scale: float, level: float, closed: bool) -> Possible:
             centre = self.solutions[..., place][inside] * scale

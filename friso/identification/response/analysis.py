@@ -23,7 +23,7 @@ from friso.identification.response.period import find_periods
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
 from friso.identification.response.response import Channels, FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 from friso.identification.response.simulated import Explanation, explained
 from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
 
@@ -70,7 +70,6 @@ def analyse(
     of friction); `period` [s] is the approximate period of the excitation (default: searched). Raises InputError if no
     response can be estimated.
     """
-    settings = ResponseSettings.current()
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
     if measured is not None:
         driven, other = as_measured(measured), None
@@ -251,7 +250,7 @@ def _friction(
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None
     step = records[0].sample_time
-    rigid = ResponseSettings.current().frequency_of_one_body * model["antiresonance frequency"].value
+    rigid = settings.frequency_of_one_body * model["antiresonance frequency"].value
     limits = (float(driven.frequency[0]) / 2, min(2 * departs.frequency.high, rigid))
     smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
     speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]

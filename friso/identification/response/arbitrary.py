@@ -12,7 +12,7 @@ from scipy import signal
 from friso.errors import InputError
 from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import Channels, FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 OVERLAP = 1 / 36
 """Squared correlation of neighbouring Hann segments that overlap by half (Welch 1967, doi:10.1109/TAU.1967.1161901)."""
@@ -49,7 +49,7 @@ def welch(record: ResponseRecord, resolution: float, channels: Channels | None =
         effective = count / (1 + 2 * OVERLAP * (count - 1) / count)
         deviation = np.sqrt(np.maximum(left, 0.0) * power / (max(effective - 1, 1) * np.abs(driven) ** 2))
         coherence = np.abs(answer) ** 2 / (power * total)
-    excited = np.sqrt(power) > ResponseSettings.current().amplitude_of_a_weak_line * np.sqrt(power.max())
+    excited = np.sqrt(power) > settings.amplitude_of_a_weak_line * np.sqrt(power.max())
     degrees = np.full(len(frequency), 2 * (effective - 1))
     return _response(frequency, response, deviation, degrees, "welch", channels, coherence, record.sample_time).at(
         excited
@@ -63,7 +63,6 @@ def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -
     of order 2 in the frequency over 17 lines of the spectrum of the whole record; the residual is the noise. One line
     in 9 is returned, so that neighbours share little. Raises InputError for a record of fewer than 200 samples.
     """
-    settings = ResponseSettings.current()
     record = record.checked(200)
     external = record.input if record.reference is None else record.reference
     size = len(external)

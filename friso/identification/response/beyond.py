@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 DELAY, HELD, COMPLIANCES = range(3)
 """Indices of the parameters: the delay [s]; the square of the time for which the force is held [ms^2]; from
@@ -51,7 +51,7 @@ def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.nd
     Both arrays have the shape (COMPLIANCES + outputs,); compliances have no limits. The model covers frequencies up to
     `top` [Hz].
     """
-    late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
+    late, longest = settings.periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
     return np.array([-late, 0.0, *-free]), np.array([late, (longest / MILLI) ** 2, *free])
 
@@ -61,7 +61,7 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 
     They stand for a time between 0 and the whole sample time.
     """
-    half = (_longest(response, ResponseSettings.current().periods_of_a_sample) / MILLI) ** 2 / 2
+    half = (_longest(response, settings.periods_of_a_sample) / MILLI) ** 2 / 2
     return half, half
 
 

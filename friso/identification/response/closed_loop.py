@@ -10,7 +10,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift
 from friso.identification.response.response import Channels, FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 from friso.quantities import percent
 
 
@@ -24,7 +24,6 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     The present sample of the output counts as past, because a position cannot react to a force within one sample.
     `direct` is true for an output that does, such as an acceleration.
     """
-    settings = ResponseSettings.current()
     record = record.checked(settings.samples_of_a_feedback_test)
     driven, answer = _surprising(record)
     if driven is None or answer is None:
@@ -51,7 +50,7 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
         samples = values[periods.start : periods.stop]
         samples = samples - drift(samples, periods.samples)
         parts.append((samples.reshape(periods.count, -1) - samples.reshape(periods.count, -1).mean(axis=0)).ravel())
-    if np.std(parts[0]) <= ResponseSettings.current().difference_of_played_periods * np.std(record.input):
+    if np.std(parts[0]) <= settings.difference_of_played_periods * np.std(record.input):
         return None, None
     return parts[0], parts[1]
 
@@ -62,7 +61,6 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
     With `direct`, the present sample of the output is no past. Returns the probability (F-test) that the output's past
     does not help, and the fraction of the input's unpredicted part that it explains.
     """
-    settings = ResponseSettings.current()
     target = driven[settings.past_of_the_input :]
     past = [driven[settings.past_of_the_input - lag : -lag] for lag in range(1, settings.past_of_the_input + 1)]
     first = int(direct)
@@ -91,7 +89,6 @@ def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tupl
 
     Both responses must have the same spectral lines. The result is empty if they agree.
     """
-    settings = ResponseSettings.current()
     _same_lines(direct, indirect)
     weight = 1 / (direct.deviation**2 + indirect.deviation**2)
     off = np.array_split(weight * (direct.response - indirect.response), settings.bands_of_a_bias)

@@ -12,7 +12,7 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.fitting import refined
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 from friso.intervals import COVERAGE
 
 RANDOM = np.sqrt(2 / np.pi)
@@ -43,7 +43,6 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
     (F-test). The scale of the test comes from the upper half, where the model is taken to hold as well as it can. The
     departure ends with the highest window that differs. Raises InputError for fewer than 36 lines.
     """
-    settings = ResponseSettings.current()
     frequency = response.frequency
     if len(frequency) < 4 * settings.lines_of_a_window:
         raise InputError(
@@ -77,7 +76,6 @@ def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, floa
     The ratio is that of noise with distortion to noise alone. The first result is None, and the ratio NaN, if the
     distortion is not known.
     """
-    settings = ResponseSettings.current()
     noise, distortion = response.noise[part], response.distortion[part]
     if not np.all(np.isfinite(distortion)) or not np.all(noise > 0):
         return None, np.nan

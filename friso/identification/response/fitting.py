@@ -11,7 +11,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 ResponseModel = Callable[[np.ndarray], np.ndarray]
 """A function from parameters (p,) to complex responses (outputs, lines)."""
@@ -64,7 +64,6 @@ class ResponseFit:
 
         The interval of a `positive` quantity is computed for its logarithm.
         """
-        settings = ResponseSettings.current()
         value, deviation = self._at(of)
         if not np.isfinite(value) or (positive and not value > 0):
             return Estimate.unknown(name, unit, method, "the fitted model does not have it")
@@ -114,7 +113,6 @@ def refined(
     and deviations of parameters by index; each counts as one more observation. `lower` and `upper` only keep the fit
     from diverging.
     """
-    settings = ResponseSettings.current()
     weight = np.sqrt(2) / deviation
     places = list(believed)
     middle, reach = np.array(list(believed.values())).reshape(-1, 2).T

@@ -14,7 +14,7 @@ from scipy import stats
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 from friso.intervals import COVERAGE
 
 TURNED = np.radians(30)
@@ -85,7 +85,7 @@ def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]
     `band` has the indices of its first and last spectral line, and its sign.
     """
     frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
-    weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
+    weight = 1 / (relative**2 / 2 + settings.scatter_of_a_straight_line**2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
     spread = np.sum(weight * octave**2)
     return bool(abs(np.sum(weight * octave * level) / spread) + 2 / np.sqrt(spread) < 0.5)
@@ -104,7 +104,7 @@ def _parted(
     between = level[lower[1] + 1 : upper[0]]
     means = [np.mean(level[band[0] : band[1] + 1]) for band in (lower, upper)]
     off = np.abs(between[:, None] - means).min(axis=1, initial=np.inf)
-    return bool(np.any(off > np.log(ResponseSettings.current().factor_between_lines)))
+    return bool(np.any(off > np.log(settings.factor_between_lines)))
 
 
 def _widest(
@@ -129,7 +129,6 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
     this `sign`. Spectral lines from `start` to before `stop` are searched; at most `edges_tried` evenly spaced ones are
     tried as ends. Returns None if no such band is wide enough.
     """
-    settings = ResponseSettings.current()
     if stop - start < settings.lines_of_a_band:
         return None
     frequency, level, phase, relative = (quantity[start:stop] for quantity in _flat(response, slope, sign))
@@ -197,7 +196,7 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
     drawn at random (`benchmarks/identify.py`).
     """
     _, level, phase, relative = (quantity[band] for quantity in _flat(response, slope, sign))
-    weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
+    weight = 1 / (relative**2 / 2 + settings.scatter_of_a_straight_line**2)
     columns, coefficients = _bent(_bends(response, slope, band), level, weight)
     inverse = np.linalg.inv(columns.T @ (weight[:, None] * columns))
     residual = level - columns @ coefficients
@@ -239,7 +238,7 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
     """
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
-    gone = frequency[np.abs(level - mean) > np.log(ResponseSettings.current().factor_between_lines)]
+    gone = frequency[np.abs(level - mean) > np.log(settings.factor_between_lines)]
     above, below = gone[gone > inside[-1]], gone[gone < inside[0]]
     up = above[0] / inside[-1] if above.size else np.inf
     down = inside[0] / below[-1] if below.size else np.inf

@@ -20,7 +20,7 @@ from friso.identification.response.rational import (
     simplest_model,
 )
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 METHOD = "rational fit of the response"
 
@@ -58,7 +58,6 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
 
     `rigid` tells whether the mass moves freely (default: the better fit). Raises InputError for fewer than 12 lines.
     """
-    settings = ResponseSettings.current()
     part = response if band is None else response.between(*band)
     part = part.at(part.frequency > 0)
     if len(part.frequency) < 12:
@@ -91,7 +90,6 @@ def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tupl
 
     `band` is in Hz. Poles and zeros times `scale` are frequencies in Hz.
     """
-    settings = ResponseSettings.current()
     poles, zeros = poles_and_zeros(fit.parameters, shape)
     for pole in sorted(poles, key=abs):
         if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:

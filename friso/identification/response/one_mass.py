@@ -10,7 +10,7 @@ from scipy import stats
 from friso.identification.response.beyond import COMPLIANCES, HELD, believed, beyond, bounds
 from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 from friso.identification.response.two_mass import TwoMass
 
 MASS, DRAG, SPRING, BEYOND = range(4)
@@ -25,7 +25,6 @@ def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyRespons
     band of `model`. An F-test decides whether the difference is chance; its level is divided by the number of lines,
     because the mode could lie at any line.
     """
-    settings = ResponseSettings.current()
     responses = [response for response in (driven, other) if response is not None]
     one, two = fit_one_mass(responses, model.signs, model.band), model.fit
     free, more = max(two.count - len(two.parameters), 1), len(two.parameters) - len(one.parameters)
@@ -56,7 +55,7 @@ def fit_one_mass(
         return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
 
     lower, upper = np.array([-np.inf, 0.0, 0.0, *outside[0]]), np.array([np.inf, np.inf, np.inf, *outside[1]])
-    starts = sorted(_starts(values, frequency), key=misfit)[: ResponseSettings.current().starts_refined]
+    starts = sorted(_starts(values, frequency), key=misfit)[: settings.starts_refined]
     fits = [refined(model, start, values, deviation, lower, upper, held) for start in starts]
     return min(fits, key=lambda fit: fit.squares)
 
@@ -81,7 +80,6 @@ def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
 
     The magnitude of each start is, on average, that of the first response in `values`.
     """
-    settings = ResponseSettings.current()
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])
     starts = []
     for corner, mode in product(places, places):

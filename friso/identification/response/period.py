@@ -8,7 +8,7 @@ import numpy as np
 from scipy import fft
 
 from friso.errors import InputError
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,6 @@ def _switched_off(signal: np.ndarray) -> int:
     An input that is off at the end for 10 samples or fewer, or 0.5 % of the record, is not switched off: all samples
     count.
     """
-    settings = ResponseSettings.current()
     moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
     stop = int(moving[-1]) + 1 if moving.size else 0
     return stop if len(signal) - stop > max(10, len(signal) // 200) else len(signal)
@@ -85,7 +84,7 @@ def _shortest(change: np.ndarray) -> int:
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
     lags = np.arange(max(first, 2), len(change))
-    if not lags.size or change[lags].min() > ResponseSettings.current().change_between_periods:
+    if not lags.size or change[lags].min() > settings.change_between_periods:
         raise _not_periodic("an input that does not repeat within half the record")
     good = lags[change[lags] <= 1.5 * change[lags].min() + 1e-9]
     return min([_lowest(change, int(good[0])), *_slipping(change, lags)[:1]])
@@ -97,7 +96,6 @@ def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
     After twice such a lag the signal has changed several times as much as after one. `change`, over all lags, is how
     much it changes; `lags` are those searched.
     """
-    settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]
     lowest = (
@@ -126,7 +124,7 @@ def _near(change: np.ndarray, expected: float) -> int:
         raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")
     lags = np.arange(max(low, 2), min(high, len(change)))
     best = int(lags[np.argmin(change[lags])])
-    if change[best] > ResponseSettings.current().change_between_periods:
+    if change[best] > settings.change_between_periods:
         raise _not_periodic(f"an input that does not repeat near {expected:g} samples")
     return best
 

@@ -15,7 +15,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.response.records import ResponseRecord, Spectra, spectra
 from friso.identification.response.response import Channels, FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 
 def multisine(
@@ -69,7 +69,6 @@ def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
 
     Raises InputError without common lines.
     """
-    settings = ResponseSettings.current()
     if not records:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
     spacings = np.array([realisation.frequency[0] for realisation in records])
@@ -125,7 +124,6 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
 
     Both are arrays of shape (lines,). With few realisations, neighbouring spectral lines share their variance.
     """
-    settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)
     squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
@@ -144,7 +142,6 @@ def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarr
     Noise and the linear response to the input at these lines are subtracted. The result is NaN if fewer than two lines
     of the band were left free.
     """
-    settings = ResponseSettings.current()
     places = np.flatnonzero(excited)
     free = np.setdiff1d(np.arange(places[0], places[-1] + 1), places)
     if len(free) < 2:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from friso.identification.response.fitting import ResponseFit
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,6 @@ def _better(larger: Row, smaller: Row) -> bool:
 
     Its Bayesian criterion and its sum of squares must both be lower by more than the settings ask.
     """
-    settings = ResponseSettings.current()
     return (
         larger.bic < smaller.bic - settings.criterion_of_a_mode
         and larger.squares < settings.squares_left_by_a_mode * smaller.squares
@@ -155,7 +154,6 @@ def _another(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
     """Add one more mode to the nonlinear parameters, where it improves the fit most."""
-    settings = ResponseSettings.current()
     before = shape.modes - 1
     best, best_parameters = np.inf, nonlinear
     for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), settings.frequencies_tried):
@@ -174,7 +172,6 @@ def _eliminated(
 
     At each step the linear parameters follow by least squares (Golub, Pereyra 1973).
     """
-    settings = ResponseSettings.current()
 
     def left(nonlinear: np.ndarray) -> np.ndarray:
         return _linear_parameters(_columns(nonlinear, shape, s), values, deviation)[1]

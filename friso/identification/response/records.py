@@ -12,7 +12,7 @@ from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.response.period import Periods, find_periods
 from friso.identification.response.response import Channels
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     driving = _harmonics(record.driving, periods)
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
-    if abs(slip) * periods.count > ResponseSettings.current().samples_of_a_slip:
+    if abs(slip) * periods.count > settings.samples_of_a_slip:
         text = (
             f"a period has {periods.samples + slip:.7g} samples, because the clocks differ: resampled to whole periods"
         )
@@ -214,7 +214,6 @@ def _excited(driving: np.ndarray) -> np.ndarray:
     `driving` is its spectrum, shape (periods, lines). These lines stand out of its noise, and of other lines that are
     much weaker.
     """
-    settings = ResponseSettings.current()
     mean = np.abs(driving.mean(axis=0))
     noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean
     excited = (mean > settings.amplitude_of_an_excited_line * mean.max()) & (
@@ -243,7 +242,7 @@ def _transient_periods(reaction: np.ndarray) -> int:
         return 0
     later = np.arange(count - last, count)
     off = np.array([_distance(reaction[number], reaction[later[later != number]]) for number in range(count)])
-    return int(np.flatnonzero(off <= ResponseSettings.current().distance_of_a_transient * off[later].max())[0])
+    return int(np.flatnonzero(off <= settings.distance_of_a_transient * off[later].max())[0])
 
 
 def _distance(single: np.ndarray, others: np.ndarray) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from friso.errors import InputError
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 if TYPE_CHECKING:
     from control import FrequencyResponseData
@@ -122,7 +122,6 @@ class FrequencyResponse:
         Their coherence must also suffice, if it is known. Warnings list the lines left out. Raises InputError if none
         is left, because the excitation is too weak.
         """
-        settings = ResponseSettings.current()
         enough = np.abs(self.response) >= ratio * self.deviation
         if self.coherence is not None:
             enough &= self.coherence >= settings.coherence_of_a_line
@@ -151,7 +150,7 @@ class FrequencyResponse:
         if len(size) < 3 or not np.all(size > 0):
             return self.deviation
         second = np.abs(np.diff(np.log(size), 2)) / np.sqrt(6)
-        width = min(ResponseSettings.current().lines_of_a_scatter, len(second))
+        width = min(settings.lines_of_a_scatter, len(second))
         medians = np.median(np.lib.stride_tricks.sliding_window_view(second, width), axis=1)
         places = np.arange(len(size)) - 1 - (width - 1) / 2
         rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # of normal deviations

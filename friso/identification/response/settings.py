@@ -189,3 +189,6 @@ class ResponseSettings(Settings):
 
     misfit_of_no_model: float = setting(0.4, "")
     """RMS logarithm of the ratio of response to model above which the model does not describe the response."""
+
+
+settings = ResponseSettings.live()

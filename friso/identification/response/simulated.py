@@ -12,7 +12,7 @@ from friso.identification.response.departure import Drag
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,6 @@ def explained(
     `limits` [Hz]. The `factors`, of which 1 must be one, show how the response depends on the amplitude. Raises
     InputError if `drag` has no friction level or 1 is missing.
     """
-    settings = ResponseSettings.current()
     if not drag.coulomb.value > 0:
         raise InputError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
     if 1.0 not in factors:

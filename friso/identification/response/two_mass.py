@@ -14,7 +14,7 @@ from friso.identification.response.beyond import COMPLIANCES, DELAY, HELD, belie
 from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.settings import ResponseSettings
+from friso.identification.response.settings import settings
 from friso.intervals import COVERAGE
 
 METHOD = "two-mass model fitted to the response"
@@ -153,7 +153,7 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
     Raises InputError if it misses the magnitude by too large a factor on average.
     """
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
-    if off > ResponseSettings.current().misfit_of_no_model:
+    if off > settings.misfit_of_no_model:
         text = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
         expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
         raise InputError("response", text, expected, '--band "3 Hz .. 20 Hz"')
@@ -201,7 +201,6 @@ def _best(
     the lower and upper bounds of delay, hold and compliances. `held` has prior values and deviations of parameters, by
     index.
     """
-    settings = ResponseSettings.current()
     reach = np.array([FAR] * 3 + [2 * FAR])
 
     def model(parameters: np.ndarray) -> np.ndarray:
@@ -231,7 +230,6 @@ def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
 
     The starts have several mass ratios.
     """
-    settings = ResponseSettings.current()
     level = np.abs(values[0]) * (2 * np.pi * frequency) ** 2
     resonance = frequency[1 + int(np.argmax(level[1:-1]))]
     for ratio in settings.resonance_ratios:
@@ -253,7 +251,7 @@ def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
         yield "the second output has the opposite sign of the first: it was reversed"
-    if fit.reduced > ResponseSettings.current().misfit_of_a_right_model:
+    if fit.reduced > settings.misfit_of_a_right_model:
         yield f"the model is not right to the precision of the data (reduced chi-square {fit.reduced:.3g})"
 
 

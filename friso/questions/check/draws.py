@@ -10,7 +10,7 @@ from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
 from friso.shown.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval
 from friso.studies.draws import Draws, Fates
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 COLOURS = {
     "hunts": VERMILLION,
@@ -105,7 +105,7 @@ def _narrowed(draws: Draws) -> str:
     """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))
-    if len(shown) < StudySettings.current().trial_draws or not np.ptp(fates.amplitudes[shown]) > 0:
+    if len(shown) < settings.trial_draws or not np.ptp(fates.amplitudes[shown]) > 0:
         return ""
     ranks = fates.amplitudes[shown].argsort().argsort()
     follows = {

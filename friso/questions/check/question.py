@@ -30,7 +30,7 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
 from friso.studies.draws import Draws
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 if TYPE_CHECKING:
     from friso.hunting import LoopState, ParameterMargin
@@ -238,7 +238,6 @@ def checked_stage(
     With `laws`, the stage is checked under other friction laws, too. `tolerance` is that of the solver. Raises
     InputError for a number of draws that is not usable.
     """
-    settings = StudySettings.current()
     loose = max(tolerance, LONG_RUN_RTOL)
     sample = uncertain = None
     if draws is not None:
@@ -314,7 +313,6 @@ def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlatio
 
     Returns None, with a warning, if nearly all machines drawn are invalid.
     """
-    settings = StudySettings.current()
 
     try:
         draw(stage, correlations, settings.trial_draws, seed)

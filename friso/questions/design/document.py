@@ -16,7 +16,7 @@ from friso.design_method.front import Candidate
 from friso.design_method.geometry import Geometry
 from friso.design_method.method import Design, NoDesign, UnfinishedDesign
 from friso.design_method.relax import Relaxation
-from friso.design_method.settings import DesignSettings
+from friso.design_method.settings import settings
 from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.questions.design.window import lower, upper
@@ -194,7 +194,6 @@ def _controller(design: Design) -> dict[str, Any]:
 
 def _verification(design: Design) -> dict[str, Any]:
     """Return the outcome of the simulated moves with the joint free and locked."""
-    settings = DesignSettings.current()
     verification, limit = design.verification, design.spec.position.settling_time
     met = None if limit is None else verification.free.slower_than(settings.slow_share) <= limit
     return {**_outcome(verification.free), "settling_time_met": met, "locked": _outcome(verification.locked)}

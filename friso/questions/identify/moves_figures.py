@@ -15,7 +15,7 @@ from friso.identification.output_error.problem import Simulated
 from friso.identification.output_error.profile import Profile
 from friso.identification.quality import steady_friction
 from friso.identification.readings.common import cart, low_pass, on_bearing
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import identification_settings
 from friso.questions.identify.kind_view import TIME
 from friso.questions.identify.numbers import digits, name_of, unit_of
 from friso.shown.drawing.figure import (
@@ -128,11 +128,10 @@ def _difference(time: Array, left: Array, unit: str) -> Panel:
 
 def _residual(moves: IdentifiedMoves, name: str) -> Figure:
     """Draw the residual force over position and speed."""
-    settings = IdentificationSettings.current()
     moved = motion(
         moves.log["position"][moves.part],
         moves.log.sample_time,
-        settings.smoothing_bandwidths * moves.inverse.bandwidth,
+        identification_settings.smoothing_bandwidths * moves.inverse.bandwidth,
     )
     left, axis = moves.fit.residual, Axis("Residual force", moves.force_unit)
     panels = (
@@ -148,17 +147,16 @@ def _residual(moves: IdentifiedMoves, name: str) -> Figure:
 
 def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     """Draw the force without the inertial force over velocity, and the identified friction."""
-    settings = IdentificationSettings.current()
     flat = moves.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
-    step, cutoff = moves.log.sample_time, settings.smoothing_bandwidths * moves.inverse.bandwidth
+    step, cutoff = moves.log.sample_time, identification_settings.smoothing_bandwidths * moves.inverse.bandwidth
     moved, stage = (
         motion(position[moves.part], step, cutoff) for position in (on_bearing(moves.log), moves.log["position"])
     )
     force = low_pass(moves.log["force"][moves.part], step, cutoff)
     friction = force - masses[0] * moved.acceleration - masses[1] * stage.acceleration
     inner = slice(
-        settings.samples_of_an_edge, -settings.samples_of_an_edge
+        identification_settings.samples_of_an_edge, -identification_settings.samples_of_an_edge
     )  # the filter has transients at the ends of a record
     loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())

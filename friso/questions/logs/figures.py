@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.identification.contents import ChannelContent, LogContent
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.questions.logs.words import title
 from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
 
@@ -38,7 +38,7 @@ def _panel(channel: ChannelContent) -> Panel:
     role = channel.role.replace("_", " ")
     words = f"{channel.name}: {role}" if role and role != channel.name else channel.name
     if np.isnan(values[np.isfinite(channel.values)]).any():
-        words += f" (values beyond {LogSettings.current().largest_value:g} not drawn)"
+        words += f" (values beyond {settings.largest_value:g} not drawn)"
     across = Axis("Time", "s", prefixed=False) if timed else Axis("Sample", "", prefixed=False)
     return Panel(words, across, Axis("", channel.unit, prefixed=False), (Series(x, values, "", BLUE, width=1.0),))
 
@@ -48,6 +48,5 @@ def _within_range(values: np.ndarray) -> np.ndarray:
 
     The limit is the setting `largest_value`. Values smaller than its inverse become 0.
     """
-    settings = LogSettings.current()
     sizes = np.abs(values)
     return np.where(sizes <= settings.largest_value, np.where(sizes < 1 / settings.largest_value, 0.0, values), np.nan)

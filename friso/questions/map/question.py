@@ -57,7 +57,7 @@ from friso.studies.axes import AxisValues
 from friso.studies.built_runs import of_runs_alone, runs_as_built
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
 from friso.studies.store_folder import ReadOnlyStoreError
 from friso.studies.study import Study
@@ -365,7 +365,6 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
     A safe one is the loosest at which enough outcomes of a sample of cells survive. If there is none, the best one
     tried is taken. The choice is logged.
     """
-    settings = StudySettings.current()
     if entry != "auto":
         return tolerance_of(entry)
     rtol, shares, cells = loosest_rtol(study, crew)

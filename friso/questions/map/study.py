@@ -30,7 +30,7 @@ from friso.studies.metric import METRICS, metrics, with_usual
 from friso.studies.refine import finer
 from friso.studies.request import Request
 from friso.studies.samples import Samples
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.studies.study import Study, study_of
 
 if TYPE_CHECKING:
@@ -86,7 +86,6 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
 
     Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its cost.
     """
-    settings = StudySettings.current()
     axes, links, samples = varied.axes, varied.links, varied.samples
     if not axes and not isinstance(samples, Samples):
         raise InputError("x", "no axis", "one axis or more", f"x={AXIS_EXAMPLE}")

@@ -29,7 +29,7 @@ from friso.remedies.least import LEAST
 from friso.remedies.method import Advice
 from friso.remedies.relax import RelaxedGoal
 from friso.remedies.search import TriedPoints
-from friso.remedies.settings import RemedySettings
+from friso.remedies.settings import settings
 from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
@@ -402,7 +402,6 @@ def length_from(outcome: RemedyOutcome) -> str:
 
 def _no_relaxation(tuning: Advice) -> str:
     """Say that no relaxation was found, or that none was sought."""
-    settings = RemedySettings.current()
     if tuning.outcomes and not any(outcome.remedy.verifiable for outcome in tuning.outcomes):
         return "Relaxations of the goal were not sought: no cycle verifies a stage with dither."
     return (
@@ -619,7 +618,7 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
     first, last = (number(float(value), unit) for value in ends)
     first = f"{first} (the least tried)" if window.open_below else first
     last = f"{last} (the most tried)" if window.open_above else last
-    near = RemedySettings.current().window_end_share * (window.high - window.low)
+    near = settings.window_end_share * (window.high - window.low)
     gaps = {"lower": window.value - window.low, "upper": window.high - window.value}
     end, gap = min(gaps.items(), key=lambda item: item[1])
     return f"{name}: from {first} to {last}{f', set at its {end} end' if gap < near else ''}"

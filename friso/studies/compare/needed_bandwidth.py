@@ -19,7 +19,7 @@ from friso.stage.controllers import as_tuned
 from friso.stage.rig import AS_BUILT
 from friso.studies.compare.machines import Machines
 from friso.studies.compare.options import linear_flat
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,6 @@ def needed_bandwidth(machines: Machines, locked: Stage, within: float) -> Needed
     The joint is `locked` in the stage, and rest means `within` [m] of the reference. Returns None if no higher
     bandwidth keeps the margin.
     """
-    settings = StudySettings.current()
     tried, count = settings.needed_bandwidths, min(machines.count, settings.needed_machines)
     ideal = locked.replace({table: None for table in AS_BUILT if getattr(locked, table)})
     flat = ideal.flat()

@@ -22,7 +22,7 @@ from friso.stage import Stage
 from friso.stage.controllers import controller_of
 from friso.studies.compare.disturbance_rejection import ADRC, rejecting
 from friso.studies.compare.machines import Machines
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 DEADBAND = 0.5
 """Deadband of the integrator over the tolerance for in position (friso's choice). The integrator pauses while the stage
@@ -213,7 +213,7 @@ def _faster(stage: Stage, situation: Situation) -> Variant:
     if tuned is not None and highest is not None:
         highest = min(highest, 1 / (PER_PERIOD * flat["drive.sample_time"]))
     if highest is not None and highest > present and situation.bandwidth_limit is not None:
-        factors = np.geomspace(1.0, highest / present, StudySettings.current().limit_factors)
+        factors = np.geomspace(1.0, highest / present, settings.limit_factors)
         below = np.flatnonzero(bandwidths_at(stage, factors) <= situation.bandwidth_limit)
         if not below.size:
             raise UnavailableError(f"the limit of {situation.bandwidth_limit:g} Hz is below the present bandwidth")

@@ -28,7 +28,7 @@ from friso.studies.compare.measures import (
 from friso.studies.compare.needed_bandwidth import NeededBandwidth, needed_bandwidth
 from friso.studies.compare.options import OPTIONS, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, own_motion
 
@@ -253,7 +253,7 @@ def compare(
     try:
         for option in tried.options:
             measures = work.runs(option, len(results))
-            may_rest = measures.rests.mean() >= StudySettings.current().followed_share
+            may_rest = measures.rests.mean() >= settings.followed_share
             later = work.longer(option) if may_rest else NOT_FOLLOWED
             loops = results[0].loops if results and not option.kind.own_loop else _loops(machines, option)
             results.append(OptionResult(option, measures, later, loops))

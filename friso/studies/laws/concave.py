@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,6 @@ def knots_of(x: np.ndarray) -> np.ndarray:
 
     The knots are all points but 0, or some of them: closer together near 0, but not closer than the scatter of x.
     """
-    settings = StudySettings.current()
     back = np.minimum(np.diff(x), 0.0)
     places = np.unique(x[x > settings.blurred_scatters * np.sqrt(np.mean(back**2))])
     places = places[
@@ -92,7 +91,6 @@ def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFi
     leaves out one more knot near 0, until fits are far worse than the best. Beyond the points a curve continues with
     its final slope, at most as far again.
     """
-    settings = StudySettings.current()
     knots = knots_of(x)
     rows = _rows(x, y, knots)
     straight, _ = nnls(rows[:, : len(knots)], rows[:, -1], maxiter=settings.fit_steps)
@@ -125,7 +123,6 @@ def _fit(rows: np.ndarray, knots: np.ndarray, first: int, bent: bool, points: in
 
     Without `bent` it has straight parts only. `points` is the number of points, and `end` the value reached.
     """
-    settings = StudySettings.current()
     used = np.arange(2 * len(knots)).reshape(2, -1)[: 1 + bent, first:].ravel()
     weights, away = nnls(rows[:, used], rows[:, -1], maxiter=settings.fit_steps)
     strength = np.zeros((2, len(knots)))

@@ -19,7 +19,7 @@ from friso.stage.section import list_fields, nearest_name, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
 from friso.studies.laws.loops import hysteresis_loop
 from friso.studies.laws.virgin import VirginPoints, read_virgin_curve, with_virgin_curve
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 ELEMENTS = 6
 """Default number of elements, for a law that has several."""
@@ -185,7 +185,6 @@ def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[Mea
 
     The loops have fractions of the deflection at break-away as amplitudes.
     """
-    settings = StudySettings.current()
     deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
     for share in settings.loop_amplitudes:
         old, new = (hysteresis_loop(stage.flat(), share * deflection, speed) for stage in (source, made))
@@ -250,7 +249,6 @@ def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: Vi
 
     The new law is compared with the old curve or, if there are any, the measured points.
     """
-    settings = StudySettings.current()
     if not after.stiffness:
         return MeasuredChange(
             "virgin", "N", before.levels.static, 0.0, float(before.stiffness > 0), settings.curve_error

@@ -12,7 +12,7 @@ from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
 from friso.stage.tables import friction_law
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,6 @@ def hysteresis_loop(flat: Mapping[str, Any], amplitude: float, speed: float) -> 
     `flat` has the stage's keys. A body is moved back and forth by the `amplitude` [m] at a steady `speed` [m/s], from
     rest with unbent bristles.
     """
-    settings = StudySettings.current()
     law, points = flat["friction.model"], settings.points_of_a_loop
     shape = kernel(Dragged(law, friction_law(law).variant(flat)))
     # first a quarter, then whole loops from one end, as triangles with the same speed throughout

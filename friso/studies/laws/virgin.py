@@ -17,7 +17,7 @@ from friso.errors import InputError
 from friso.identification.logs.read import read_table
 from friso.identification.logs.units import unit_factor
 from friso.studies.laws.concave import concave_fits
-from friso.studies.settings import StudySettings
+from friso.studies.settings import settings
 
 EXAMPLE = "displacement [um],force [N]"
 """Example heading of a file with a virgin curve."""
@@ -52,7 +52,6 @@ class VirginPoints:
     @property
     def together(self) -> int:
         """Return the number of neighbouring points in an average."""
-        settings = StudySettings.current()
         wanted = (self.usual / (settings.curve_error * max(self.force))) ** 2
         return int(np.clip(np.ceil(wanted), 1, max(len(self.force) // settings.most_knots, 1)))
 
@@ -68,7 +67,6 @@ def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.
     The file has one channel of each, recognised by their units for this `kind` of axis. Raises InputError or LogError
     for a file without such a curve.
     """
-    settings = StudySettings.current()
     channels = read_table(Path(path)).channels
     displacement, force = (
         _channel(path, [(c.values, unit_factor(c.unit, unit)) for c in channels if c.unit], unit)
@@ -120,7 +118,6 @@ def with_virgin_curve(
     least squares. The curve is straight between few points and smooth through many. Also returns the points with their
     scatter. Raises InputError for points that contradict static friction.
     """
-    settings = StudySettings.current()
     static = measured.levels.static
     end = float(force[-max(len(force) // settings.late_points, 1) :].mean())
     if not settings.reached_friction * static <= end <= static / settings.reached_friction:

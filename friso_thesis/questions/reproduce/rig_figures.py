@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.identification.settings import ExperimentSettings
+from friso.identification.settings import experiment_settings
 from friso.questions.bode.figures import phases
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.figure import (
@@ -140,7 +140,7 @@ def _steps(experiments: Experiments) -> dict[str, Figure]:
     )
     force = (
         Series(log.time, log["force"], "force", VERMILLION, width=0.8),
-        Series(read.time, read.force, f"low-passed at {ExperimentSettings.current().low_pass_of_steps:g} Hz", INK),
+        Series(read.time, read.force, f"low-passed at {experiment_settings.low_pass_of_steps:g} Hz", INK),
     )
     panels = Panel("", _TIME, Axis("Position", "m"), place), Panel("", _TIME, Axis("Force", "N"), force)
     caption = "Steps of 0.3 mm of the simulated rig, its cart fixed: the position is the deflection of the joint."

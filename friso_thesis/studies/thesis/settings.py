@@ -33,3 +33,6 @@ class JudgeSettings(Settings):
 
     exact_share: float = setting(1e-9, "")
     """Largest relative difference between numbers that follow from one equation. Rounding is far smaller."""
+
+
+settings = JudgeSettings.live()

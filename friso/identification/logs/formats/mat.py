@@ -14,7 +14,7 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.confined import content
 from friso.identification.logs.format import FileHead, LogFormat
 from friso.identification.logs.libraries import content_by
-from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.settings import settings
 from friso.identification.logs.units import split_heading
 
 
@@ -87,7 +87,7 @@ def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
         walk.scalars[name] = float(values)
     elif values.ndim == 1 and values.size > 1:
         walk.channels.append(Channel(name, "", values.astype(float), None, name))
-    elif values.ndim == 2 and min(values.shape) <= LogSettings.current().columns_of_a_matrix:
+    elif values.ndim == 2 and min(values.shape) <= settings.columns_of_a_matrix:
         for i, column in enumerate(values.T if values.shape[0] >= values.shape[1] else values):
             label = f"{name}(:,{i + 1})" if values.shape[0] >= values.shape[1] else f"{name}({i + 1},:)"
             walk.channels.append(Channel(label, "", column.astype(float), None, label))

@@ -12,7 +12,7 @@ from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
 from friso.identification.output_error.profile import Profile
-from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.settings import settings
 from friso.quantities import percent
 from friso.questions.identify.estimates import ends_document
 from friso.questions.identify.kind_view import Facts, KindView, PredictionView
@@ -166,7 +166,6 @@ def _prediction_sentence(simulated: SimulatedLog) -> str:
 
     The sentence also says how far the simulation of machines drawn from the estimates lies apart.
     """
-    settings = OutputErrorSettings.current()
     errors, apart = simulated.errors, simulated.apart
     farthest = f"differs from it by {percent(apart)} of the position" if np.isfinite(apart) else "runs away"
     return (

@@ -20,7 +20,7 @@ from friso_thesis.studies.thesis.judges.shares import slow_spells
 from friso_thesis.studies.thesis.linear import FREE
 from friso_thesis.studies.thesis.maps import overlap, trend, trend_text, verdict_table
 from friso_thesis.studies.thesis.reading import about, reading
-from friso_thesis.studies.thesis.settings import JudgeSettings
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import STUDIES
 
 LIGHT, HEAVY = "1.7 kg", "2.5 kg"
@@ -86,7 +86,7 @@ def _margins(stage_file: str) -> dict[float, float]:
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     whole = flat["masses.cart"] + flat["masses.stage"]
-    masses = np.geomspace(flat["masses.stage"], whole, JudgeSettings.current().tuned_masses)
+    masses = np.geomspace(flat["masses.stage"], whole, settings.tuned_masses)
     return {float(mass): settled_margin({**flat, TUNED_MASS: float(mass)}) for mass in masses}
 
 

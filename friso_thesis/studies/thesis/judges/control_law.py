@@ -21,7 +21,7 @@ from friso_thesis.studies.thesis.judges.identified_responses import CONSTANTS
 from friso_thesis.studies.thesis.linear import PLANT
 from friso_thesis.studies.thesis.maps import trend, trend_text, verdict_table
 from friso_thesis.studies.thesis.reading import reading
-from friso_thesis.studies.thesis.settings import JudgeSettings
+from friso_thesis.studies.thesis.settings import settings
 
 S, K_P, TAU_Z, TAU_I, TAU_P = sp.symbols("s k_p tau_z tau_i tau_p", positive=True)
 
@@ -93,7 +93,7 @@ def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
     stuck under a bias force.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
-    reach = 2 * JudgeSettings.current().far_crossover_factor
+    reach = 2 * settings.far_crossover_factor
     ratios = np.geomspace(1 / reach, reach, 25)
     return {float(ratio): settled_margin({**flat, CROSSOVER: float(ratio) * first}) for ratio in ratios}
 
@@ -122,7 +122,7 @@ def judged_crossovers(margins: dict[float, float], first: float, force: float, s
     `margins` has the least modulus margin by crossover, in first eigenfrequencies. `force` and `settling` are the rank
     correlations of force and settling time with the crossover.
     """
-    words, far = reading(), JudgeSettings.current().far_crossover_factor
+    words, far = reading(), settings.far_crossover_factor
     near = {ratio: margin for ratio, margin in margins.items() if 1 / far < ratio < far}
     worst = min(near, key=lambda ratio: near[ratio])
     apart = min(margin for ratio, margin in margins.items() if ratio not in near)
@@ -170,7 +170,7 @@ def motor_constant_cancels(evidence: Evidence) -> Finding:
             Part(
                 "the open loop is the one of the true mass, if the controller is tuned for the mass that a wrong motor "
                 "constant shows, with that motor",
-                max(changes) <= JudgeSettings.current().exact_share,
+                max(changes) <= settings.exact_share,
                 f"it differs by at most {percent(max(changes), 2)} with motors of "
                 f"{' and '.join(f'{1 / factor:.2g}' for factor in CONSTANTS)} of the force assumed, as Fig. 17 and 18 "
                 "ask for",

@@ -13,7 +13,7 @@ from friso.stage import loads
 from friso.studies.samples import Samples
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
-from friso_thesis.studies.thesis.settings import JudgeSettings
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import SEED
 from friso_thesis.studies.thesis.studies import STUDIES
 
@@ -60,7 +60,7 @@ def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]
     spans = {span.key: span for study in studies for span in study.spans}
     links = {key: text for study in studies for key, text in study.links.items()}
     ranges = {key: span.text(2).rsplit(":", 2)[0] + (":log" if span.log else "") for key, span in spans.items()}
-    settings, stage = JudgeSettings.current(), loads(stage_file).replace({"joint.locked": locked})
+    stage = loads(stage_file).replace({"joint.locked": locked})
     samples = Samples(ranges, count=settings.influence_draws, seed=SEED)
     runs = sweep(stage, {}, samples, links, ["peaks", "outcome"], settings.influence_rtol)
     valid = ~runs["outcome"].isin(["invalid", "failed"]).values

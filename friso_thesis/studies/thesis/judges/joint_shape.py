@@ -16,7 +16,7 @@ from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.judges.leaf_springs import STROKE, mechanism
 from friso_thesis.studies.thesis.reading import reading
-from friso_thesis.studies.thesis.settings import JudgeSettings
+from friso_thesis.studies.thesis.settings import settings
 
 _YOUNG, _SPACING = 195e9, 0.06
 """Young's modulus [Pa] of tempered strip, and spacing of the leaves [m]."""
@@ -40,7 +40,7 @@ def shortening_is_negligible(evidence: Evidence) -> Finding:
 
 def judged_shortening(leaves: Evaluation) -> Finding:
     """Judge how nonlinear leaf springs are, and how much they shorten, at full stroke."""
-    share, least = leaves.shortening / leaves.stroke, JudgeSettings.current().negligible_share
+    share, least = leaves.shortening / leaves.stroke, settings.negligible_share
     return Finding(
         (
             Part(
@@ -70,7 +70,7 @@ def _ratios(dimension: str) -> tuple[float, float, float]:
 
     The stiffnesses are those of the drive, along the leaves, and along their width.
     """
-    own, other = evaluated(), evaluated(dimension, JudgeSettings.current().leaf_change_factor)
+    own, other = evaluated(), evaluated(dimension, settings.leaf_change_factor)
     drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)
     return drive, along, across
 
@@ -80,7 +80,7 @@ def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, fl
 
     The stiffnesses are that of the drive, along the leaves, and along their width.
     """
-    words, settings = reading(), JudgeSettings.current()
+    words = reading()
     alike, larger = settings.negligible_share, settings.leaf_change_factor
     drive, along, across = wider
     return Finding(

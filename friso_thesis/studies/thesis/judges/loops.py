@@ -7,7 +7,7 @@ import numpy as np
 from friso.frequency.crossover import WANTED
 from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings as frequency_settings
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import BUILT
@@ -63,12 +63,11 @@ def _beyond(locked: CrossoverLoops) -> str:
 
 def _stable_at_speeds(speeds: Speeds) -> Part:
     """Judge the stability of the loop as Fig. 8 linearises it, about initial cart speeds."""
-    settings = FrequencySettings.current()
     unstable = {"limiter free": speeds.unstable, "touched": speeds.unstable_touched}
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
     steady = f"unstable with {', '.join(where)}" if where else "stable at every speed too"
     if speeds.incurable:
-        highest = f"{settings.highest_crossover / 1e3:g} kHz"
+        highest = f"{frequency_settings.highest_crossover / 1e3:g} kHz"
         steady += f", and in the middle of that range no faster controller up to {highest} is stable"
     return Part(
         "linearised about an initial speed of the cart, the bristles not yet deflected (z = 0), the loop is stable at "
@@ -200,9 +199,8 @@ def _frequencies(frequencies: tuple[float, ...]) -> str:
 
 
 def _hertz(crossover: float | None) -> str:
-    settings = FrequencySettings.current()
     return (
-        f"{settings.highest_crossover / 1e3:g} kHz, the end of the search"
+        f"{frequency_settings.highest_crossover / 1e3:g} kHz, the end of the search"
         if crossover is None
         else f"{crossover:.4g} Hz"
     )

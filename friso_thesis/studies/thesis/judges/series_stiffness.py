@@ -13,7 +13,7 @@ import sympy as sp
 from friso.frequency.stiffness import in_series
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.linear import PLANT, Springs
-from friso_thesis.studies.thesis.settings import JudgeSettings
+from friso_thesis.studies.thesis.settings import settings
 
 K_F, K_J = sp.symbols("k_f k_j", positive=True)
 
@@ -79,7 +79,7 @@ def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
     return Part(
         "Eq. 1 with k_f = sigma_0 is the force over displacement at rest of the plant linearised with a stuck cart, "
         "its limiter free",
-        abs(springs.both / expected - 1) <= JudgeSettings.current().exact_share,
+        abs(springs.both / expected - 1) <= settings.exact_share,
         f"plant {springs.both:.6g} N/m, Eq. 1 {expected:.6g} N/m; eta {eta:.3g}: an error of 1 % in k_f changes k_e by "
         f"{eta / (1 + eta):.2g} %",
     )

@@ -19,7 +19,7 @@ from friso.frequency.family import controller_response, loops, plant_poles, plan
 from friso.frequency.margins import Margins, frequencies, margins, with_resonances
 from friso.frequency.members import concatenate_families, limit_cases
 from friso.frequency.ranges import ranges_below
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings as frequency_settings
 from friso.stage import Stage
 from friso.studies.rig.experiments.frf import SETTINGS as MEASURED_SETTINGS
 
@@ -101,17 +101,18 @@ def _single(flat: Mapping[str, Any]) -> float | None:
     A free joint's limiter is touched, because the controller is tuned for the whole mass. The result is None if the
     loop does so up to the end of the search, and 0 if it does at no crossover.
     """
-    settings = FrequencySettings.current()
     cases = limit_cases(flat)
     member = cases.get("sliding-touched", cases["sliding"])
-    omega = frequencies(flat, member, DriveTiming.of(flat), settings.margin_density, [plant_poles(flat, member)])
+    omega = frequencies(
+        flat, member, DriveTiming.of(flat), frequency_settings.margin_density, [plant_poles(flat, member)]
+    )
     bare = plants(flat, member, omega)[0]
 
     def more(crossover: np.ndarray) -> np.ndarray:
         above = np.array([np.abs(bare * controller_response(_tuned(flat, f), omega)) > 1 for f in crossover])
         return (above[:, 1:] != above[:, :-1]).sum(axis=1) - 1.5
 
-    at = np.geomspace(LOWEST, 0.999 * settings.highest_crossover, STEPS)
+    at = np.geomspace(LOWEST, 0.999 * frequency_settings.highest_crossover, STEPS)
     end = next((high for _, high in ranges_below(at, more)), 0.0)
     return None if end >= at[-1] else end
 

@@ -14,7 +14,7 @@ from friso.frequency.family import plant_poles, plants
 from friso.frequency.margins import frequencies
 from friso.frequency.members import Members, limit_cases
 from friso.frequency.parts import FORCE, STAGE, plant
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 from friso.frequency.stiffness import limiter_in_series
 from friso.stage.tables import friction_law
 
@@ -91,7 +91,6 @@ def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
 
 
 def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
-    settings = FrequencySettings.current()
     omega = frequencies(flat, member, DriveTiming.of(flat), settings.margin_density, [plant_poles(flat, member)])
     resonances, antiresonances = (_peaks(flat, member, omega, sign) for sign in (1, -1))
     at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan))

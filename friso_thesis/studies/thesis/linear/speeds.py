@@ -18,7 +18,7 @@ from friso.frequency.members import Members, member
 from friso.frequency.operating_point import operating_point
 from friso.frequency.parts import DISTURBANCE, cart_states
 from friso.frequency.ranges import Range, ranges_below
-from friso.frequency.settings import FrequencySettings
+from friso.frequency.settings import settings
 
 SPEEDS = 257
 """Number of speeds at which stability is checked before the ends of ranges are located."""
@@ -76,7 +76,6 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
     """Tell whether no faster controller is stable in the middle of at least one unstable range."""
-    settings = FrequencySettings.current()
     crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVERS)
     many = faster(flat, crossover / flat[CROSSOVER])
     middles = [np.full(CROSSOVERS, np.sqrt(low * high)) for low, high in unstable]
