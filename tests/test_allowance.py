@@ -8,7 +8,7 @@ from variants import VARIANTS
 
 from friso.engine.allowance import Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
-from friso.engine.kernel import CALL, OPERATION, STEP, kernel
+from friso.engine.kernel import CALL_WORK, OPERATION_WORK, STEP_WORK, kernel
 from friso.engine.settings import WorkSettings
 from friso.equations.structure import structure
 from friso.hunting import CheckPart
@@ -59,8 +59,8 @@ def test_a_step_is_as_dear_as_the_operations_in_it() -> None:
         rigid,
         source="def step(b, k):\n    b[0] = b[1] * b[2] + exp(b[3])\n\ndef locate(b, k):\n    b[0] = b[1] / b[2]\n",
     )
-    assert STEP < rigid.work < free.work < variational.work < 5 * rigid.work
-    assert bare.work == pytest.approx(STEP + 2 * OPERATION + CALL)
+    assert STEP_WORK < rigid.work < free.work < variational.work < 5 * rigid.work
+    assert bare.work == pytest.approx(STEP_WORK + 2 * OPERATION_WORK + CALL_WORK)
 
 
 def test_runs_beyond_an_allowance_are_refused(locked: Stage) -> None:

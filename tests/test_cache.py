@@ -18,8 +18,8 @@ from filelock import FileLock
 from systems import posix
 
 from friso.engine import building, cache, private, prune
-from friso.engine.cache import DAY
-from friso.engine.seal import LENGTH, SECRET, read_sealed, write_sealed
+from friso.engine.cache import SECONDS_OF_A_DAY
+from friso.engine.seal import SECRET_BYTES, SECRET_FILE, read_sealed, write_sealed
 from friso.engine.settings import BuildSettings
 from friso.platform.helper_process import HelperProcess
 from friso.platform.whole_file import PARTIAL
@@ -134,7 +134,7 @@ def test_permissions_are_mended(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["truncate", "alter", "remove"])
-@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET])
+@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET_FILE])
 def test_a_damaged_file_is_made_again(copied: Path, pattern: str, damage: str) -> None:
     (file,) = (copied / "kernels").glob(pattern)
     content = file.read_bytes()
@@ -186,7 +186,7 @@ def test_what_has_not_been_used_for_long_is_deleted(copied: Path) -> None:
     """When something else is built; and requests for it with it."""
     (old,) = entries(copied)
     (request,) = (copied / "kernels").glob("*.request")
-    aged(BuildSettings().kept_time + DAY, old, request)
+    aged(BuildSettings().kept_time + SECONDS_OF_A_DAY, old, request)
     assert built(copied, "another", STAND_IN_ENDS_WITH=" + 0.0")
     assert not old.exists()
     assert not request.exists()
@@ -197,7 +197,7 @@ def test_what_has_not_been_used_for_long_is_deleted(copied: Path) -> None:
 def test_what_is_used_is_kept(copied: Path) -> None:
     """An entry that was built long ago stays too, because its use is recorded."""
     (old,) = entries(copied)
-    aged(BuildSettings().kept_time + DAY, old, *(copied / "kernels").glob("*.request"))
+    aged(BuildSettings().kept_time + SECONDS_OF_A_DAY, old, *(copied / "kernels").glob("*.request"))
     assert not built(copied)
     assert built(copied, "another", STAND_IN_ENDS_WITH=" + 0.0")
     assert not built(copied)
@@ -209,7 +209,7 @@ def test_there_is_an_end_to_what_is_kept(copied: Path) -> None:
     others = [Path(shutil.copy(first, first.with_name(f"{i}" * 24 + ".kernel"))) for i in range(1, 4)]
     size = first.stat().st_size
     for i, other in enumerate(others, 1):
-        aged(i * 2 * DAY, other)
+        aged(i * 2 * SECONDS_OF_A_DAY, other)
     with BuildSettings(kept_size=int(2.5 * size)).in_use():
         prune.prune(folder)
     assert set(entries(copied)) == {first, others[0]}
@@ -220,7 +220,7 @@ def test_there_is_an_end_to_what_is_kept(copied: Path) -> None:
 
 def test_an_entry_that_is_being_written_is_left_alone(copied: Path) -> None:
     old = entry(copied)
-    aged(BuildSettings().kept_time + DAY, old)
+    aged(BuildSettings().kept_time + SECONDS_OF_A_DAY, old)
     with cache.entry_lock(old):
         prune.prune(copied / "kernels")
         assert old.exists()
@@ -268,7 +268,7 @@ def test_what_killed_processes_left_is_deleted(copied: Path) -> None:
     drafts = [copied / "kernels" / f"{name}.kernel.x{PARTIAL}" for name in ("old", "new")]
     for draft in drafts:
         draft.write_bytes(b"half")
-    aged(2 * DAY, drafts[0])
+    aged(2 * SECONDS_OF_A_DAY, drafts[0])
     prune.prune(copied / "kernels")
     assert [draft.exists() for draft in drafts] == [False, True]
 
@@ -447,7 +447,7 @@ def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pyt
 
 
 @posix
-@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET])
+@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET_FILE])
 def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (file,) = (copied / "kernels").glob(pattern)
     belongs_to_another(file, monkeypatch)
@@ -472,7 +472,7 @@ def test_a_planted_entry_is_not_loaded(copied: Path, tmp_path: Path) -> None:
     """A planted entry is complete, with the right name and mode, but sealed with another secret or as another entry."""
     kernel, other = entry(copied), tmp_path / "elsewhere"
     other.mkdir(mode=0o700)
-    write_sealed(other / kernel.name, kernel.read_bytes()[LENGTH:])
+    write_sealed(other / kernel.name, kernel.read_bytes()[SECRET_BYTES:])
     shutil.copy(other / kernel.name, kernel)
     assert built(copied)
     write_sealed(kernel.with_name("other.kernel"), b"of the same secret")
@@ -483,7 +483,7 @@ def test_a_planted_entry_is_not_loaded(copied: Path, tmp_path: Path) -> None:
 
 @posix
 def test_a_secret_that_others_could_read_is_a_secret_no_more(copied: Path) -> None:
-    secret = copied / "kernels" / SECRET
+    secret = copied / "kernels" / SECRET_FILE
     before = secret.read_bytes()
     secret.chmod(0o644)
     assert built(copied)

@@ -20,12 +20,12 @@ from friso.equations.structure import structure
 from friso.hunting import check_given, judge_many
 from friso.hunting.criteria import (
     ATTRACTED,
-    BAND,
     COUNTED_ABOVE,
     COUNTED_AFTER,
-    DISTINCT,
+    LEAST_PEAK_SEPARATION,
+    LEAST_VALLEY_DEPTH,
     OUTCOMES,
-    SEPARATION,
+    REST_BAND,
     UNDECIDED,
     VERDICTS,
     End,
@@ -152,17 +152,17 @@ def test_a_wider_band_makes_no_swing(swing: float, earlier: float, band: float) 
 
 def test_a_run_that_failed_has_failed_whatever_it_did() -> None:
     swing = 1e-3 * np.sin(TIME * 5)[None]
-    assert outcomes(end_of_traces(TIME, swing, BAND, np.zeros(1, bool))).tolist() == ["failed"]
-    assert outcomes(end_of_traces(TIME, swing, BAND)).tolist() == ["swings"]
-    assert outcomes(end_of_traces(TIME, np.full((1, len(TIME)), np.nan), BAND)).tolist() == ["creeps"]
+    assert outcomes(end_of_traces(TIME, swing, REST_BAND, np.zeros(1, bool))).tolist() == ["failed"]
+    assert outcomes(end_of_traces(TIME, swing, REST_BAND)).tolist() == ["swings"]
+    assert outcomes(end_of_traces(TIME, np.full((1, len(TIME)), np.nan), REST_BAND)).tolist() == ["creeps"]
 
 
 @pytest.mark.parametrize("until", [15.5, 17.0, 18.5])
 def test_a_swing_that_stops_before_the_end_rests(until: float) -> None:
     """However large the last quarter is; one that is going on swings."""
     stopped = np.where(until > TIME, 1e-3 * np.sin(2 * np.pi * TIME), 0.0)[None]
-    assert outcomes(end_of_traces(TIME, stopped, BAND)).tolist() == ["rests"]
-    assert outcomes(end_of_traces(TIME, 1e-3 + stopped, BAND)).tolist() == ["creeps"]
+    assert outcomes(end_of_traces(TIME, stopped, REST_BAND)).tolist() == ["rests"]
+    assert outcomes(end_of_traces(TIME, 1e-3 + stopped, REST_BAND)).tolist() == ["creeps"]
 
 
 def test_a_jump_after_a_decay_is_no_swing() -> None:
@@ -176,8 +176,8 @@ def test_a_jump_after_a_decay_is_no_swing() -> None:
 
 def test_rest_may_be_asked_for_some_time() -> None:
     late = np.where(TIME < 18, 1e-3, 0.0)[None]
-    end = end_of_traces(TIME, late, BAND)
-    assert [outcomes(end, BAND, hold)[0] for hold in (0.0, 1.9, 2.1)] == ["rests", "rests", "creeps"]
+    end = end_of_traces(TIME, late, REST_BAND)
+    assert [outcomes(end, REST_BAND, hold)[0] for hold in (0.0, 1.9, 2.1)] == ["rests", "rests", "creeps"]
 
 
 @pytest.mark.xdist_group("rig")
@@ -192,7 +192,7 @@ def test_outcomes_of_runs_are_those_of_their_traces(rig: Stage) -> None:
         stage = rig.replace({"joint.locked": True, "controller.crossover": f"{crossover} Hz"})
         trace = friso.simulate(stage, rtol=1e-6, sample_time=1e-3)
         deviation = (trace.position - trace.reference).values[None]
-        assert outcomes(end_of_traces(trace.time.values, deviation, BAND), BAND)[0] == words[k]
+        assert outcomes(end_of_traces(trace.time.values, deviation, REST_BAND), REST_BAND)[0] == words[k]
         (alone,) = run_chunks(kernel(structure(stage.flat())), stage.flat(), 1, measuring_options(1e-6))
         assert measure_runs(stage.flat(), alone).outcome[0] == words[k]
 
@@ -206,7 +206,7 @@ def sampled_peaks(values: np.ndarray) -> list[float]:
     spikes = np.zeros(len(values))
     late = maxima[TIME[maxima] >= COUNTED_AFTER]
     spikes[late] = values[late]
-    return TIME[find_peaks(spikes, distance=round(SEPARATION / STEP))[0]].tolist()
+    return TIME[find_peaks(spikes, distance=round(LEAST_PEAK_SEPARATION / STEP))[0]].tolist()
 
 
 waves = st.lists(st.tuples(st.floats(0.1, 4.0), st.floats(1e-5, 1e-3), st.floats(0, 6.28)), min_size=1, max_size=4)
@@ -225,11 +225,11 @@ def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float
 
 def prominent_peaks(values: np.ndarray) -> int:
     """Counted peaks of samples by scipy, of maxima alone that stand out by `DISTINCT`."""
-    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=DISTINCT)
+    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=LEAST_VALLEY_DEPTH)
     spikes = np.zeros(len(values))
     late = maxima[TIME[maxima] >= COUNTED_AFTER]
     spikes[late] = values[late]
-    return len(find_peaks(spikes, distance=round(SEPARATION / STEP))[0])
+    return len(find_peaks(spikes, distance=round(LEAST_PEAK_SEPARATION / STEP))[0])
 
 
 def test_where_a_trace_ends_is_no_peak() -> None:
@@ -255,7 +255,7 @@ def test_distinct_peaks_are_fewer(gaps: list[tuple[float, int]]) -> None:
     for marks in (plain, distinct):
         assert (times[0, marks] >= COUNTED_AFTER).all()
         assert (values[0, marks] > COUNTED_ABOVE).all()
-        assert (np.diff(times[0, marks]) >= SEPARATION - 1e-12).all()
+        assert (np.diff(times[0, marks]) >= LEAST_PEAK_SEPARATION - 1e-12).all()
     assert bool(plain.any()) >= bool(distinct.any())
     if (np.abs(np.diff(values[0])) >= 1e-6).all():
         assert plain.tolist() == distinct.tolist()
@@ -289,7 +289,7 @@ def test_a_batch_of_turning_points_is_all_of_its_runs(gaps: list[tuple[float, fl
 
 
 def test_an_end_is_made_of_arrays_of_one_length() -> None:
-    end = end_of_traces(TIME, np.zeros((3, len(TIME))), BAND)
+    end = end_of_traces(TIME, np.zeros((3, len(TIME))), REST_BAND)
     assert {getattr(end, item.name).shape for item in fields(End)} == {(3,)}
     assert outcomes(replace(end, completed=np.array([True, False, True]))).tolist() == ["rests", "failed", "rests"]
 

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, SEPARATION, distinct_peaks
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, LEAST_PEAK_SEPARATION, distinct_peaks
 from friso.hunting.measures import measure_runs, measuring_options, scan_turning_points
 from friso.hunting.settings import CheckSettings
 from friso.stage import Stage
@@ -66,7 +66,7 @@ def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
     kept: list[int] = []
     tall = [k for k in maxima if times[k] >= COUNTED_AFTER and values[k] > COUNTED_ABOVE]
     for k in sorted(tall, key=lambda k: -values[k]):
-        if all(abs(times[k] - times[other]) >= SEPARATION for other in kept):
+        if all(abs(times[k] - times[other]) >= LEAST_PEAK_SEPARATION for other in kept):
             kept.append(k)
     if len(set(values)) == len(values):
         assert peaks(list(zip(times.tolist(), values.tolist(), strict=True))) == times[sorted(kept)].tolist()

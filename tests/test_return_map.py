@@ -23,7 +23,7 @@ from friso.hunting.margin import NOT_SOUGHT, _Grid, search_bandwidths
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
-from friso.hunting.return_map.landings import RTOL, Landings, find_landings
+from friso.hunting.return_map.landings import LANDING_RTOL, Landings, find_landings
 from friso.hunting.return_map.mapped import gaps
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.settings import EdgeSettings, ToleranceSettings
@@ -333,7 +333,9 @@ def test_the_page_says_what_certain_means_with_the_numbers_of_the_code() -> None
     section = " ".join(page.split("## What *certain* means")[1].split("\n## ")[0].split())
     beyond = ", ".join(f"{100 * (factor - 1):.3g}" for factor in (edge.beyond_edge_factor, *edge.farther_factors[:-1]))
     steps = [f"{100 * (10 ** (1 / n) - 1):.0f}" for n in (SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond)]
-    tolerances = f"{RTOL:.0e} and at {ToleranceSettings().check_rtol_factor * RTOL:.0e}".replace("e-0", "e-")
+    tolerances = f"{LANDING_RTOL:.0e} and at {ToleranceSettings().check_rtol_factor * LANDING_RTOL:.0e}".replace(
+        "e-0", "e-"
+    )
     for text in (
         f"less than {100 * maps.map_scatter_share:g} %",
         f"from {maps.near_starts[0][0]:g} to {maps.far_starts[1]:g} times",

@@ -14,7 +14,7 @@ import friso
 from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.by_hand import ByHand, by_hand
 from benchmarks.truth.draws import draw
-from friso.engine.simulate import RTOL
+from friso.engine.simulate import SIMULATION_RTOL
 from friso.stage import Stage
 
 WITHIN = 1e-2
@@ -35,9 +35,9 @@ def compared(seed: int, number: int, series: str = "stages") -> dict[str, Any]:
     equations = by_hand(stage.flat())
     unit = equations.length
     begin = time.process_time()
-    times, theirs = _scipy(stage, equations, RTOL)
+    times, theirs = _scipy(stage, equations, SIMULATION_RTOL)
     seconds = time.process_time() - begin
-    status, ours = _friso(stage, RTOL, len(times))
+    status, ours = _friso(stage, SIMULATION_RTOL, len(times))
     off = float(np.max(np.abs(ours - theirs)) / unit)
     record = {"number": number, "kind": stage.motion.kind, "status": status, "off": off, "scipy_cpu": seconds}
     if not off < WITHIN:

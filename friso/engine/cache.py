@@ -50,7 +50,7 @@ FOLDER_VARIABLE = "FRISO_CACHE_DIR"
 ENTRY, REQUEST = ".kernel", ".request"
 """Suffixes of files with code, and of files that name such a file."""
 
-DAY = 86_400.0
+SECONDS_OF_A_DAY = 86_400.0
 """Seconds of a day, the interval at which use is recorded."""
 
 
@@ -210,7 +210,7 @@ def _digest(*parts: str) -> str:
 
 def _note_use(*files: Path) -> None:
     for file in files:
-        if time.time() - file.stat().st_mtime > DAY:
+        if time.time() - file.stat().st_mtime > SECONDS_OF_A_DAY:
             os.utime(file)
 
 

@@ -13,10 +13,10 @@ from itertools import combinations
 
 MatrixEntry = tuple[int, int]
 
-MULTIPLY, DIVIDE = 4, 13
+MULTIPLY_LATENCY, DIVIDE_LATENCY = 4, 13
 """Latency of a fused multiply-add and of a division, in cycles, on current x86-64 processors."""
 
-WORK = 0.5
+OPERATION_CLOCKS = 0.5
 """Processor clocks of a vector operation that nothing waits for; two work side by side."""
 
 
@@ -95,23 +95,23 @@ def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], s
     forward, backward = dict.fromkeys(order, 0), dict.fromkeys(order, 0)
     untouched = set(order) - diagonal
     for step, k in enumerate(order):
-        inverse[k] = 0 if k in untouched else ready[k, k] + DIVIDE
+        inverse[k] = 0 if k in untouched else ready[k, k] + DIVIDE_LATENCY
         later = order[step + 1 :]
         for i in (i for i in later if (i, k) in ready):
-            factor = max(ready[i, k], inverse[k]) + MULTIPLY
-            forward[i] = max(forward[i], forward[k]) + MULTIPLY
+            factor = max(ready[i, k], inverse[k]) + MULTIPLY_LATENCY
+            forward[i] = max(forward[i], forward[k]) + MULTIPLY_LATENCY
             operations += 1 + solves
             for j in (j for j in later if (k, j) in ready):
-                ready[i, j] = max(ready.get((i, j), 0), factor, ready[k, j]) + MULTIPLY
+                ready[i, j] = max(ready.get((i, j), 0), factor, ready[k, j]) + MULTIPLY_LATENCY
                 untouched -= {i} if i == j else set()
                 operations += 1
     for step in range(len(order) - 1, -1, -1):
         k = order[step]
-        backward[k] = forward[k] + MULTIPLY
+        backward[k] = forward[k] + MULTIPLY_LATENCY
         for j in (j for j in reversed(order[step + 1 :]) if (k, j) in ready):
-            backward[k] = max(backward[k], backward[j]) + MULTIPLY
+            backward[k] = max(backward[k], backward[j]) + MULTIPLY_LATENCY
             operations += 1 + solves
-    return max(inverse.values()) + solves * max(backward.values()) + WORK * operations
+    return max(inverse.values()) + solves * max(backward.values()) + OPERATION_CLOCKS * operations
 
 
 def _write(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int]) -> Elimination:

@@ -35,7 +35,7 @@ KernelForm = Structure | Imposed | Driven | AsBuilt
 with their real drive."""
 
 
-STEP, OPERATION, CALL = 3.5, 0.0011, 0.126
+STEP_WORK, OPERATION_WORK, CALL_WORK = 3.5, 0.0011, 0.126
 """Work of a step of a run (see `friso.engine.allowance`): a constant, a term for each operation in its source, and one
 for each call of a function such as an exponential. They were fitted on 25 November 2026 to 33 kernels, which take 63 to
 280 ns a step, and match them to 30 %."""
@@ -65,7 +65,7 @@ class Kernel:
         It is equal on every machine.
         """
         step = "".join(_STEP.findall(self.source))
-        return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
+        return STEP_WORK + OPERATION_WORK * len(_OPERATIONS.findall(step)) + CALL_WORK * len(_CALLS.findall(step))
 
     def run(self, queue: np.ndarray, batch: Batch, settings: BatchOptions, results: Results) -> None:
         """Compute this thread's share of a batch: the runs whose numbers it takes from the queue.

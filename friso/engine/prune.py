@@ -8,7 +8,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from friso.engine.cache import DAY, ENTRY, REQUEST, entry_lock, logger
+from friso.engine.cache import ENTRY, REQUEST, SECONDS_OF_A_DAY, entry_lock, logger
 from friso.engine.settings import build_settings
 from friso.platform.whole_file import PARTIAL
 
@@ -24,8 +24,12 @@ def prune(folder: Path) -> None:
             for used, file, length in sorted(_used(folder), reverse=True):
                 size += length
                 age = now - used
-                unfinished = file.suffix == PARTIAL and age > DAY
-                if unfinished or age > build_settings.kept_time or (age > DAY and size > build_settings.kept_size):
+                unfinished = file.suffix == PARTIAL and age > SECONDS_OF_A_DAY
+                if (
+                    unfinished
+                    or age > build_settings.kept_time
+                    or (age > SECONDS_OF_A_DAY and size > build_settings.kept_size)
+                ):
                     _delete(file)
     except (Timeout, OSError) as error:  # another process is pruning, too
         logger.debug("old kernels are left: %s", error)

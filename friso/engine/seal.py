@@ -16,7 +16,7 @@ from filelock import FileLock
 from friso.engine.private import read_private, write_private
 from friso.platform.system import is_open_to_others
 
-SECRET, LENGTH = "secret", 32
+SECRET_FILE, SECRET_BYTES = "secret", 32
 """The file with the secret, and the length [bytes] of it and of an authenticator."""
 
 
@@ -34,7 +34,7 @@ def read_sealed(path: Path) -> bytes | None:
         sealed = read_private(path)
     except OSError:
         return None
-    authenticator, content = sealed[:LENGTH], sealed[LENGTH:]
+    authenticator, content = sealed[:SECRET_BYTES], sealed[SECRET_BYTES:]
     return content if hmac.compare_digest(authenticator, _authenticator(path, content)) else None
 
 
@@ -48,11 +48,11 @@ def _secret(folder: Path) -> bytes:
 
     A new one is made if there is none, or if others can have read or written it.
     """
-    file = folder / SECRET
+    file = folder / SECRET_FILE
     if (secret := _stored(file)) is None:
-        with FileLock(folder / f"{SECRET}.lock", mode=0o600):
+        with FileLock(folder / f"{SECRET_FILE}.lock", mode=0o600):
             if (secret := _stored(file)) is None:  # unless another process has made one meanwhile
-                secret = os.urandom(LENGTH)
+                secret = os.urandom(SECRET_BYTES)
                 write_private(file, secret)
     return secret
 
@@ -63,4 +63,4 @@ def _stored(file: Path) -> bytes | None:
         closed = not is_open_to_others(file.lstat())
     except OSError:
         return None
-    return secret if closed and len(secret) == LENGTH else None
+    return secret if closed and len(secret) == SECRET_BYTES else None

@@ -21,11 +21,11 @@ from friso.version import VERSION
 if TYPE_CHECKING:
     import xarray as xr
 
-RTOL = 1e-9
+SIMULATION_RTOL = 1e-9
 """Default tolerance. A force limit that winds up, and contacts, multiply errors by up to 1e7."""
 
 
-def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None) -> xr.Dataset:
+def simulate(stage: Stage, rtol: float = SIMULATION_RTOL, sample_time: float | None = None) -> xr.Dataset:
     """Simulate a stage's own motion, and return its time response.
 
     Variables over `time` [s] are, as far as the stage has them:

@@ -20,7 +20,7 @@ from friso.engine.tableaus.tableau import Tableau
 from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
 
-THIRDS = (1 / 3, 2 / 3)
+THIRDS_OF_A_STEP = (1 / 3, 2 / 3)
 """Fractions of a step at which kinks (where derivatives jump) are evaluated.
 
 With both ends they fix a cubic.
@@ -368,7 +368,7 @@ class StepWriter:
         """
         clear, rounding = step_settings.kink_hysteresis, step_settings.surface_rounding
         lines = []
-        for point, theta in enumerate(THIRDS):
+        for point, theta in enumerate(THIRDS_OF_A_STEP):
             states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
             lines += [*states, f"t_p{point} = t + {theta!r} * h"]
             lines += self._watched.code(f"_p{point}", self._rename(f"p{point}_", f"t_p{point}"))
@@ -499,7 +499,7 @@ class StepWriter:
         points.
         """
         lines = ["now = start + t_n"]
-        for where, theta in zip(("p0", "p1", "e"), (*THIRDS, 1.0), strict=True):
+        for where, theta in zip(("p0", "p1", "e"), (*THIRDS_OF_A_STEP, 1.0), strict=True):
             reached = f"good & (fraction >= {theta!r})"
             lines.append(f"force_peak = max(force_peak, abs(force_{where})) if {reached} else force_peak")
         return [

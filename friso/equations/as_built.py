@@ -34,7 +34,7 @@ READING, COMMANDED = "reading", "commanded"
 RATED = "seen_rated"
 """Name of the position at the velocity encoder, for a drive that has a separate one."""
 
-OF_RATED = 2**50
+VELOCITY_SEED_OFFSET = 2**50
 """Offset from a drive's random seed to the seed for the noise of its velocity encoder. It is larger than any seed."""
 
 
@@ -195,7 +195,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
         return quantised(noisy, drive["encoder_resolution"])
 
     reading = read("seen", key("drive.seed"))
-    rated = None if loop.rated is None else read(RATED, key("drive.seed") + OF_RATED)
+    rated = None if loop.rated is None else read(RATED, key("drive.seed") + VELOCITY_SEED_OFFSET)
     error = loop.error.xreplace({loop.position: reading})
     acceleration, speed, before = loop.reference_acceleration, loop.reference_velocity, state("error_before")
     ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed

@@ -14,7 +14,7 @@ from friso.stage.transmission import MOTOR_FRICTION, as_friction
 if TYPE_CHECKING:
     import sympy as sp
 
-SLOW = 1e-12
+SLOWEST_SLIDING = 1e-12
 """Speed [m/s] that stands for the slowest possible sliding."""
 
 Force = Callable[[Mapping[str, Any]], Any]
@@ -76,7 +76,7 @@ def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     force = _steady_of(flat["friction.model"], _variant(flat))
     if force is None:
         return np.zeros(()), np.zeros(())
-    forward, back = (np.abs(force({**flat, "velocity": sign * SLOW})) for sign in (1.0, -1.0))
+    forward, back = (np.abs(force({**flat, "velocity": sign * SLOWEST_SLIDING})) for sign in (1.0, -1.0))
     return forward, back
 
 

@@ -54,7 +54,7 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
     return Controller(force, Component(states, (*blocks.kinks, *others), outputs))
 
 
-FAR = 1e9
+FAR_ERROR = 1e9
 """An error [m] beyond all windows and deadbands."""
 
 
@@ -72,7 +72,7 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
         gain = sp.diff(force, x)
         proportional -= gain * sp.diff(integrand, STEADY.velocity)  # the integral of a velocity acts as a displacement
         integral += gain * _per_error(integrand)
-    values: dict[Any, Any] = {STEADY.error: FAR}
+    values: dict[Any, Any] = {STEADY.error: FAR_ERROR}
     values |= {
         symbol: flat[str(symbol)]
         for gain in (proportional, integral)

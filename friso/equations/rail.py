@@ -15,15 +15,15 @@ PHASES, FIELD = int.from_bytes(b"phases"), int.from_bytes(b"field")
 
 HARMONICS = ("first", "second", "third")
 
-CELLS, REACH = 2, 5
+CELLS_PER_LENGTH, KERNEL_REACH = 2, 5
 """Cells of white noise per correlation length, and length of the smoothing kernel to each side in correlation lengths.
-They make the sum over cells differ from the integral by a fraction 2 exp(-(pi CELLS)^2 / 2) = 5e-9 (Poisson's
-summation) and by exp(-REACH^2)."""
+They make the sum over cells differ from the integral by a fraction 2 exp(-(pi CELLS_PER_LENGTH)^2 / 2) = 5e-9
+(Poisson's summation) and by exp(-KERNEL_REACH^2)."""
 
 MOST_CELLS = 10**7
 """Largest number of cells of a rail, for which arrays of some 100 MB are needed."""
 
-BLOCK = 4
+WORDS_PER_COUNT = 4
 """Number of words that Philox gives per count."""
 
 
@@ -56,18 +56,18 @@ def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
     longest waves would also repeat along a rail. Raises InputError for a length that is tiny against the range of
     places.
     """
-    at = places * (CELLS / length)
+    at = places * (CELLS_PER_LENGTH / length)
     cell = np.rint(at)
-    reach = CELLS * REACH
+    reach = CELLS_PER_LENGTH * KERNEL_REACH
     first = int(cell.min()) - reach
     noise = _white(first, int(cell.max()) + reach + 1 - first, seed, length)
-    index, beside = (cell - first).astype(np.intp), (at - cell) / CELLS
+    index, beside = (cell - first).astype(np.intp), (at - cell) / CELLS_PER_LENGTH
     # exp(-(u - k/C)^2) = exp(-u^2) q^k exp(-(k/C)^2) with q = exp(2 u/C): a polynomial of q, by Horner's rule
-    q, field = np.exp(2 * beside / CELLS), np.zeros(len(places))
+    q, field = np.exp(2 * beside / CELLS_PER_LENGTH), np.zeros(len(places))
     for k in range(reach, -reach - 1, -1):
         field *= q
-        field += (noise * np.exp(-((k / CELLS) ** 2)))[index + k]
-    return field * q**-reach * np.exp(-(beside**2)) * (2 / np.pi) ** 0.25 / CELLS**0.5
+        field += (noise * np.exp(-((k / CELLS_PER_LENGTH) ** 2)))[index + k]
+    return field * q**-reach * np.exp(-(beside**2)) * (2 / np.pi) ** 0.25 / CELLS_PER_LENGTH**0.5
 
 
 def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
@@ -80,7 +80,7 @@ def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
         least = length * count / MOST_CELLS
         actual, expected = f"{length:.3g} m", f"at least {least:.3g} m for places that far apart"
         raise InputError("rail.correlation_length", actual, expected, 'correlation_length = "5 mm"')
-    block, skipped = divmod(first, BLOCK)
+    block, skipped = divmod(first, WORDS_PER_COUNT)
     words = np.random.Philox(key=[seed, FIELD], counter=block % 2**256).random_raw(skipped + count)[skipped:]
     return ndtri(((words >> np.uint64(11)) + 0.5) * 2.0**-53)
 

@@ -120,16 +120,16 @@ def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
         sp.lambdify([symbol, *others], part, [{"sine": lambda turn: mp.sin(2 * mp.pi * turn)}, "mpmath"])
         for part in (kink.surface.subs(symbol, 0), sp.diff(kink.surface, symbol), gap)
     )
-    with mp.workdps(DIGITS):
-        for n in range(1, TRIED + 1):
+    with mp.workdps(TESTED_DECIMALS):
+        for n in range(1, TRIED_POINTS + 1):
             point = [mp.mpf(int(prime(n + k)) % 97) / (50 + n) + 1 for k in range(1, len(others) + 1)]
             if not (steep := slope(0, *point)):
                 return False
             at = -rest(0, *point) / steep
-            if abs(difference(at, *point)) > NOTHING:
+            if abs(difference(at, *point)) > ZERO_BOUND:
                 return False
     return True
 
 
-TRIED, DIGITS, NOTHING = 3, 50, 1e-25
+TRIED_POINTS, TESTED_DECIMALS, ZERO_BOUND = 3, 50, 1e-25
 """Number of points at which a difference is tested, decimals of its value, and the bound below which it counts as 0."""

@@ -27,8 +27,7 @@ from friso.hunting.boundary import (
 )
 from friso.hunting.cases import LONG_RUN_RTOL, Case, Solver, check, check_given, needed_kernels
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL as CYCLE_RTOL
-from friso.hunting.cycle.find import Cycles, find_cycles
+from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, find_cycles
 from friso.hunting.cycle.hunting import DITHERS, Cycle, Hunting, Swing, cannot_hunt, hunting
 from friso.hunting.cycle.multipliers import Multipliers, multipliers
 from friso.hunting.cycle.rest import stuck, wait

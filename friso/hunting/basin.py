@@ -14,7 +14,7 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner, standing, without_motion
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
-from friso.hunting.attractors.rounds import RTOL, TIGHT, typical_period
+from friso.hunting.attractors.rounds import SURVEY_RTOL, TIGHT_SURVEY_RTOL, typical_period
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import pushed
@@ -114,7 +114,7 @@ def _ends_closed(
     left, until, leg = np.arange(count), np.minimum(early, lasting), np.max(last_corner(flat)) + early
     while left.size:
         part = some_of(flat, left), leg[left], last[left], starts
-        swing[left], completed[left], starts = _last_swing(*part, RTOL, **options)
+        swing[left], completed[left], starts = _last_swing(*part, SURVEY_RTOL, **options)
         final = until[left] >= lasting[left]
         close = np.abs(swing[left] / size[left] - 1) <= basin_settings.caught_swing_share
         ends[left] = completed[left] & np.where(final, lasts(swing[left], 0.0, size[left] / 4), close)
@@ -136,13 +136,13 @@ def _ends_observed(
     """
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
     swing, completed, _ = _last_swing(
-        flat, after, basin_settings.judged_periods * target.period, starts, TIGHT, **options
+        flat, after, basin_settings.judged_periods * target.period, starts, TIGHT_SURVEY_RTOL, **options
     )
     ends = completed & lasts(swing, 0.0, np.broadcast_to(target.amplitude, (count,)) / 2)
     if (others := np.flatnonzero(completed & ~ends)).size:
         begin = None if starts is None else starts[others]
         part = some_of(flat, others), after[others], basin_settings.resting_end_share * after[others]
-        swing[others], completed[others], _ = _last_swing(*part, begin, TIGHT, **options)
+        swing[others], completed[others], _ = _last_swing(*part, begin, TIGHT_SURVEY_RTOL, **options)
     return ends, completed, swing
 
 
@@ -227,7 +227,7 @@ def displacements_that_run_away(stage: Stage) -> Kick:
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Run the stage from displacements [m]; return which diverge, and which are certain, (n,)."""
-        options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
+        options = RunOptions(rtol=SURVEY_RTOL, record_from=np.inf, least_swing=np.inf)
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed
 

@@ -14,7 +14,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.engine.side_by_side import side_by_side
-from friso.engine.simulate import RTOL, sampled_outputs, simulate
+from friso.engine.simulate import SIMULATION_RTOL, sampled_outputs, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.motion import size, stands
 from friso.equations.structure import structure
@@ -142,7 +142,7 @@ LONG_RUN_RTOL = ToleranceSettings().long_run_rtol
 
 def check(
     stage: Stage,
-    rtol: float = RTOL,
+    rtol: float = SIMULATION_RTOL,
     traces: bool = False,
     progress: Progress = silent,
     margins: bool = True,
@@ -198,7 +198,7 @@ def _share(stage: Stage) -> float:
     return check_settings.free_work_share if free else 1 - check_settings.free_work_share
 
 
-def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -> Case:
+def check_given(stage: Stage, rtol: float = SIMULATION_RTOL, progress: Progress = silent) -> Case:
     """Check a stage with its joint as in its file, without its margin in static friction.
 
     `progress` is called as parts end. Raises InputError for an unusable `rtol`.

@@ -20,7 +20,7 @@ from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.criteria import verdicts
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL
+from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.cycle.hunting import surely_surveyed, why_not
 from friso.hunting.loop import unstable_among, winds_up_at_a_limit
 from friso.hunting.measures import measuring_options
@@ -97,7 +97,7 @@ def kernels_to_judge(form: Structure) -> set[KernelRequest]:
 def find_attractors(
     flat: Mapping[str, Any],
     count: int,
-    rtol: float = RTOL,
+    rtol: float = CYCLE_RTOL,
     close_orbits: bool = True,
     threads: int | None = None,
     cancel: np.ndarray | None = None,

@@ -16,17 +16,17 @@ from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import Stand, ends_evenly, last_corner, stands
 from friso.equations.structure import structure
-from friso.hunting.criteria.run_outcome import BAND, End, end_of_traces, last_outside, outcomes, swings_on
+from friso.hunting.criteria.run_outcome import REST_BAND, End, end_of_traces, last_outside, outcomes, swings_on
 from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
-from friso.hunting.turning import COUNTED_AFTER, DISTINCT, HALF, WINDOW, zigzag
+from friso.hunting.turning import COUNTED_AFTER, LAST_HALF, LAST_QUARTER, LEAST_VALLEY_DEPTH, zigzag
 from friso.hunting.turns import Turns, scan_turning_points
 from friso.stage import Stage
 
 __all__ = [
     "BANDS",
-    "HALF",
+    "LAST_HALF",
+    "LAST_QUARTER",
     "RESOLVED",
-    "WINDOW",
     "Measures",
     "SampledSolver",
     "Turns",
@@ -41,10 +41,10 @@ __all__ = [
     "zigzag",
 ]
 
-BANDS = (1e-6, BAND)
+BANDS = (1e-6, REST_BAND)
 """Bands about the reference into which a stage settles [m]."""
 
-RESOLVED = DISTINCT / 4
+RESOLVED = LEAST_VALLEY_DEPTH / 4
 """Size [m] below which swings are skipped when turning points are stored; peaks, periods and outcomes need larger
 ones."""
 
@@ -89,7 +89,7 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
     return RunOptions(
         rtol=rtol,
         bands=BANDS,
-        window=WINDOW,
+        window=LAST_QUARTER,
         record_from=0.8 * COUNTED_AFTER,
         least_swing=RESOLVED,
         threads=threads,
@@ -165,7 +165,7 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
         period=finished(np.where(swings_on(end, 0.0), turns.period, np.nan)),
         settling_time=(finished(settling[0]), finished(settling[1])),
         in_the_end=(finished(in_the_end[0]), finished(in_the_end[1])),
-        outcome=outcomes(end, BAND, passing),
+        outcome=outcomes(end, REST_BAND, passing),
         largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,
         steps=runs.statistic("attempted").astype(np.int64),
@@ -184,7 +184,7 @@ def measure_traces(
     `solver` says which runs were completed.
     """
     done, places = solver.status == Status.DONE, [*stands(flat)]
-    end = end_of_traces(time, deviation, BAND, done, corner_of(flat))
+    end = end_of_traces(time, deviation, REST_BAND, done, corner_of(flat))
     samples, swings = np.full(len(deviation), len(time)), np.nan_to_num(end.swing)
     values = np.ascontiguousarray(deviation)
     turns = scan_turning_points(np.tile(time, (len(deviation), 1)), values, samples, swings, end.ended)
@@ -209,7 +209,7 @@ def measure_traces(
         period=np.where(done & swings_on(end, 0.0), turns.period, np.nan),
         settling_time=(settled(places, 0), settled(places, 1)),
         in_the_end=(settled(places[-1:], 0), settled(places[-1:], 1)),
-        outcome=outcomes(end, BAND, passing),
+        outcome=outcomes(end, REST_BAND, passing),
         largest_force=np.where(done, np.abs(force).max(axis=1), np.nan),
         status=solver.status,
         steps=solver.steps,

@@ -16,13 +16,13 @@ from friso.equations.motion import last_corner, rests
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors.rounds import loose_from
 from friso.hunting.attractors.settings import settings
-from friso.hunting.criteria import BAND, COUNTED_ABOVE, lasts
+from friso.hunting.criteria import COUNTED_ABOVE, REST_BAND, lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
 from friso.hunting.measures import Measures, measure_runs
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import check_settings
-from friso.hunting.turning import HALF, WINDOW
+from friso.hunting.turning import LAST_HALF, LAST_QUARTER
 
 
 @dataclass(frozen=True)
@@ -97,10 +97,10 @@ class FollowedMotions:
         waits = check_settings.least_followed_waits * wait(stages, loose_from(stages))
         lasts_for = np.maximum(np.maximum(check_settings.least_followed_time, flat["motion.duration"]), waits)
         long = {**flat, "motion.duration": lasts_for + last_corner(flat)}
-        last = run_motions(long, count, replace(run_options, window=WINDOW))
+        last = run_motions(long, count, replace(run_options, window=LAST_QUARTER))
         done = last.completed.copy()
         if (swinging := np.flatnonzero(done & (last.swing > COUNTED_ABOVE))).size:
-            half = run_motions(some_of(long, swinging), swinging.size, replace(run_options, window=HALF))
+            half = run_motions(some_of(long, swinging), swinging.size, replace(run_options, window=LAST_HALF))
             done[swinging] = half.completed
             swing = last.swing[swinging]
             self.steady[which[swinging]] = half.completed & lasts(
@@ -127,7 +127,7 @@ def followed_motions(
     rest.moving[:] = ~(rests & (motions.swing <= resting(flat, count)))
     if (moving := np.flatnonzero(rest.moving)).size:
         # turning points that may leave the band at the end
-        late = replace(run_options, record_from=np.inf, least_swing=BAND / 2)
+        late = replace(run_options, record_from=np.inf, least_swing=REST_BAND / 2)
         try:
             rest.follow(moving, some_of(flat, moving), moving.size, late)
         except Exhausted:

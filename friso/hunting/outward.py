@@ -20,7 +20,7 @@ from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, described, kept
+from friso.hunting.cycle.find import CYCLE_RTOL, described, kept
 from friso.hunting.cycle.shooting import close
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import has_a_map, what_attracts
@@ -239,11 +239,11 @@ class EdgeSearch:
         states, times = at.states, at.times
         for factor in np.geomspace(end, beyond, edge_settings.past_end_steps + 1)[1:]:
             there = self._stages(np.array([factor]))
-            before, at = at, close(there, states, times, at.sign, RTOL, at.swings)
+            before, at = at, close(there, states, times, at.sign, CYCLE_RTOL, at.swings)
             if not (at.closed & kept(there, at, before.states[:, stages.sticking]))[0]:
                 return ()
             states, times = 2 * at.states - before.states, 2 * at.times - before.times
-        return tuple(of_cycles(np.zeros(1, np.int64), described(stages, at, RTOL), stages.sticking))
+        return tuple(of_cycles(np.zeros(1, np.int64), described(stages, at, CYCLE_RTOL), stages.sticking))
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         """Return the stage with its bandwidth multiplied by factors."""

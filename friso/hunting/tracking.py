@@ -13,8 +13,8 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations import motion
 from friso.equations.structure import structure
-from friso.hunting.criteria import BAND, settling_of_traces
-from friso.hunting.measures import BANDS, WINDOW, measuring_options
+from friso.hunting.criteria import REST_BAND, settling_of_traces
+from friso.hunting.measures import BANDS, LAST_QUARTER, measuring_options
 from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
 from friso.stage.motion import DURATION, motion_of
@@ -37,7 +37,7 @@ class Dwell:
     @property
     def slowness(self) -> float:
         """Return the time of settling within 10 um [s], infinite if the stage does not settle."""
-        time = self.settling[BAND]
+        time = self.settling[REST_BAND]
         return np.inf if time is None else time
 
 
@@ -134,7 +134,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
     flat = stage.flat()
     shape, period = kernel(structure(flat)), motion_of(flat).period(flat)
     start, multiplier = None, None
-    begins, ends = WINDOW * flat[DURATION], flat[DURATION]
+    begins, ends = LAST_QUARTER * flat[DURATION], flat[DURATION]
     end = ends
     if period is not None and period <= end and (orbit := _closed(shape, flat, period, rtol)) is not None:
         start, multiplier = orbit

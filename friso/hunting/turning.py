@@ -12,14 +12,14 @@ COUNTED_AFTER = 10.0
 COUNTED_ABOVE = 1e-4
 """Height above the reference from which peaks count [m] (thesis, Sec. 3.2.2)."""
 
-SEPARATION = 0.5
+LEAST_PEAK_SEPARATION = 0.5
 """Shortest time between counted peaks [s] (thesis, Sec. 3.2.2)."""
 
-DISTINCT = 1e-6
+LEAST_VALLEY_DEPTH = 1e-6
 """Least depth [m] of the valleys on both sides of a distinct peak, friso's choice. Shallower ripple is noise of the
 solver or of an encoder."""
 
-WINDOW, HALF = 0.75, 0.5
+LAST_QUARTER, LAST_HALF = 0.75, 0.5
 """Fractions of the run after which its last quarter and its last half begin."""
 
 
@@ -74,7 +74,7 @@ def zigzag(values, count, least, kinds):
 
 
 def keep_tallest(times, values, count, kinds, peaks):
-    """Mark counted peaks: late and tall maxima, of which the tallest within `SEPARATION` counts.
+    """Mark counted peaks: late and tall maxima, of which the tallest within `LEAST_PEAK_SEPARATION` counts.
 
     Maxima are marked in `kinds`, which is overwritten. MATLAB's findpeaks does so with MinPeakDistance.
     """
@@ -90,7 +90,7 @@ def keep_tallest(times, values, count, kinds, peaks):
             return
         peaks[tallest] = True
         for k in range(count):
-            if abs(times[k] - times[tallest]) < SEPARATION:
+            if abs(times[k] - times[tallest]) < LEAST_PEAK_SEPARATION:
                 kinds[k] = 0
 
 
@@ -105,7 +105,7 @@ def mean_period(times, count, kinds, ended):
     for k in range(count):
         if kinds[k] != 0:
             last = k
-    for share in (WINDOW, HALF):
+    for share in (LAST_QUARTER, LAST_HALF):
         for kind in (1, -1):
             number, first, before, latest = 0, 0.0, 0.0, 0.0
             for k in range(count):
@@ -115,7 +115,7 @@ def mean_period(times, count, kinds, ended):
                     before, latest = latest, times[k]
                     number += 1
             if number > 1:
-                return (latest - first) / (number - 1) if share == WINDOW else latest - before
+                return (latest - first) / (number - 1) if share == LAST_QUARTER else latest - before
     return np.nan
 
 
@@ -155,9 +155,9 @@ def run(times, values, counts, swing, ended, since, kinds, peaks, distinct, peri
         if tall:
             maxima(values[j], count, kinds)
             keep_tallest(times[j], values[j], count, kinds, peaks[j])
-            zigzag(values[j], count, DISTINCT, kinds)
+            zigzag(values[j], count, LEAST_VALLEY_DEPTH, kinds)
             keep_tallest(times[j], values[j], count, kinds, distinct[j])
-        if swing[j] > DISTINCT:
+        if swing[j] > LEAST_VALLEY_DEPTH:
             zigzag(values[j], count, swing[j] / 2, kinds)
             period[j] = mean_period(times[j], count, kinds, ended[j])
             turned[j] = last_turn(times[j], count, kinds)

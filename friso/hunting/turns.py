@@ -15,7 +15,7 @@ from friso.engine.machine_code import Loops, load_object
 from friso.equations import motion
 from friso.hunting import turning
 from friso.hunting.settings import check_settings
-from friso.hunting.turning import HALF
+from friso.hunting.turning import LAST_HALF
 
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
 _COUNTS, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
@@ -56,7 +56,7 @@ def scan_turning_points(
     `corner` [s] the last time at which its reference moved.
     """
     runs = len(counts)
-    since = motion.last_part(HALF, ended, corner)
+    since = motion.last_part(LAST_HALF, ended, corner)
     arrays = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended, since)))
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))

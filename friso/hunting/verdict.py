@@ -12,7 +12,7 @@ from friso.engine.allowance import Exhausted, allowance
 from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner
 from friso.hunting.attractors import Target
-from friso.hunting.attractors.rounds import RTOL
+from friso.hunting.attractors.rounds import SURVEY_RTOL
 from friso.hunting.attractors.settings import settings
 from friso.hunting.basin import (
     Kick,
@@ -339,7 +339,7 @@ def _runs_away(stage: Stage, target: Target) -> bool:
     """
     flat = stage.flat()
     longer = {**flat, "motion.duration": float(np.max(last_corner(flat)) + target.lasting)}
-    return bool(run_motions(longer, 1, measuring_options(RTOL)).away[0])
+    return bool(run_motions(longer, 1, measuring_options(SURVEY_RTOL)).away[0])
 
 
 def _widest(attraction: Hunting) -> float:

@@ -16,7 +16,7 @@ from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.rounds import typical_period
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families
 from friso.hunting.cycle.held import held_beside
 from friso.hunting.loop import winds_up_at_a_limit
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
@@ -35,7 +35,7 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def what_attracts(
     stages: Ensemble,
-    rtol: float = RTOL,
+    rtol: float = CYCLE_RTOL,
     distances: np.ndarray | None = None,
     confirm: Sequence[int] = (),
     suggested: tuple[Cycles, ...] = (),
@@ -70,7 +70,7 @@ def what_attracts(
     return Attractors(motions, decided, typical_period(stages), (), nothing, decided, nothing)
 
 
-def attractors_beside(stages: Ensemble, cycles: tuple[Cycles, ...], rtol: float = RTOL) -> Attractors:
+def attractors_beside(stages: Ensemble, cycles: tuple[Cycles, ...], rtol: float = CYCLE_RTOL) -> Attractors:
     """Find the attractors of stages whose `families` of cycles are known, by return maps or by simulation.
 
     Orbits are closed to the relative tolerance `rtol`.
@@ -182,7 +182,7 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
 
 
 @np.errstate(all="ignore")
-def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -> Attractors:
+def surveyed_roughly(stages: Ensemble, rtol: float = CYCLE_RTOL, close: bool = True) -> Attractors:
     """Find at least one apparent attractor of each stage that may hunt, if it has one.
 
     This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. A coarse return map

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.tolerance import TIGHTEST, checked_rtol
+from friso.engine.tolerance import TIGHTEST_RTOL, checked_rtol
 from friso.errors import InputError
 from friso.studies.cells import INFERRED, allowed_cells
 from friso.studies.execute import Crew, run_scattered
@@ -41,12 +41,12 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
     cannot be tightened. It is also empty if the attributes of the runs state the counts already.
     """
     if (
-        share in (0, runs.attrs.get("verified_share")) or study.rtol < 10 * TIGHTEST
+        share in (0, runs.attrs.get("verified_share")) or study.rtol < 10 * TIGHTEST_RTOL
     ):  # no tighter tolerance is available
         return {}
     count, rtol = (
         max(settings.least_verified, round(share * study.cells)),
-        max(study.rtol / settings.tighter_factor, TIGHTEST),
+        max(study.rtol / settings.tighter_factor, TIGHTEST_RTOL),
     )
     tighter = replace(study, rtol=rtol, metrics=in_order(()))
 

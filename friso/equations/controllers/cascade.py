@@ -34,7 +34,7 @@ FEEDFORWARD = (
 )
 
 
-SLOWER = 4.0
+INTEGRAL_TIME_FACTOR = 4.0
 """Initial integral time of a loop, in units of 1/kv."""
 
 
@@ -149,7 +149,7 @@ class Cascade(ControllerSection):
         elif outer and inner:
             listed["integral in the velocity loop alone"] = {POSITION_TIME: None}
         else:
-            listed["with an integral"] = {VELOCITY_TIME: SLOWER / flat[cls.key("kv")]}
+            listed["with an integral"] = {VELOCITY_TIME: INTEGRAL_TIME_FACTOR / flat[cls.key("kv")]}
         if inner:
             other = "error" if flat[PROPORTIONAL_ON] == "measurement" else "measurement"
             named = {"measurement": "pseudo-derivative feedback", "error": "proportional part on the error"}

@@ -23,7 +23,7 @@ KP, KI, KD, TAU, DERIVATIVE_ON = (f"controller.{name}" for name in ("kp", "ki", 
 FEEDFORWARD = ("viscous_feedforward", "acceleration_feedforward", "coulomb_feedforward", "jerk_feedforward")
 
 
-SLOWER = 4.0
+INTEGRAL_TIME_FACTOR = 4.0
 """Initial integral time, in units of the derivative time."""
 
 
@@ -123,7 +123,7 @@ class PidGains(Pid):
         if flat[KI] and flat[KP]:
             listed["no integral"] = {KI: None}
         elif flat[KP] and flat[KD]:
-            listed["with an integral"] = {KI: flat[KP] ** 2 / flat[KD] / SLOWER}
+            listed["with an integral"] = {KI: flat[KP] ** 2 / flat[KD] / INTEGRAL_TIME_FACTOR}
         return listed
 
     @classmethod

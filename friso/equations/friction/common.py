@@ -204,7 +204,7 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp
     exponent = curve.exponent
     ratio = velocity / key("friction.stribeck_velocity")
     if exponent is None:
-        power = (ratio**2 + TINY) ** (key("friction.stribeck_exponent") / 2)
+        power = (ratio**2 + TINY_SQUARE) ** (key("friction.stribeck_exponent") / 2)
     else:
         power = ratio**exponent if exponent % 2 == 0 else (sign * ratio) ** exponent
     force = coulomb + (static - coulomb) * exp(-power)
@@ -220,12 +220,12 @@ def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Exp
 
     from friso.equations.component import key
 
-    speed = sqrt(velocity**2 + TINY)
+    speed = sqrt(velocity**2 + TINY_SQUARE)
     force = stribeck_level(speed, Integer(1), curve._replace(asymmetric=False))
     return force * (1 + key("friction.asymmetry") * velocity / speed) if curve.asymmetric else force
 
 
-TINY = 1e-60
+TINY_SQUARE = 1e-60
 """Small number that keeps roots and powers of squares differentiable at 0."""
 
 

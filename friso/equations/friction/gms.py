@@ -17,7 +17,7 @@ from friso.equations.conditions import friction_level
 from friso.equations.friction.common import (
     COULOMB_BELOW_STATIC,
     STEADY_LOAD,
-    TINY,
+    TINY_SQUARE,
     Friction,
     StribeckCurve,
     StribeckSection,
@@ -41,13 +41,13 @@ if TYPE_CHECKING:
 
 STIFFNESS, SHARE, DAMPING = (f"friction.element_{name}" for name in ("stiffness", "share", "damping"))
 
-AT = 1 - 1e-9
+SLIPS_AT = 1 - 1e-9
 """Fraction of its limit from which a pulled element counts as slipping at the start of a run."""
 
-MOST = 12
+MOST_ELEMENTS = 12
 """Largest number of elements."""
 
-FITTED, EVEN = 4, 1.5
+FITTED_ELEMENTS, SPACING_EXPONENT = 4, 1.5
 """Number of elements fitted to a record, and the exponent that spaces their tangents on the virgin curve."""
 
 
@@ -82,10 +82,13 @@ class GeneralisedMaxwellSlip(StribeckSection):
     """
 
     model: Literal["gms"]
-    element_stiffness: Annotated[Values, Several(Quantity("N/m", positive, "70 N/mm"), ("70 N/mm", "30 N/mm"), 1, MOST)]
-    element_share: Annotated[Values, Several(Number(positive, "0.5"), ("0.4", "0.6"), 1, MOST)]
+    element_stiffness: Annotated[
+        Values, Several(Quantity("N/m", positive, "70 N/mm"), ("70 N/mm", "30 N/mm"), 1, MOST_ELEMENTS)
+    ]
+    element_share: Annotated[Values, Several(Number(positive, "0.5"), ("0.4", "0.6"), 1, MOST_ELEMENTS)]
     element_damping: Annotated[
-        Values | None, Several(Quantity("N*s/m", non_negative, "100 N*s/m"), ("220 N*s/m", "95 N*s/m"), 1, MOST)
+        Values | None,
+        Several(Quantity("N*s/m", non_negative, "100 N*s/m"), ("220 N*s/m", "95 N*s/m"), 1, MOST_ELEMENTS),
     ] = None
     """Damping of the rate of each element's deflection (micro-damping); without it there is none."""
     attraction: Annotated[Value, Quantity("N/s", positive, "1000 N/s")]
@@ -136,7 +139,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
             z, stiffness, share = state(f"deflection_{number}"), key(f"{STIFFNESS}.{number}"), key(f"{SHARE}.{number}")
             scale = share * static / stiffness
             limit = share * level / stiffness
-            pulled_on = And(z * velocity > 0, z**2 >= (AT * share * level_at_start / stiffness) ** 2)
+            pulled_on = And(z * velocity > 0, z**2 >= (SLIPS_AT * share * level_at_start / stiffness) ** 2)
             slip = Switch(
                 f"slip_{number}",
                 enter=forward.sign * z - limit,
@@ -145,7 +148,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
                 # the limit on either side, except for the squared rounding error
                 entered={z: (z + limit**2 / z) / 2},
             )
-            side = z / sqrt(z**2 + TINY)  # a slipping element is bent along the motion
+            side = z / sqrt(z**2 + TINY_SQUARE)  # a slipping element is bent along the motion
             slipping = attraction / stiffness * (share * side - stiffness * z / level)
             rate = velocity * (1 - slip.beyond) + slipping * slip.beyond
             states.append(State(z, rate, "m", scale, Role.BRISTLE))
@@ -182,13 +185,13 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {
         "rolling_exponent": (0.1, 1.0, 4.0),
-        **{f"stiffer_{n}": (0.1, 1.0, 10.0) for n in range(2, FITTED + 1)},
+        **{f"stiffer_{n}": (0.1, 1.0, 10.0) for n in range(2, FITTED_ELEMENTS + 1)},
         "lag": (0.01, 1.0, 100.0),
     }
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return `FITTED` elements on a virgin curve of rolling friction, at evenly spaced slopes.
+        """Return `FITTED_ELEMENTS` elements on a virgin curve of rolling friction, at evenly spaced slopes.
 
         `shape` has the exponent of the rolling friction, and factors. For each element but the first, one factor makes
         the element stiffer. The factor "lag" lengthens the lag of friction, relative to LuGre at the Stribeck velocity.
@@ -197,8 +200,8 @@ class GeneralisedMaxwellSlip(StribeckSection):
         way = virgin_displacements(levels.static, stiffness)
         curve = power_law(levels.static, stiffness, shape["rolling_exponent"], way)
         whole = MeasuredFriction(levels, stiffness, measured.damping, way, curve)
-        springs, slips = _tangents(whole, (1 - np.arange(FITTED + 1) / FITTED) ** EVEN)
-        springs = springs * [1.0, *(shape[f"stiffer_{n}"] for n in range(2, FITTED + 1))]
+        springs, slips = _tangents(whole, (1 - np.arange(FITTED_ELEMENTS + 1) / FITTED_ELEMENTS) ** SPACING_EXPONENT)
+        springs = springs * [1.0, *(shape[f"stiffer_{n}"] for n in range(2, FITTED_ELEMENTS + 1))]
         springs *= stiffness / springs.sum()
         slips *= levels.static / (springs @ slips)
         return _elements_with(whole, springs, slips) | {
@@ -245,10 +248,10 @@ def _elements(flat: Mapping[str, Any], key: str) -> np.ndarray:
     return np.array([flat[name] for name in element_keys(flat, key)])
 
 
-SAME = 1e-6
+STRAIGHT_CURVE = 1e-6
 """Difference of slopes, relative to the first, below which a virgin curve counts as straight."""
 
-POWERS = np.linspace(0.6, 4.0, 69)
+TRIED_EXPONENTS = np.linspace(0.6, 4.0, 69)
 """Exponents to try for spacing the tangents along the virgin curve."""
 
 
@@ -259,10 +262,10 @@ def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.n
     elements form the polygon of tangents with the least error.
     """
     slopes = np.append(np.diff(measured.force) / np.diff(measured.displacement), 0.0)
-    corners = np.flatnonzero(-np.diff(slopes) > SAME * measured.stiffness)
+    corners = np.flatnonzero(-np.diff(slopes) > STRAIGHT_CURVE * measured.stiffness)
     if len(corners) <= elements:
         return -np.diff(slopes[[0, *corners + 1]]), measured.displacement[corners + 1]
-    tried = [_tangents(measured, (1 - np.arange(elements + 1) / elements) ** power) for power in POWERS]
+    tried = [_tangents(measured, (1 - np.arange(elements + 1) / elements) ** power) for power in TRIED_EXPONENTS]
     curves = [np.minimum(k * measured.displacement[:, None], k * x).sum(axis=1) for k, x in tried]
     return tried[int(np.argmin([measured.misfit(curve) for curve in curves]))]
 

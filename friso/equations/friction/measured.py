@@ -14,11 +14,11 @@ import numpy as np
 
 from friso.equations.conditions import LEVELS, level_under_conditions
 
-REACH, POINTS, FURTHER = 60.0, 2000, 200
+CURVE_LENGTH, CURVE_POINTS, LONGER_CURVE_POINTS = 60.0, 2000, 200
 """Length of virgin curves, and numbers of their points. The length is in units of the deflection that static friction
 causes at the first stiffness. Points are denser near rest. The last number is for points on a longer curve."""
 
-NEAR = 1e-6
+LEAST_POINT_DISTANCE = 1e-6
 """Distance between points, relative to the last, below which no slope is computed."""
 
 
@@ -81,13 +81,13 @@ def virgin_displacements(static: float, stiffness: float, corners: Sequence[floa
     `corners` if that lies farther. They include all `corners`, the displacements at which a curve made of straight
     pieces bends.
     """
-    usual, corners = static / stiffness * REACH, np.unique(np.append(0.0, corners))
-    places = usual * np.linspace(0.0, 1.0, POINTS) ** 2
+    usual, corners = static / stiffness * CURVE_LENGTH, np.unique(np.append(0.0, corners))
+    places = usual * np.linspace(0.0, 1.0, CURVE_POINTS) ** 2
     if corners[-1] > usual:
-        places = np.append(places, np.geomspace(usual, corners[-1], FURTHER)[1:])
+        places = np.append(places, np.geomspace(usual, corners[-1], LONGER_CURVE_POINTS)[1:])
     after = np.searchsorted(corners, places)
     beside = [corners[np.clip(after - before, 0, len(corners) - 1)] for before in (0, 1)]
-    return np.union1d(places[np.abs(places - beside).min(axis=0) > NEAR * places[-1]], corners)
+    return np.union1d(places[np.abs(places - beside).min(axis=0) > LEAST_POINT_DISTANCE * places[-1]], corners)
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
@@ -127,7 +127,7 @@ def best(candidates: np.ndarray, misfits: np.ndarray) -> float:
     return float(candidates[int(np.argmin(misfits))])
 
 
-SLACK = 0.02
+MISFIT_SLACK = 0.02
 """Misfit, as a fraction of static friction, by which a virgin curve may exceed the best one and still pass."""
 
 
@@ -136,5 +136,5 @@ def as_good(candidates: np.ndarray, misfits: np.ndarray) -> tuple[float, float]:
 
     Candidates between these limits have misfits almost as small as the best one.
     """
-    good = candidates[misfits <= np.min(misfits) + SLACK]
+    good = candidates[misfits <= np.min(misfits) + MISFIT_SLACK]
     return float(good.min()), float(good.max())

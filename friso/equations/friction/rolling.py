@@ -77,7 +77,7 @@ class Rolling(StribeckSection):
         static, stiffness, i = (
             flat[f"friction.{name}"] for name in ("static", "bristle_stiffness", "rolling_exponent")
         )
-        far = static / stiffness * (LACKS ** (1 - i) - 1) / (i - 1) if i > 1 else 0.0
+        far = static / stiffness * (MISSING_AT_END ** (1 - i) - 1) / (i - 1) if i > 1 else 0.0
         displacement = virgin_displacements(static, stiffness, [far])
         return on_bristles(flat, displacement, power_law(static, stiffness, i, displacement))
 
@@ -110,21 +110,21 @@ class Rolling(StribeckSection):
         return bristles_active(flat, softer, "" if exponent == 1 else f"^{exponent:g}")
 
 
-LACKS = 0.01
+MISSING_AT_END = 0.01
 """Force, as a fraction of static friction, that may be missing at the last point of a virgin curve."""
 
-ROUNDED = 1e-4
+ROUNDED_SHARE = 1e-4
 """Missing force, as a fraction of the level, below which the bristle yields in proportion to the missing force."""
 
 
 def softening(lacking: Any, exponent: Any) -> Any:
     """Return abs(r)^(i - 1), rounded at r = 0 and still 1 at rest, where r = `lacking` is 1.
 
-    It is ((r^2 + d^2)/(1 + d^2))^((i - 1)/2) with the `exponent` i and d = ROUNDED. A bare power is 0 at r = 0.
+    It is ((r^2 + d^2)/(1 + d^2))^((i - 1)/2) with the `exponent` i and d = ROUNDED_SHARE. A bare power is 0 at r = 0.
     Bristles of a body that rolls steadily would then not follow a small change of the level. The linearised law would
     also change abruptly as i leaves 1. Rounding changes the force by less than d F_s.
     """
-    return ((lacking**2 + ROUNDED**2) / (1 + ROUNDED**2)) ** ((exponent - 1) / 2)
+    return ((lacking**2 + ROUNDED_SHARE**2) / (1 + ROUNDED_SHARE**2)) ** ((exponent - 1) / 2)
 
 
 def _exponent_candidates(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:

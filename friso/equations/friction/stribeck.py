@@ -67,9 +67,9 @@ class Stribeck(StribeckSection):
         """
         return {
             **measured.levels.keys,
-            "friction.regularisation_velocity": SLOWEST * measured.levels.stribeck_velocity,
+            "friction.regularisation_velocity": RISE_SHARE * measured.levels.stribeck_velocity,
         }
 
 
-SLOWEST = 0.01
+RISE_SHARE = 0.01
 """Velocity over which the curve rises from 0, as a fraction of the Stribeck velocity."""

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from friso.engine.allowance import Exhausted
-from friso.hunting.attractors.rounds import TIGHT, typical_period
+from friso.hunting.attractors.rounds import TIGHT_SURVEY_RTOL, typical_period
 from friso.hunting.attractors.settings import settings
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, families
+from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, families
 from friso.hunting.loop import surely_run_away
 from friso.hunting.rows import ArrayRows
 
@@ -103,7 +103,7 @@ class Attractors:
 def attractors(
     stages: Ensemble,
     thorough: bool = False,
-    rtol: float = RTOL,
+    rtol: float = CYCLE_RTOL,
     distances: np.ndarray | None = None,
     cycles: bool = True,
     suggested: tuple[Cycles, ...] = (),
@@ -130,7 +130,7 @@ def attractors(
     try:
         if thorough and cycles:
             suggested = families(stages, rtol)
-        starts = Starts(stages) if cycles else Starts(stages, COARSE_RTOL)
+        starts = Starts(stages) if cycles else Starts(stages, GUESS_RTOL)
         if distances is not None:
             starts.stuck_at(distances)
         starts.spread(thorough | (at_once & ~np.any([cycles.closed for cycles in suggested], axis=0)))
@@ -205,7 +205,7 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         return first
     survey = Survey(surely_run_away(stages), False, rtol, decides=True)
     survey.attracting += [motion for motion in first.motions if motion.stage in proved]
-    starts = Starts(stages, TIGHT)
+    starts = Starts(stages, TIGHT_SURVEY_RTOL)
     starts.spread(thorough=False)
     observed = [motion for motion in first.motions if motion.stage not in proved]
     shares = np.array(settings.beside_motion_shares)

@@ -11,7 +11,7 @@ from friso.engine.settings import room_settings
 from friso.hunting.attractors.recurrence import Recurrence, recurrence
 from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.find import COARSE_RTOL
+from friso.hunting.cycle.find import GUESS_RTOL
 from friso.hunting.cycle.rest import wait
 from friso.hunting.cycle.return_map import trace_returns
 from friso.hunting.cycle.settings import settings as orbit_settings
@@ -19,8 +19,8 @@ from friso.hunting.cycle.swings import last_swings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
-RTOL = ToleranceSettings().survey_rtol
-TIGHT = ToleranceSettings().tight_survey_rtol
+SURVEY_RTOL = ToleranceSettings().survey_rtol
+TIGHT_SURVEY_RTOL = ToleranceSettings().tight_survey_rtol
 """Relative tolerances of survey runs: the usual one, and a tighter one where only simulations decide."""
 
 
@@ -39,7 +39,7 @@ class Pending(ArrayRows):
     durations: np.ndarray
     loose: np.ndarray
     mirrored: np.ndarray
-    rtol: float = RTOL
+    rtol: float = SURVEY_RTOL
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def loose_from(stages: Ensemble) -> np.ndarray:
     shares = np.geomspace(*survey_settings.creep_distances)
     distances = shares * stages.length[:, None]
     sides = (1.0,) if stages.symmetric.all() else (1.0, -1.0)
-    returns = np.max([trace_returns(stages, distances, COARSE_RTOL, side).returns for side in sides], axis=0)
+    returns = np.max([trace_returns(stages, distances, GUESS_RTOL, side).returns for side in sides], axis=0)
     breaks = returns > survey_settings.least_overshoot_share * distances
     first = np.where(breaks.any(axis=1), breaks.argmax(axis=1), len(shares) - 1)
     return distances[np.arange(stages.count), first]

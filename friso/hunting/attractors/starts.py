@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from friso.equations.roles import Steady
-from friso.hunting.attractors.rounds import RTOL, Pending, loose_from, typical_period
+from friso.hunting.attractors.rounds import SURVEY_RTOL, Pending, loose_from, typical_period
 from friso.hunting.attractors.settings import settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
@@ -19,7 +19,7 @@ from friso.stage.controllers import FORCE_LIMIT
 class Starts:
     """Runs to be started: initial states (runs, states) and the numbers of their stages (runs,)."""
 
-    def __init__(self, stages: Ensemble, rtol: float = RTOL, loose: np.ndarray | None = None) -> None:
+    def __init__(self, stages: Ensemble, rtol: float = SURVEY_RTOL, loose: np.ndarray | None = None) -> None:
         self.stages, self.rtol = stages, rtol
         self.loose = loose_from(stages) if loose is None else loose
         self.period = typical_period(stages)

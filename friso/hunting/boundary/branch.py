@@ -17,7 +17,7 @@ import numpy as np
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, described
+from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, described
 from friso.hunting.cycle.shooting import Border, Condition, ConditionSearch, Family, Followed, close_along
 from friso.hunting.settings import tolerance_settings
 
@@ -95,7 +95,7 @@ class Tracer:
         self,
         family: Family,
         sign: float,
-        rtol: float = RTOL,
+        rtol: float = CYCLE_RTOL,
         farthest: float = 1.0,
         swings: int | None = None,
         pace: float = 1.0,

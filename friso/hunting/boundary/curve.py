@@ -16,10 +16,10 @@ from numpy.polynomial.polynomial import polyder, polyfit, polyval
 
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
-from friso.hunting.boundary.locate import ALONG, Bifurcation, LocatedPoint, met, met_by_secants
+from friso.hunting.boundary.locate import ALONG_KEY, Bifurcation, LocatedPoint, met, met_by_secants
 from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
-from friso.hunting.cycle.find import RTOL
+from friso.hunting.cycle.find import CYCLE_RTOL
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Expected:
 class CurveTracer:
     """Tracer of the points of a flip, a fold or a torus through the box of two keys."""
 
-    def __init__(self, space: Space, kind: Bifurcation, sign: float, rtol: float = RTOL) -> None:
+    def __init__(self, space: Space, kind: Bifurcation, sign: float, rtol: float = CYCLE_RTOL) -> None:
         self.space, self.sign, self.rtol = space, sign, rtol
         self.kind: Bifurcation = kind
 
@@ -114,7 +114,7 @@ class CurveTracer:
         special, size, states = near.special, near.size, near.special.point.cycle.states
         if expected is not None:
             size, states = expected.size, expected.states
-        direction, far = ALONG, reach
+        direction, far = ALONG_KEY, reach
         if self.kind == "fold":
             direction, far = special.direction * [0.0, 1.0, 1.0], continuation_settings.fold_search_depth
             direction = direction / np.linalg.norm(direction)

@@ -12,7 +12,7 @@ from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
-from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.hunting.what_attracts import attractors_beside
@@ -66,7 +66,7 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress: Progress = silent) -> Diagram:
+def diagram(space: Space, rtol: float = CYCLE_RTOL, seeds: int | None = None, progress: Progress = silent) -> Diagram:
     """Follow every cycle that is found at `seeds` stages over the range of one key.
 
     The cycles are those that the return map suggests, and those in which simulations end, of any number of swings. Of

@@ -21,7 +21,7 @@ from friso.hunting.cycle.shooting import Condition
 Bifurcation = Literal["flip", "fold", "torus"]
 
 
-ALONG = np.array([1.0, 0.0, 0.0])
+ALONG_KEY = np.array([1.0, 0.0, 0.0])
 """Direction along the key alone, in the space of place, log distance and log time."""
 
 
@@ -211,9 +211,9 @@ def _passed(
     of place, log distance and log time. The error is that of the curve, or the distance at which the multiplier of the
     located point is met, if larger. Returns None if the point cannot be located.
     """
-    orbits = _beside(tracer, kind, near, guess, ALONG)
+    orbits = _beside(tracer, kind, near, guess, ALONG_KEY)
     passed = crossing(*np.array([(point.place, distance_to(kind, point)) for point in orbits]).reshape(-1, 2).T)
-    there = passed and _nearest(tracer, orbits, guess + (passed.place - guess[0]) * ALONG, ALONG)
+    there = passed and _nearest(tracer, orbits, guess + (passed.place - guess[0]) * ALONG_KEY, ALONG_KEY)
     if not passed or not there:
         return None
     error = max(passed.reserve, abs(distance_to(kind, there) / passed.slope))

@@ -17,7 +17,7 @@ from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
 from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, families, symmetric_cycles, whole_cycles
+from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families, symmetric_cycles, whole_cycles
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.hunting.settings import edge_settings
@@ -81,7 +81,7 @@ class _Grid:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def edge_curves(space: Space, rtol: float = RTOL, nodes: int | None = None) -> tuple[Curve, ...]:
+def edge_curves(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None) -> tuple[Curve, ...]:
     """Find the curves in the plane of two keys on which the hunting cycle stops attracting.
 
     Changes are looked for between `nodes` x `nodes` stages. Orbits are closed to the relative tolerance `rtol`.
@@ -93,7 +93,7 @@ def edge_curves(space: Space, rtol: float = RTOL, nodes: int | None = None) -> t
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
+def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
     """Find all curves in the plane of two keys on which the hunting cycle stops attracting.
 
     Curves on which an asymmetric cycle appears that bounds its basin are found as well. Changes are looked for between

@@ -14,7 +14,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations
 
-GENERIC = 0.4721359549995794
+GENERIC_POSITION = 0.4721359549995794
 """Irrational position in a key's range, from 0 to 1, at which no key has a special value."""
 
 FlatAt = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
@@ -88,7 +88,7 @@ class Space:
         The structure is that of a stage at which no key is zero or a whole number. Simpler stages, with a stroke of
         zero or a whole exponent, use it too.
         """
-        return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
+        return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC_POSITION))))
 
     def grid(self, nodes: int) -> np.ndarray:
         """Return points spaced evenly over the box, `nodes` along every side, (points, keys).

@@ -16,28 +16,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, DISTINCT, SEPARATION
+from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, LEAST_PEAK_SEPARATION, LEAST_VALLEY_DEPTH
 from friso.hunting.turns import scan_turning_points
 
 __all__ = [
     "COUNTED_ABOVE",
     "COUNTED_AFTER",
-    "DISTINCT",
     "DISTINCT_CRITERION",
+    "LEAST_PEAK_SEPARATION",
+    "LEAST_VALLEY_DEPTH",
     "PEAK_CRITERION",
     "PEAK_RULE",
-    "SEPARATION",
     "counted_peaks",
     "distinct_peaks",
     "peaks_in_traces",
 ]
 
-PEAK_RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {SEPARATION:g} s apart"
+PEAK_RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {LEAST_PEAK_SEPARATION:g} s apart"
 """Rule for maxima that count."""
 
 PEAK_CRITERION = f"peak count of the thesis: maxima {PEAK_RULE}, the tallest kept first"
 
-DISTINCT_CRITERION = f"{PEAK_CRITERION}; of maxima with valleys of {1e6 * DISTINCT:g} um or more on both sides"
+DISTINCT_CRITERION = (
+    f"{PEAK_CRITERION}; of maxima with valleys of {1e6 * LEAST_VALLEY_DEPTH:g} um or more on both sides"
+)
 
 
 def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -53,8 +55,9 @@ def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Mark the distinct peaks, shape (runs, room).
 
-    They are counted peaks with valleys at least `DISTINCT` deep on both sides. `times` [s] and `values` [m] of position
-    minus reference have the shape (runs, room). The number of valid entries in each row is in `counts`, shape (runs,).
+    They are counted peaks with valleys at least `LEAST_VALLEY_DEPTH` deep on both sides. `times` [s] and `values` [m]
+    of position minus reference have the shape (runs, room). The number of valid entries in each row is in `counts`,
+    shape (runs,).
     """
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).distinct
@@ -74,9 +77,9 @@ def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
 
 def _until_last_fall(values: np.ndarray) -> np.ndarray:
-    """Count each row's samples up to the end of its last fall by `DISTINCT`, (runs,), or 0."""
+    """Count each row's samples up to the end of its last fall by `LEAST_VALLEY_DEPTH`, (runs,), or 0."""
     ahead = np.minimum.accumulate(values[:, ::-1], axis=1)[:, ::-1]
-    falls = values - ahead >= DISTINCT
+    falls = values - ahead >= LEAST_VALLEY_DEPTH
     last = values.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
     following = np.where(np.arange(values.shape[1]) >= last[:, None], values, np.inf)
     return np.where(falls.any(axis=1), following.argmin(axis=1) + 1, 0)

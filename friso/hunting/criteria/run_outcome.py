@@ -9,7 +9,7 @@ An outcome says nothing on what the stage can do.
 - *creeps*: it does neither: it is outside the band at its end without swinging. It drifts, sticks there, or dies out.
 - *failed*: the run was not completed.
 
-Just one of the four holds. The band depends on the question: `BAND` for sweeps and maps, the position window of a
+Just one of the four holds. The band depends on the question: `REST_BAND` for sweeps and maps, the position window of a
 specification, or the user's band for being in position. A swing slower than the run is long looks like creeping.
 """
 
@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from friso.equations.motion import last_part
-from friso.hunting.turning import HALF, WINDOW
+from friso.hunting.turning import LAST_HALF, LAST_QUARTER
 from friso.hunting.turns import scan_turning_points
 
 SWINGS: Final = "swings"
@@ -32,11 +32,11 @@ FAILED: Final = "failed"
 OUTCOMES = (SWINGS, CREEPS, RESTS, FAILED)
 """All words for an outcome; the order decides which of two counts as worse."""
 
-BAND = 1e-5
+REST_BAND = 1e-5
 """Band [m] about the reference within which a run of a sweep rests: friso's choice, the wider one of
 `friso.hunting.measures.BANDS`."""
 
-LASTING = 0.5
+LASTING_RATIO = 0.5
 """Least ratio of the peak-to-peak deviation over the last quarter to that over the last half, for a swing to last. A
 swing that decays at a tenth of its frequency is gone by then."""
 
@@ -64,7 +64,7 @@ class End:
 
 
 def lasts(
-    swing: np.ndarray, earlier: np.ndarray | float, band: np.ndarray | float, lasting: float = LASTING
+    swing: np.ndarray, earlier: np.ndarray | float, band: np.ndarray | float, lasting: float = LASTING_RATIO
 ) -> np.ndarray:
     """Return which runs still swing by more than twice the `band` [m] without decaying, (runs,).
 
@@ -80,7 +80,7 @@ def swings_on(end: End, band: np.ndarray | float) -> np.ndarray:
         return lasts(end.swing, end.earlier, band) & (end.ended - end.turned <= end.period)
 
 
-def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float = 0.0) -> np.ndarray:
+def outcomes(end: End, band: np.ndarray | float = REST_BAND, hold: np.ndarray | float = 0.0) -> np.ndarray:
     """Return swings, creeps, rests or failed for every run, shape (runs,).
 
     A run rests if it left the band [m] for the last time more than `hold` [s] before its end.
@@ -108,7 +108,7 @@ def end_of_traces(
     ended = np.full(runs, time[-1])
     swing, earlier = (
         np.ptp(np.where(time >= last_part(share, ended, corner)[:, None], deviation, deviation[:, -1:]), axis=1)
-        for share in (WINDOW, HALF)
+        for share in (LAST_QUARTER, LAST_HALF)
     )
     # The whole trace: the first sample of a part would pass for a turn, even on a flank.
     samples, values = np.full(runs, len(time)), np.ascontiguousarray(deviation)

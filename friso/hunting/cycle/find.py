@@ -18,10 +18,10 @@ from friso.hunting.cycle.swings import swings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
-RTOL = ToleranceSettings().cycle_rtol
+CYCLE_RTOL = ToleranceSettings().cycle_rtol
 """Default relative tolerance of closed orbits."""
 
-COARSE_RTOL = ToleranceSettings().guess_rtol
+GUESS_RTOL = ToleranceSettings().guess_rtol
 """Relative tolerance of runs that only supply guesses."""
 
 
@@ -99,17 +99,17 @@ class Cycles(ArrayRows):
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
+def symmetric_cycles(stages: Ensemble, rtol: float = CYCLE_RTOL, positive: ReturnMap | None = None) -> Cycles:
     """Find the symmetric cycle of every stage with symmetric equations.
 
     Such a cycle is its own mirror image after half a period. `positive` is the return map of stages that stick on the
     positive side (None: it is computed).
     """
-    positive = positive or return_map(stages, COARSE_RTOL)
-    return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
+    positive = positive or return_map(stages, GUESS_RTOL)
+    return _closed(stages, symmetric_guess(stages, positive, GUESS_RTOL), -1.0, rtol)
 
 
-def find_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
+def find_cycles(stages: Ensemble, rtol: float = CYCLE_RTOL) -> Cycles:
     """Find one hunting cycle of every stage, stable or not.
 
     For a symmetric stage it is the symmetric cycle, with the multiplier of half a period; for others the multiplier is
@@ -134,14 +134,14 @@ def concatenate_cycles(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
     return Cycles(0.0, 0, **{pair[0][0]: np.concatenate([array for _, array in pair])[order] for pair in columns})
 
 
-def families(stages: Ensemble, rtol: float = RTOL, one_each: bool = False) -> tuple[Cycles, ...]:
+def families(stages: Ensemble, rtol: float = CYCLE_RTOL, one_each: bool = False) -> tuple[Cycles, ...]:
     """Find the cycles that the return maps of stages suggest.
 
     If all stages are symmetric, the result has two entries: their symmetric cycles, and one of each asymmetric pair. If
     any stage is not, the only entry has cycles over a whole period. With `one_each`, asymmetric cycles are sought only
     for stages whose symmetric one is not stable.
     """
-    positive = return_map(stages, COARSE_RTOL)
+    positive = return_map(stages, GUESS_RTOL)
     if not stages.symmetric.all():
         return (whole_cycles(stages, rtol, positive),)
     symmetric = symmetric_cycles(stages, rtol, positive)
@@ -150,7 +150,7 @@ def families(stages: Ensemble, rtol: float = RTOL, one_each: bool = False) -> tu
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def asymmetric_cycles(
-    stages: Ensemble, positive: ReturnMap, rtol: float = RTOL, which: np.ndarray | None = None
+    stages: Ensemble, positive: ReturnMap, rtol: float = CYCLE_RTOL, which: np.ndarray | None = None
 ) -> Cycles:
     """Find one of the pair of asymmetric cycles of each symmetric stage, if it has one.
 
@@ -167,13 +167,13 @@ def asymmetric_cycles(
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def whole_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
+def whole_cycles(stages: Ensemble, rtol: float = CYCLE_RTOL, positive: ReturnMap | None = None) -> Cycles:
     """Find the cycle of every stage over a whole period, for stages that need not be symmetric.
 
     `positive` is the return map of stages that stick on the positive side (None: it is computed).
     """
-    positive = positive or return_map(stages, COARSE_RTOL)
-    return _closed(stages, whole_guess(stages, positive, return_map(stages, COARSE_RTOL, -1.0)), 1.0, rtol)
+    positive = positive or return_map(stages, GUESS_RTOL)
+    return _closed(stages, whole_guess(stages, positive, return_map(stages, GUESS_RTOL, -1.0)), 1.0, rtol)
 
 
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
@@ -226,7 +226,7 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
     subset, sign = stages.take(missing), orbits.sign
     starts = stuck(subset, guess.distances[missing])
     extrema = swings(
-        subset, starts, settings.guess_returns * guess.times[missing], 4 * settings.guess_returns, COARSE_RTOL
+        subset, starts, settings.guess_returns * guess.times[missing], 4 * settings.guess_returns, GUESS_RTOL
     )
     rows, step = np.arange(subset.count), 1 if sign < 0 else 2
     last = np.maximum(np.isfinite(extrema.values).sum(axis=1) - 2, step)
@@ -239,7 +239,7 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
     if not fine.size:
         return
     ends_at = extrema.times[rows, last] + settings.unwinding_wait_share * wait(subset, heights[0])
-    ends = subset.take(fine).run(starts[fine], ends_at[fine], COARSE_RTOL).ends
+    ends = subset.take(fine).run(starts[fine], ends_at[fine], GUESS_RTOL).ends
     if sign < 0:
         ends *= np.sign(ends[:, stages.sticking])[:, None]
     _accept(stages, orbits, missing[fine], close(subset.take(fine), ends, times[fine], sign, rtol), guess)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles
+from friso.hunting.cycle.find import CYCLE_RTOL, Cycles
 from friso.hunting.cycle.multipliers import returns_of
 from friso.hunting.cycle.settings import settings
 from friso.hunting.cycle.shooting import Orbits
@@ -13,7 +13,7 @@ from friso.hunting.settings import tolerance_settings
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndarray:
+def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = CYCLE_RTOL) -> np.ndarray:
     """Return distances [m] at which stages stick in lasting motions beside an unstable cycle.
 
     The return map keeps these motions within a few per cent of the cycle. The shape is (count, n), NaN for no motion.

@@ -16,9 +16,9 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.roles import Role
 from friso.equations.structure import Structure, structure
 from friso.hunting.attractors import Attractors, Target, attractors
-from friso.hunting.attractors.rounds import TIGHT
+from friso.hunting.attractors.rounds import TIGHT_SURVEY_RTOL
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
+from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import settings
@@ -85,7 +85,7 @@ NARROW_PLAY = "the backlash is so narrow that cycles of its size may be smaller 
 STIFF_BRISTLES = "bristles give way by so little that runs do not resolve how friction falls as they break away"
 """Reason given when bristles bend by less than runs can resolve."""
 
-RESOLVED_BRISTLES = 10 * TIGHT
+RESOLVED_BRISTLES = 10 * TIGHT_SURVEY_RTOL
 """Smallest deflection of bristles, in deflections of the loop, that runs resolve at the tightest tolerance of a survey.
 At 9e-10 runs find no attractor where the exact map of a stage has a cycle; from 1e-8 on they do
 (`benchmarks.oracles`, always)."""
@@ -219,7 +219,7 @@ def why_not(form: Structure) -> str:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
+def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hunting:
     """Find the limit cycles and other attractors of a stage, whatever its own motion.
 
     Cycles are closed to the relative tolerance `rtol`. The search may use so much `work` (see
@@ -248,7 +248,7 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),
         reason=reason if not certain or not (closed or repelling) else "",
         certain=certain,
-        returns=return_map(stages, COARSE_RTOL),
+        returns=return_map(stages, GUESS_RTOL),
         observed=tuple(
             Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings) for m in survey.motions if not m.cycles
         ),
@@ -380,7 +380,7 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
     """
     away = np.array([[0.0, settings.beside_cycle_share, -settings.beside_cycle_share]])
     heights = returns_of(
-        stages, cycles.orbits, cycles.direction, away, settings.beside_cycle_returns, COARSE_RTOL / 100
+        stages, cycles.orbits, cycles.direction, away, settings.beside_cycle_returns, GUESS_RTOL / 100
     )[0]
     deviations = (heights[1:] - heights[0]) / cycles.amplitude[0]
     before, after = deviations[:, :-1].ravel(), deviations[:, 1:].ravel()
@@ -395,7 +395,7 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
 def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
     """Return the signals of one period of a cycle, by name."""
     period = float(cycles.period[0])
-    results = stages.run(cycles.states, cycles.period, COARSE_RTOL / 100, interval=period / settings.trace_samples)
+    results = stages.run(cycles.states, cycles.period, GUESS_RTOL / 100, interval=period / settings.trace_samples)
     time = np.arange(results.samples.shape[1]) * (period / settings.trace_samples)
     flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": period}
     return {**output_variables(stages.kernel, flat, results.samples[0].T, time), **time_axis(time)}

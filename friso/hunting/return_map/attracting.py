@@ -10,12 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.hunting.attractors.closing import close_orbits
-from friso.hunting.attractors.rounds import RTOL as RUN_RTOL
-from friso.hunting.attractors.rounds import Pending
+from friso.hunting.attractors.rounds import SURVEY_RTOL, Pending
 from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL
+from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.return_map.landing_map import MapAttractor
 from friso.hunting.return_map.mapped import Mapped, map_stages, remembered
 from friso.hunting.return_map.settings import settings as return_map_settings
@@ -78,7 +77,7 @@ class _Proposal:
     run: int
 
 
-def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
+def survey_maps(stages: Ensemble, rtol: float = CYCLE_RTOL) -> MapSurvey:
     """Find the attractors of stages by their return maps.
 
     Orbits are closed to the relative tolerance `rtol`.
@@ -182,7 +181,7 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
     if not which.size:
         return
     some = mapped.stages.take(owners[which])
-    pending = Pending(some, landings.ends[which], times[which], np.zeros(which.size), some.symmetric, RUN_RTOL)
+    pending = Pending(some, landings.ends[which], times[which], np.zeros(which.size), some.symmetric, SURVEY_RTOL)
     for group, cycles in close_orbits(pending, swings[which], times[which], sizes[which], rtol):
         numbers = owners[which[group]]
         for kind, some_cycles in ((motions, cycles.attracting), (repelling, cycles.closed & ~cycles.attracting)):

@@ -7,7 +7,7 @@ import numpy as np
 from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.rest import stuck
 from friso.hunting.return_map.attracting import MapSurvey
-from friso.hunting.return_map.landings import RTOL, find_landings
+from friso.hunting.return_map.landings import LANDING_RTOL, find_landings
 from friso.hunting.return_map.settings import settings as return_map_settings
 from friso.hunting.settings import tolerance_settings
 
@@ -23,7 +23,7 @@ def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])
     right = np.ones(len(numbers), bool)
-    for rtol in (RTOL, tolerance_settings.check_rtol_factor * RTOL):
+    for rtol in (LANDING_RTOL, tolerance_settings.check_rtol_factor * LANDING_RTOL):
         lands = _land_as_foretold(survey, numbers[owners], np.concatenate(begun), rtol)
         right[owners[~lands]] = False
     return right

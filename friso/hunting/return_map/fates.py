@@ -16,7 +16,7 @@ from friso.equations.motion import last_corner, returns
 from friso.equations.structure import shared_structure
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.return_map.landing_map import LandingMap
-from friso.hunting.return_map.landings import RTOL, find_landings
+from friso.hunting.return_map.landings import LANDING_RTOL, find_landings
 from friso.hunting.return_map.settings import settings
 
 
@@ -36,7 +36,7 @@ def motions_go_on(
     shape = kernel(shared_structure(flat))
     long = {**flat, "motion.duration": np.broadcast_to(last_corner(flat) * (1 + 1e-9) + 1e-9, (count,))}
     ends, completed = np.zeros((count, len(shape.full_state))), np.zeros(count, bool)
-    for runs in run_chunks(shape, long, count, RunOptions(rtol=RTOL, least_swing=np.inf)):
+    for runs in run_chunks(shape, long, count, RunOptions(rtol=LANDING_RTOL, least_swing=np.inf)):
         ends[runs.numbers], completed[runs.numbers] = runs.results.ends, done(runs.results)
     goes_on, decided = _go_on(Ensemble.held(flat, count), ends, landing_map)
     return goes_on & completed, decided & completed

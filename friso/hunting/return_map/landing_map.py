@@ -16,10 +16,10 @@ from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.return_map.landings import Landings
 from friso.hunting.return_map.settings import settings as return_map_settings
 
-OTHER_SIDE = 1e3
+NEGATIVE_SIDE_SHIFT = 1e3
 """Shift of a landing's coordinate on the map, its log distance, on the negative side."""
 
-REST = -1e6
+REST_COORDINATE = -1e6
 """Coordinate on the map that stands for a stage that rests, or has diverged."""
 
 
@@ -107,7 +107,7 @@ class LandingMap:
         Coordinates are logarithms of distance (see `_place`), and ascend. Where the map breaks off between two points,
         each half has the gain of the nearer point.
         """
-        lines = [np.array([[-np.inf], [REST], [0.0]])]
+        lines = [np.array([[-np.inf], [REST_COORDINATE], [0.0]])]
         for side in self.sides:
             points = self.points(side)
             places, after = _place(self.before[points]), self.after[points]
@@ -132,7 +132,7 @@ class LandingMap:
             if len(points):
                 ends = after[-1:] if abs(after[-1]) < abs(self.before[points[-1]]) else np.zeros(1)
                 pieces = np.hstack([pieces, [places[-1:], *_beside(places[-1:], ends)]])
-            lines += [pieces, np.array([[OTHER_SIDE / 2 if side > 0 else np.inf], [REST], [0.0]])]
+            lines += [pieces, np.array([[NEGATIVE_SIDE_SHIFT / 2 if side > 0 else np.inf], [REST_COORDINATE], [0.0]])]
         begins, values, slopes = np.hstack(lines)
         return begins, values, slopes
 
@@ -145,7 +145,9 @@ class LandingMap:
         pieces = self._pieces(places)
         after = values[pieces] + slopes[pieces] * places
         near = self._nearest
-        after[(after < near) | ((after > OTHER_SIDE / 2) & (after < OTHER_SIDE + near))] = REST
+        after[(after < near) | ((after > NEGATIVE_SIDE_SHIFT / 2) & (after < NEGATIVE_SIDE_SHIFT + near))] = (
+            REST_COORDINATE
+        )
         return after
 
     def _pieces(self, places: np.ndarray) -> np.ndarray:
@@ -177,7 +179,7 @@ class LandingMap:
     def attractors(self) -> tuple[MapAttractor, ...]:
         """Return the map's attractors, in which a stage swings for ever, from any of its points."""
         goes = np.isfinite(self.after) & (self.after != 0)
-        at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
+        at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST_COORDINATE)
         return tuple(self._told_apart(self._followed(at)))
 
     def _followed(self, at: np.ndarray) -> np.ndarray:
@@ -191,11 +193,13 @@ class LandingMap:
             for number in range(iterations):
                 if number % return_map_settings.checked_landings == 0:
                     at = self._on_cycles(at)
-                    if np.all((np.abs(at - earlier) < return_map_settings.exact_repetition_share) | (at <= REST)):
+                    if np.all(
+                        (np.abs(at - earlier) < return_map_settings.exact_repetition_share) | (at <= REST_COORDINATE)
+                    ):
                         break
                     earlier = at
                 at = self.next(at)
-            if not np.any(at > REST):
+            if not np.any(at > REST_COORDINATE):
                 return np.tile(at[:, None], 2)
             orbits = [at]
             for _ in range(2 * survey_settings.most_repeating_swings):
@@ -219,20 +223,20 @@ class LandingMap:
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
         """Return which landings, as signed distances, lead to swinging for ever, (count,)."""
-        return np.all(self._followed(self._places(distances)) > REST, axis=1)
+        return np.all(self._followed(self._places(distances)) > REST_COORDINATE, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """Return the coordinates on the map (see `_place`) of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
         moves = np.isfinite(at) & (np.abs(at) >= survey_settings.least_swing)
-        return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
+        return np.where(moves, _place(np.where(moves, at, 1.0)), REST_COORDINATE)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
         """Yield each attractor once, from paths that end on attractors.
 
         Paths are coordinates on the map (see `_place`), shape (points, landings).
         """
-        left = np.all(paths > REST, axis=1)
+        left = np.all(paths > REST_COORDINATE, axis=1)
         while left.any():
             number = int(np.flatnonzero(left)[0])
             first = paths[number]
@@ -286,13 +290,13 @@ class LandingMap:
 
 def _place(distances: np.ndarray) -> np.ndarray:
     """Return coordinates on the map: logarithms of distances, shifted where they are negative."""
-    return np.log(np.abs(distances)) + OTHER_SIDE * (distances < 0)
+    return np.log(np.abs(distances)) + NEGATIVE_SIDE_SHIFT * (distances < 0)
 
 
 def _distance(places: np.ndarray) -> np.ndarray:
     """Return signed distances from coordinates on the map (see `_place`)."""
-    negative = places > OTHER_SIDE / 2
-    return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - OTHER_SIDE, places))
+    negative = places > NEGATIVE_SIDE_SHIFT / 2
+    return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - NEGATIVE_SIDE_SHIFT, places))
 
 
 def _beside(at: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -302,7 +306,7 @@ def _beside(at: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     the stage rests or diverges after it, the piece leads to rest.
     """
     goes = np.isfinite(after) & (after != 0)
-    return np.where(goes, _place(np.where(goes, after, 1.0)) - at, REST), np.where(goes, 1.0, 0.0)
+    return np.where(goes, _place(np.where(goes, after, 1.0)) - at, REST_COORDINATE), np.where(goes, 1.0, 0.0)
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from friso.hunting.return_map.settings import settings as return_map_settings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
-RTOL = ToleranceSettings().landing_rtol
+LANDING_RTOL = ToleranceSettings().landing_rtol
 """Relative tolerance of the runs that find where stages stick."""
 
 
@@ -54,7 +54,7 @@ class Landings(ArrayRows):
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
+def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = LANDING_RTOL) -> Landings:
     """Follow stages from states, (runs, states), until each has landed `most` times or rests.
 
     A stage lands where it sticks after a swing. Runs have the relative tolerance `rtol`. They go on in rounds, each as

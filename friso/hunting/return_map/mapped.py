@@ -14,7 +14,7 @@ from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import spread_over, stuck
 from friso.hunting.return_map.landing_map import LandingMap
-from friso.hunting.return_map.landings import RTOL, Landings, find_landings
+from friso.hunting.return_map.landings import LANDING_RTOL, Landings, find_landings
 from friso.hunting.return_map.settings import settings as return_map_settings
 from friso.stage.controllers import FORCE_LIMIT
 
@@ -33,7 +33,7 @@ class Mapped:
     starts: np.ndarray
     continued: np.ndarray
     landings: Landings
-    rtol: float = RTOL
+    rtol: float = LANDING_RTOL
 
     @cached_property
     def maps(self) -> tuple[LandingMap, ...]:
@@ -126,7 +126,7 @@ def map_stages(
     stages: Ensemble,
     near: tuple[tuple[float, float, int], ...] | None = None,
     rounds: int | None = None,
-    rtol: float = RTOL,
+    rtol: float = LANDING_RTOL,
     sparse: bool = False,
 ) -> Mapped:
     """Sample the return maps of stages by runs stuck near their reference, and farther off.

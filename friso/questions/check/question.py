@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from friso.engine.kernel import kernels
-from friso.engine.simulate import RTOL, simulate
+from friso.engine.simulate import SIMULATION_RTOL, simulate
 from friso.errors import InputError
 from friso.hunting import LONG_RUN_RTOL, Case, needed_kernels
 from friso.interface.answer import Answer, AnswerTable, question
@@ -182,7 +182,7 @@ class CheckAnswer(Answer):
 @question
 def check(
     stage: StageLike,
-    rtol: Tolerance = RTOL,
+    rtol: Tolerance = SIMULATION_RTOL,
     *,
     set: Changes = None,
     draws: Whole | None = None,
@@ -226,7 +226,7 @@ def check(
 def checked_stage(
     chosen: Stage,
     correlations: Correlations,
-    tolerance: float = RTOL,
+    tolerance: float = SIMULATION_RTOL,
     draws: int | None = None,
     seed: int = 0,
     laws: bool = False,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.engine.arrays import Status
-from friso.engine.simulate import RTOL
+from friso.engine.simulate import SIMULATION_RTOL
 from friso.errors import InputError
 from friso.hunting.measures import Measures, measured_run
 from friso.interface.answer import Answer, question
@@ -201,7 +201,7 @@ def simulate(
 
         response = run_as_built(chosen, tolerance or usual, interval)
     else:
-        response = simulated(chosen, tolerance or usual or RTOL, interval)
+        response = simulated(chosen, tolerance or usual or SIMULATION_RTOL, interval)
     return SimulateAnswer(response, stage=chosen, name=name, of_cell=cell is not None)
 
 

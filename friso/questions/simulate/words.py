@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.hunting.criteria import BAND, CREEPS, RESTS, SWINGS
-from friso.hunting.measures import BANDS, WINDOW, Measures
+from friso.hunting.criteria import CREEPS, REST_BAND, RESTS, SWINGS
+from friso.hunting.measures import BANDS, LAST_QUARTER, Measures
 from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
 from friso.shown.motion_words import off_its_reference
 from friso.stage import Stage
@@ -24,7 +24,7 @@ def conclusion(
     `moves_on` is true if the reference moves at the end, and `evenly` if its velocity is then constant. `deviation` has
     evenly timed samples of the deviation from the reference [m], shape (n,).
     """
-    before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
+    before, late = np.split(np.abs(deviation), [int(LAST_QUARTER * len(deviation))])
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
     clauses = {
         SWINGS: lambda: (
@@ -72,11 +72,11 @@ def _settling(measures: Measures) -> str:
     (fine, coarse), (last_fine, last_coarse) = (
         tuple(map(_value, times)) for times in (measures.settling_time, measures.in_the_end)
     )
-    text = f"within {with_unit(BAND, 'm')} of its reference, {with_unit(last_coarse, 's')} after its last corner"
+    text = f"within {with_unit(REST_BAND, 'm')} of its reference, {with_unit(last_coarse, 's')} after its last corner"
     if not np.isnan(last_fine):
         text = f"{text}; within {with_unit(BANDS[0], 'm')} after {with_unit(last_fine, 's')}"
     if np.isnan(coarse):
-        return f"{text}; not within {with_unit(BAND, 'm')} at the far end before it returned"
+        return f"{text}; not within {with_unit(REST_BAND, 'm')} at the far end before it returned"
     if np.isnan(fine) and not np.isnan(last_fine):
         return f"{text}; not within {with_unit(BANDS[0], 'm')} at the far end before it returned"
     far = f"{with_unit(coarse, 's')} and {with_unit(fine, 's')}" if fine > last_fine else with_unit(coarse, "s")

@@ -14,7 +14,7 @@ from friso.frequency.family import about_resonances, for_poles
 from friso.frequency.loops import Poles
 from friso.frequency.members import limit_cases
 from friso.hunting.criteria import FAILED, RESTS, SWINGS, end_of_traces, outcomes, peaks_in_traces, settling_of_traces
-from friso.hunting.measures import WINDOW
+from friso.hunting.measures import LAST_QUARTER
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
 
@@ -81,7 +81,7 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
     deviation = recorded.true["position"] - reference
     done = recorded.statuses == Status.DONE
     outcome = outcomes(end_of_traces(time, deviation, within, done, np.asarray(stands[-1].corner)), within)
-    late = deviation[:, time >= WINDOW * time[-1]]
+    late = deviation[:, time >= LAST_QUARTER * time[-1]]
     settling = np.where(outcome == RESTS, settling_of_traces(stands, time, deviation, within), np.inf)
     return MachineMeasures(
         outcome=outcome,

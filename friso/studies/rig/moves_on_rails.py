@@ -13,7 +13,7 @@ from friso.equations import motion
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
 from friso.hunting.criteria import COUNTED_ABOVE, FAILED, SWINGS, End, last_outside, lasts, outcomes, peaks_in_traces
-from friso.hunting.measures import HALF, WINDOW, scan_turning_points, zigzag
+from friso.hunting.measures import LAST_HALF, LAST_QUARTER, scan_turning_points, zigzag
 from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -237,7 +237,7 @@ def rail_runs(recorded: RecordedRuns) -> RailRuns:
     times, values = np.zeros((2, len(turns), max(1, counts.max(initial=0))))
     for row, (at, value) in enumerate(turns):
         times[row, : len(at)], values[row, : len(at)] = at, value
-    swing, earlier = (np.ptp(deviation[:, time >= part * time[-1]], axis=1) for part in (WINDOW, HALF))
+    swing, earlier = (np.ptp(deviation[:, time >= part * time[-1]], axis=1) for part in (LAST_QUARTER, LAST_HALF))
     ended = np.full(len(turns), time[-1])
     ending = scan_turning_points(times, values, counts, swing, ended)
     end = End(~failed, swing, earlier, ending.period, ending.turned, last_outside(time, deviation, BAND), ended)
