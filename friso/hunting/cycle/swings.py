@@ -30,7 +30,8 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
     """
     position = starts[:, stages.kernel.position]
     legs = settings.swing_leg_share * np.abs(position)
-    results = stages.run(starts, durations, rtol, least_swing=0.1 * legs)
+    budget = most * settings.swing_step_limit
+    results = stages.run(starts, durations, rtol, least_swing=0.1 * legs, budget=budget)
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
     values = np.hstack([position[:, None], np.where(held, results.turn_values, np.nan)])
