@@ -11,12 +11,11 @@ from beyond_flip import CREEPING
 import friso
 from friso.design_method import method as method_module
 from friso.design_method.choice import chosen, confirmed
-from friso.design_method.controller import choose_controller, comfortable_below, dampings
+from friso.design_method.controller import Modal, choose_controller, comfortable_below, dampings
 from friso.design_method.edges import Corners, edges_over, rigid
 from friso.design_method.front import Candidate, evaluate_geometries, front
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
 from friso.design_method.method import NoDesign, design, fit_leaves, leaves
-from friso.design_method.modal import Modal
 from friso.design_method.population import Population, corners
 from friso.design_method.prepare import prepared, with_leaves
 from friso.design_method.relax import relaxed_requirements

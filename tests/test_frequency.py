@@ -28,9 +28,8 @@ from friso.frequency.family import impedance, loops, plants, scan_stability, spe
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop, poles, response
 from friso.frequency.margins import margins, of_loop, with_resonances
-from friso.frequency.members import Members, family, limit_cases, member
+from friso.frequency.members import Members, family, in_series, limit_cases, member
 from friso.frequency.parts import mechanics, plant
-from friso.frequency.stiffness import in_series
 from friso.stage import Stage
 
 HZ = 2 * np.pi

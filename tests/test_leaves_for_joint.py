@@ -22,7 +22,7 @@ from friso.questions.tune.present_words import DOUBTS
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.words import UNMADE, answer
 from friso.remedies.catalogue import remedies
-from friso.remedies.goal import Goal
+from friso.remedies.machines import Goal
 from friso.remedies.method import Advice, Unmade, _Session, tune
 from friso.remedies.search import Budget
 

@@ -16,7 +16,7 @@ from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.describing.function import describing
-from friso.frequency.describing.waveform import OneStateLaw as Waveform
+from friso.frequency.describing.multi import OneStateLaw as Waveform
 from friso.frequency.friction import level, speeds, steady_force
 from friso.frequency.members import member
 from friso.frequency.parts import plant

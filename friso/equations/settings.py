@@ -1,7 +1,7 @@
 """Catalogue of a drive's settings against friction.
 
 The catalogue lists the effect of each setting, its values for a machine, and the ranges in which it is tuned. The keys
-of settings are declared in `friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare
+of settings are declared in `friso.stage.controllers`, their equations in `continuous` and `sampled`. `friso compare
 --also` tries one value of each setting; `friso tune` searches their ranges.
 """
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 from friso.errors import InputError
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
-from friso.frequency.members import Members, limit_cases, limiter_states
+from friso.frequency.members import Members, limit_cases, limiter_in_series, limiter_states
 from friso.frequency.parts import FORCE, RATED, REFERENCE, STAGE, VELOCITY, compensator, plant, reference_derivatives
-from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
 from friso.quantities import quoted
 from friso.stage import Stage

@@ -12,17 +12,15 @@ import numpy as np
 from friso.engine.side_by_side import side_by_side
 from friso.errors import InputError
 from friso.frequency.cascaded import CascadeLoops, cascade_loops, is_cascade
-from friso.frequency.crossover import Limits, limits
+from friso.frequency.crossover import Limits, Range, limits, ranges_below
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import Scan, closed_loop_poles, loops, plant_poles, scan_stability, spectral_abscissa
 from friso.frequency.friction import steady_force
 from friso.frequency.loops import response
 from friso.frequency.margins import Margins, margins, with_resonances
-from friso.frequency.members import Members, concatenate_families, family, limit_cases, member
+from friso.frequency.members import Members, concatenate_families, family, limit_cases, limiter_in_series, member
 from friso.frequency.parts import FORCE, STAGE, plant
-from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.settings import settings
-from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import Complex
 from friso.stage import Stage
 

@@ -22,8 +22,17 @@ from friso.frequency.friction import law_of
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
 from friso.frequency.members import Members, concatenate_families, limit_cases
-from friso.frequency.operating_point import operating_point
-from friso.frequency.parts import FORCE, RATED, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
+from friso.frequency.parts import (
+    FORCE,
+    RATED,
+    STAGE,
+    VELOCITY,
+    cart_states,
+    compensator,
+    mechanics,
+    operating_point,
+    plant,
+)
 from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.settings import settings
 from friso.frequency.system import Complex, System

@@ -13,8 +13,8 @@ import sympy as sp
 from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction, solve_linear
 from friso.equations.structure import shared_structure
-from friso.frequency.declared import Declared, sine
 from friso.frequency.settings import settings
+from friso.frequency.system import Declared, sine
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
 from friso.stage.transmission import STATE_PREFIX, leading_friction

@@ -1,4 +1,7 @@
-"""Represent plant and controller of a stage as linear systems, for many states at once."""
+"""Represent plant and controller of a stage as linear systems, for many states at once.
+
+Find the friction law's steady state: stuck under a bias force, or sliding at a speed.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +23,44 @@ from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
 from friso.equations.transmission import flanks
 from friso.errors import InputError
-from friso.frequency.declared import Declared
-from friso.frequency.friction import law_of, motor_law_of
+from friso.frequency.friction import FORWARD, law_of, motor_law_of
 from friso.frequency.members import Members
-from friso.frequency.operating_point import operating_point, operating_point_of_motor
-from friso.frequency.system import System
-from friso.stage.transmission import MOTOR_STATES
+from friso.frequency.system import Declared, System
+from friso.stage.transmission import MOTOR_STATES, STATE_PREFIX, of_motor
+
+
+def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """Return the steady values of a stage's friction law in each state of `members`, by name.
+
+    Each has the shape (members,). They are the values of its internal states, of its modes with memory, of the sides of
+    its kinks (where derivatives jump), and of its direction. The result is empty without friction.
+    """
+    law, forward = law_of(flat), members.forward.astype(float)
+    if law is None:
+        return {}
+    sign = 2 * forward - 1
+    at = {**flat, "velocity": sign * np.maximum(members.speed, np.finfo(float).tiny), FORWARD: forward}
+    sliding, stuck = law.sliding(at), law.stuck({**at, "bias": sign * members.bias})
+    internal = {
+        name: np.where(members.stuck, rest, moving)
+        for name, rest, moving in zip((*law.states, *law.modes), stuck, sliding, strict=True)
+    }
+    return {FORWARD: forward, **internal}
+
+
+def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """Return the steady values of the friction law at the motor in each state, by name.
+
+    The motor moves with the load and bears no bias force.
+    """
+    unbiased = replace(members, bias=np.zeros(len(members)))
+    point = operating_point(of_motor(flat), unbiased)
+    beyond = "beyond_"
+    return {
+        f"{beyond}{STATE_PREFIX}{name.removeprefix(beyond)}" if name.startswith(beyond) else f"{STATE_PREFIX}{name}": at
+        for name, at in point.items()
+    }
+
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
 FEEDFORWARD = "reference velocity", "reference acceleration", "reference jerk"

@@ -24,11 +24,10 @@ from friso.equations.blocks import Loop
 from friso.equations.component import Held
 from friso.equations.sampled import counter, sampled_controller
 from friso.equations.structure import ControllerForm, shared_structure
-from friso.frequency.declared import Declared
 from friso.frequency.parts import FORCE, RATED, STAGE
-from friso.frequency.system import Complex, System
+from friso.frequency.system import Complex, Declared, System
+from friso.stage.controllers import FrictionSettings
 from friso.stage.rig import LOOPS
-from friso.stage.standstill import FrictionSettings
 
 
 @dataclass(frozen=True)

@@ -21,22 +21,19 @@ from friso.frequency.crossover import Limits, limits
 from friso.hunting import Case
 from friso.platform.extras import missing
 from friso.progress import Progress, silent
-from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
-from friso.remedies.change import ChangeSize, change_size
-from friso.remedies.confirmed import confirmed
-from friso.remedies.goal import Goal
-from friso.remedies.least import least_changes, least_remedy, of_one_key, size_cost
-from friso.remedies.machines import Fleet, MoveRange, draw_fleet
+from friso.remedies.catalogue import BANDWIDTH, Remedy, remedies, with_bandwidth
+from friso.remedies.least import ChangeSize, change_size, least_changes, least_remedy, of_one_key, size_cost
+from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
 from friso.remedies.settings import settings
 from friso.remedies.trials import modulus_margins
-from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import (
     Performance,
     RemedyOutcome,
     checked,
+    confirmed,
     missed_parts,
     moving,
     unsettled_parts,

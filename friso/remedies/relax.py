@@ -12,8 +12,7 @@ from friso.design_method.relax import Relaxation
 from friso.engine.allowance import Exhausted
 from friso.quantities import outwards
 from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet
+from friso.remedies.machines import Fleet, Goal
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
 from friso.remedies.trials import attraction, moves_of_points

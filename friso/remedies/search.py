@@ -16,10 +16,9 @@ from scipy.optimize import brentq, differential_evolution
 from scipy.stats import qmc
 
 from friso.engine.allowance import Allowance, Exhausted, allowance
-from friso.frequency.bandwidth import loop_bandwidths
+from friso.frequency.crossover import loop_bandwidths
 from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet
+from friso.remedies.machines import Fleet, Goal
 from friso.remedies.settings import settings
 from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.stage import Stage

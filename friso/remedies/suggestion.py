@@ -6,17 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.design_method.isolator import isolated
+from friso.design_method.prepare import isolated
 from friso.equations.bandwidth import faster
 from friso.equations.breakaway import least_breakaway
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting import find_attractors
-from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
+from friso.remedies.catalogue import DAMPING_RATIOS, Remedy, joint_variables
+from friso.remedies.machines import Goal
 from friso.remedies.settings import settings
-from friso.remedies.variables import DAMPING_RATIOS, joint_variables
 from friso.stage import Stage
 
 DAMPING = (0.05, DAMPING_RATIOS[1])

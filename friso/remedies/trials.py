@@ -15,8 +15,7 @@ from friso.equations.structure import shared_structure
 from friso.hunting import find_attractors
 from friso.hunting.criteria import settling_of_runs
 from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet
+from friso.remedies.machines import Fleet, Goal
 from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT

@@ -15,7 +15,6 @@ from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, as_toml, exactly, in_unit_of, quoted
-from friso.stage.conditions import Conditions
 from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLER,
@@ -46,6 +45,7 @@ from friso.stage.tables import (
     Actuator,
     AxisTable,
     Bias,
+    Conditions,
     FrictionSection,
     Joint,
     Masses,

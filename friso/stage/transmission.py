@@ -10,8 +10,8 @@ from pydantic import model_validator
 
 from friso.errors import StageError
 from friso.quantities import Number, Quantity, Value, non_negative, positive
-from friso.stage.conditions import CONDITIONS
 from friso.stage.section import UncertainSection
+from friso.stage.tables import CONDITIONS
 
 TRANSMISSION, MOTOR_FRICTION, ENCODER = "transmission", "motor_friction", "encoder"
 MOTOR_MASS, INERTIA, LEAD, RATIO, BACKLASH = (

@@ -16,7 +16,7 @@ import sympy as sp
 from friso.equations.component import key
 from friso.equations.model import assemble
 from friso.equations.structure import Structure, shared_structure
-from friso.frequency.declared import Declared
+from friso.frequency.system import Declared
 
 FORCE, CART, STAGE = "force on cart", "cart", "stage"
 

@@ -23,15 +23,13 @@ from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.quantities import quoted
 from friso.stage import Stage
-from friso.studies.axes import AxisValues
+from friso.studies.axes import AxisValues, Samples
 from friso.studies.cells import INFERRED
 from friso.studies.execute import Crew
 from friso.studies.metric import METRICS, metrics, with_usual
 from friso.studies.refine import finer
-from friso.studies.request import Request
-from friso.studies.samples import Samples
 from friso.studies.settings import settings
-from friso.studies.study import Study, study_of
+from friso.studies.study import Request, Study, study_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -205,7 +203,7 @@ def place_of_store(folder: str | os.PathLike[str]) -> Path:
 
 def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
     """Return the study as NetCDF or CSV, by the suffix of each path."""
-    from friso.studies.export import export
+    from friso.studies.store import export
 
     return dict.fromkeys(paths, partial(export, runs))
 

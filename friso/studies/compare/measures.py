@@ -1,4 +1,7 @@
-"""Measure machines: swinging, settling, standstill, force, and the loop's margin."""
+"""Measure machines: swinging, settling, standstill, force, and the loop's margin.
+
+Compute medians and paired differences of machines, with 95 % intervals.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
 import numpy as np
+from scipy.stats import binom
 
 from friso.engine.arrays import Status
 from friso.equations.motion import Stand
@@ -15,8 +19,63 @@ from friso.frequency.loops import Poles
 from friso.frequency.members import limit_cases
 from friso.hunting.criteria import FAILED, RESTS, SWINGS, end_of_traces, outcomes, peaks_in_traces, settling_of_traces
 from friso.hunting.measures import WINDOW
+from friso.intervals import COVERAGE
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
+
+
+@dataclass(frozen=True)
+class EstimatedValue:
+    """A value and its 95 % interval; NaN if unknown."""
+
+    value: float
+    low: float
+    high: float
+
+
+def median(values: np.ndarray) -> EstimatedValue:
+    """Return the median of values (n,) and its 95 % interval, from those that are not NaN.
+
+    Infinite values are allowed.
+    """
+    ranked = np.sort(values[~np.isnan(values)])
+    if not ranked.size:
+        return EstimatedValue(np.nan, np.nan, np.nan)
+    return EstimatedValue(_middle(ranked), *quantile_interval(ranked, 0.5))
+
+
+def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
+    """Return the 95 % interval of a quantile of a population, from values (n,) drawn from it.
+
+    A fraction `share` of the population lies below the quantile. The interval by order statistics (David, Nagaraja
+    2003, Order Statistics, Sec. 7.1) holds for any distribution. It is infinite for too few values.
+    """
+    ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
+    low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))
+    return float(ranked[low]), float(ranked[high + 1])
+
+
+def _middle(ordered: np.ndarray) -> float:
+    """Return the median of ordered values, which may be infinite."""
+    low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
+    return float(low if low == high else (low + high) / 2)
+
+
+def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
+    """Return how much more probable an event is with a change than `before`, on paired machines.
+
+    `flags` and `before`, (count,), are true for machines with the event. The interval is Wald's, with half a machine
+    added to every cell (Agresti, Min 2005, doi:10.1002/sim.1781). The result is NaN without machines.
+    """
+    count = len(flags)
+    if not count:
+        return EstimatedValue(np.nan, np.nan, np.nan)
+    gained, lost = (int(np.count_nonzero(cell)) for cell in (flags & ~before, ~flags & before))
+    more, less, total = gained + 0.5, lost + 0.5, count + 2
+    centre = (more - less) / total
+    half = COVERAGE * np.sqrt((more + less) - (more - less) ** 2 / total) / total
+    return EstimatedValue((gained - lost) / count, max(-1.0, float(centre - half)), min(1.0, float(centre + half)))
+
 
 DENSITY, SLOWEST, FASTEST = 25, 0.1, 10.0
 """Frequencies at which loops are evaluated: per decade, apart from those near resonances; the lowest, over the slowest

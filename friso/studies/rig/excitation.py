@@ -12,8 +12,7 @@ from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, from_log
 from friso.identification.response.response import Channels, FrequencyResponse
 from friso.stage import Stage
-from friso.studies.rig.outcome import RigLog, stopped
-from friso.studies.rig.sizes import friction, interval, pace
+from friso.studies.rig.outcome import RigLog, friction, interval, pace, stopped
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import standing
 

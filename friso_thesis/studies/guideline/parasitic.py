@@ -8,8 +8,7 @@ from typing import Any
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency import crossover
-from friso.frequency.crossover import limits
-from friso.frequency.ranges import Range
+from friso.frequency.crossover import Range, limits
 from friso.stage import Stage
 
 FREQUENCIES = (100.0, 200.0, 300.0, 600.0, 1000.0)

@@ -16,8 +16,7 @@ from friso.progress import Progress
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.rig.moves_on_rails import crossover, crossover_key, move, with_joint
-from friso.studies.rig.outcome import Outcome, rig_log
-from friso.studies.rig.sizes import interval
+from friso.studies.rig.outcome import Outcome, interval, rig_log
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import MoveTask, standing
 

@@ -41,8 +41,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import rig_log
-from friso.studies.rig.sizes import freed, locked_stage, pace, travel
+from friso.studies.rig.outcome import freed, locked_stage, pace, rig_log, travel
 from friso_thesis.studies.rig.in_position import InPosition, in_position
 from friso_thesis.studies.rig.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover, limits_of_crossover

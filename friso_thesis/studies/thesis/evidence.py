@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from friso.engine.simulate import simulate
 from friso.equations.controllers.van_dijk import ALPHA
-from friso.studies.request import Request
+from friso.studies.study import Request
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Response
 from friso_thesis.studies.thesis.experiments import Experiments

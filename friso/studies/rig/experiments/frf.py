@@ -17,8 +17,19 @@ from friso.identification.response.response import FrequencyResponse
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.studies.rig.excitation import estimate_plant, excite, loop
-from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked_stage, pace, quicker, travel
+from friso.studies.rig.outcome import (
+    WIDE,
+    Outcome,
+    RigLog,
+    freed,
+    interval,
+    jointed,
+    locked_stage,
+    pace,
+    quicker,
+    rig_log,
+    travel,
+)
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import standing
 

@@ -30,8 +30,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, rig_log
-from friso.studies.rig.sizes import pace
+from friso.studies.rig.outcome import Outcome, pace, rig_log
 from friso.virtual_rig.run import RecordedRuns
 from friso.virtual_rig.task import MoveTask
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER
 from friso.stage import loads
-from friso.studies.samples import Samples
+from friso.studies.axes import Samples
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
 from friso_thesis.studies.thesis.settings import settings

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import WANTED, Range
 from friso.frequency.margins import Margins
-from friso.frequency.ranges import Range
 from friso.frequency.settings import settings as frequency_settings
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text

@@ -10,7 +10,7 @@ from functools import cache
 
 import sympy as sp
 
-from friso.frequency.stiffness import in_series
+from friso.frequency.members import in_series
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.linear import PLANT, Springs
 from friso_thesis.studies.thesis.settings import settings

@@ -13,12 +13,11 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import range_end, searched_crossovers, stable_crossovers
+from friso.frequency.crossover import range_end, ranges_below, searched_crossovers, stable_crossovers
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import controller_response, loops, plant_poles, plants
 from friso.frequency.margins import Margins, frequencies, margins, with_resonances
 from friso.frequency.members import concatenate_families, limit_cases
-from friso.frequency.ranges import ranges_below
 from friso.frequency.settings import settings as frequency_settings
 from friso.stage import Stage
 from friso.studies.rig.experiments.frf import SETTINGS as MEASURED_SETTINGS

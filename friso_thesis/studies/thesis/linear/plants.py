@@ -12,10 +12,9 @@ from scipy.signal import find_peaks
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import plant_poles, plants
 from friso.frequency.margins import frequencies
-from friso.frequency.members import Members, limit_cases
+from friso.frequency.members import Members, limit_cases, limiter_in_series
 from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.settings import settings
-from friso.frequency.stiffness import limiter_in_series
 from friso.stage.tables import friction_law
 
 PARASITIC = 300.0

@@ -11,13 +11,12 @@ import numpy as np
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.bode import PRESCRIBED
+from friso.frequency.crossover import Range, ranges_below
 from friso.frequency.family import loops, spectral_abscissa
 from friso.frequency.friction import law_of, speeds
 from friso.frequency.loops import closed_loop
 from friso.frequency.members import Members, member
-from friso.frequency.operating_point import operating_point
-from friso.frequency.parts import DISTURBANCE, cart_states
-from friso.frequency.ranges import Range, ranges_below
+from friso.frequency.parts import DISTURBANCE, cart_states, operating_point
 from friso.frequency.settings import settings
 
 SPEEDS = 257

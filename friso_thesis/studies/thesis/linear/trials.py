@@ -10,8 +10,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.frequency.margins import Margins, margins
-from friso.frequency.members import limit_cases
-from friso.frequency.stiffness import in_series
+from friso.frequency.members import in_series, limit_cases
 from friso.stage import Stage
 from friso_thesis.studies.thesis.studies import LOCKED
 
