@@ -9,7 +9,7 @@ and frequency takes a few operations.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -226,9 +226,7 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
         return np.zeros((len(masses.a), len(s)), complex)
     cart = cart_states(flat)
     held = [i for i, name in enumerate(masses.states) if name not in cart]
-    a, b, c = masses.a[:, held][:, :, held], masses.b[:, held], masses.c[:, :, held]
-    names = tuple(masses.states[i] for i in held)
-    return replace(masses, a=a, b=b, c=c, states=names).at(s)[..., 0, 0]
+    return masses.keep(held).at(s)[..., 0, 0]
 
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:

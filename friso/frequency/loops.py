@@ -51,10 +51,8 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     channels = machine.take((FORCE, DISTURBANCE), (STAGE, VELOCITY))
     push = machine.b[:, :, [machine.inputs.index(FORCE)]]
     measured, commanded = control.take((STAGE, VELOCITY), (FORCE,)), control.take((REFERENCE, STAGE, *ahead), (FORCE,))
-    a = np.zeros((len(members), n + k, n + k))
-    a[:, :n, :n] = machine.a + push @ measured.d @ channels.c
-    a[:, :n, n:] = push @ control.c
-    a[:, n:, :n], a[:, n:, n:] = measured.b @ channels.c, control.a
+    of_machine = [machine.a + push @ measured.d @ channels.c, push @ control.c]
+    a = np.block([of_machine, [measured.b @ channels.c, control.a]])
     outside = np.zeros((len(members), n + k, 2))
     outside[:, :n] = machine.b
     inside = np.concatenate([push @ commanded.d, commanded.b], axis=1)
@@ -62,7 +60,7 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     force = np.concatenate([measured.d @ channels.c, control.c], axis=2)
     d = np.zeros((len(members), outputs.shape[1] + 1, 4 + len(ahead)))
     d[:, -1:, 2:] = commanded.d
-    system = System(
+    return System(
         a,
         np.concatenate([outside, inside], axis=2),
         np.concatenate([outputs, force], axis=1),
@@ -71,7 +69,6 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
         (FORCE, DISTURBANCE, REFERENCE, NOISE, *ahead),
         (*machine.outputs, FORCE),
     )
-    return system
 
 
 @dataclass(frozen=True)
@@ -212,9 +209,8 @@ def _controls(flat: Mapping[str, Any], members: int, drive: DriveTiming, cut: st
 def _cut(machine: System, control: System) -> System:
     """Return plant and controller in series, from the force to minus the controller's force."""
     machine, control = machine.take((FORCE,), (STAGE, VELOCITY)), control.take((STAGE, VELOCITY), (FORCE,))
-    n, k = len(machine.states), len(control.states)
-    a = np.zeros((len(machine.a), n + k, n + k))
-    a[:, :n, :n], a[:, n:, :n], a[:, n:, n:] = machine.a, control.b @ machine.c, control.a
+    unheld = np.zeros((len(machine.a), len(machine.states), len(control.states)))
+    a = np.block([[machine.a, unheld], [control.b @ machine.c, control.a]])
     b = np.concatenate([machine.b, control.b @ machine.d], axis=1)
     c = -np.concatenate([control.d @ machine.c, control.c], axis=2)
     return System(a, b, c, -control.d @ machine.d, machine.states + control.states, (FORCE,), (FORCE,))

@@ -5,7 +5,7 @@ Find the friction law's steady state: stuck under a bias force, or sliding at a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 
 from friso.equations.blocks import Controller, Loop
-from friso.equations.component import Component
+from friso.equations.component import Component, Kink
 from friso.equations.continuous import continuous_controller
 from friso.equations.joint import touching
 from friso.equations.model import REFERENCE as REFERENCE_COURSE
@@ -90,7 +90,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
-    values |= {**_limiter(members.touched), **_on_flank()}
+    values |= {**_ahead(touching, members.touched.astype(float)), **_ahead(flanks, 1.0)}
     values |= {str(symbol): 0.0 for symbol in REFERENCE_COURSE}  # the reference rests
     bodies = {form.cart: law_of(flat)}
     if form.motor:
@@ -115,25 +115,18 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
         actual = "a backlash" if drive.backlash else "friction at the motor"
         raise InputError("transmission", actual, "the friction of the guide alone", "friso check, which simulates")
     declared = _plant(replace(shared_structure(flat).standing, friction="none", friction_variant=None)).declared
-    return declared.at({**flat, **_limiter(touched)}, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
+    masses = declared.at({**flat, **_ahead(touching, touched.astype(float))}, len(touched))
+    return masses.take((FORCE, DISTURBANCE), (STAGE, CART))
 
 
-def _limiter(touched: np.ndarray) -> dict[str, Any]:
-    """Return the symbols that say whether the limiter is touched, by name, with their values.
+def _ahead(kinks: Callable[[sp.Expr], tuple[Kink, Kink]], values: Any) -> dict[str, Any]:
+    """Return the symbols of the stops ahead and behind, by name: `values` say where the one ahead is touched.
 
-    Where `touched` is true, the limiter is touched ahead, else it is free.
+    With the limiter, members that touch it do so ahead. With a backlash, the motor stands on the flank ahead, on which
+    it pushes the load forward.
     """
-    ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
-    return {ahead: touched.astype(float), behind: 0.0}
-
-
-def _on_flank() -> dict[str, Any]:
-    """Return the symbols that say where the backlash is, by name, with their values.
-
-    The motor stands on the flank ahead, on which it pushes the load forward.
-    """
-    ahead, behind = (str(kink.beyond) for kink in flanks(sp.S.Zero))
-    return {ahead: 1.0, behind: 0.0}
+    ahead, behind = (str(kink.beyond) for kink in kinks(sp.S.Zero))
+    return {ahead: values, behind: 0.0}
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
@@ -225,11 +218,7 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
         share = system.a[:, z, velocity]
         for matrix in (a, c):
             matrix[:, :, position] += share[:, None] * matrix[:, :, z]
-    external = [i for i, name in enumerate(system.states) if name not in internal]
-    states = tuple(system.states[i] for i in external)
-    return replace(
-        system, a=a[:, external][:, :, external], b=system.b[:, external], c=c[:, :, external], states=states
-    )
+    return replace(system, a=a, c=c).keep([i for i, name in enumerate(system.states) if name not in internal])
 
 
 def _without_constants(system: System, internal: tuple[str, ...]) -> System:
@@ -238,7 +227,4 @@ def _without_constants(system: System, internal: tuple[str, ...]) -> System:
     An example is the force of an element that slips. Such a state would be a pole at 0.
     """
     unmoved = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
-    moving = [i for i in range(len(system.states)) if i not in unmoved]
-    states = tuple(system.states[i] for i in moving)
-    a, b, c = system.a[:, moving][:, :, moving], system.b[:, moving], system.c[:, :, moving]
-    return replace(system, a=a, b=b, c=c, states=states)
+    return system.keep([i for i in range(len(system.states)) if i not in unmoved])

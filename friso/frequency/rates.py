@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
@@ -31,23 +31,12 @@ from friso.stage.rig import LOOPS
 
 
 @dataclass(frozen=True)
-class Lifted:
+class Lifted(System):
     """A system of a drive over the period of its loops: x' = a x + b u, y = c x + d u.
 
     x' is x one period later; u and y hold the N samples of a period. Shapes are a (members, n, n), b (members, n, N), c
     (members, N, n), and d (members, N, N).
     """
-
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    d: np.ndarray
-
-    def at(self, points: np.ndarray) -> Complex:
-        """Return the transfer matrices at points (k,) of z to the power N, shape (members, k, N, N)."""
-        shifted = points[:, None, None] * np.eye(self.a.shape[-1]) - self.a[:, None]
-        states = np.linalg.solve(shifted, self.b[:, None].astype(complex)).astype(complex)
-        return self.c[:, None].astype(complex) @ states + self.d[:, None]
 
     def over(self, turn: np.ndarray) -> Complex:
         """Return the transfer matrices at frequencies given by a signal's `turn` [rad] in a sample.
@@ -147,10 +136,8 @@ def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndar
 
     `machine` is the plant, and `controls` the controller at each sample of the period.
     """
-    whole = _identity(machine, controls[0])
-    for control in controls:
-        whole = _step(machine, control, 1.0) @ whole
-    return whole
+    first, *later = (_step(machine, control, 1.0) for control in controls)
+    return reduce(lambda whole, step: step @ whole, later, first)
 
 
 def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
@@ -208,14 +195,5 @@ def _step(machine: System, control: System, shut: float) -> np.ndarray:
     The plant is `machine`, and the shape (members, n, n). `shut` is 1 if the loop is closed, so that the controller's
     force acts, and 0 if it is cut.
     """
-    n, k = machine.a.shape[-1], control.a.shape[-1]
-    step = np.zeros((len(machine.a), n + k, n + k))
-    step[:, :n, :n] = machine.a + shut * (machine.b @ control.d @ machine.c)
-    step[:, :n, n:] = shut * (machine.b @ control.c)
-    step[:, n:, :n], step[:, n:, n:] = control.b @ machine.c, control.a
-    return step
-
-
-def _identity(machine: System, control: System) -> np.ndarray:
-    size = machine.a.shape[-1] + control.a.shape[-1]
-    return np.broadcast_to(np.eye(size), (len(machine.a), size, size))
+    of_machine = [machine.a + shut * (machine.b @ control.d @ machine.c), shut * (machine.b @ control.c)]
+    return np.block([of_machine, [control.b @ machine.c, control.a]])

@@ -6,7 +6,7 @@ Linearise equations: derive the Jacobian in symbols, and evaluate it for many st
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -29,9 +29,9 @@ class System:
     b: np.ndarray
     c: np.ndarray
     d: np.ndarray
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    states: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
 
     def take(self, inputs: Sequence[str], outputs: Sequence[str]) -> System:
         """Return the system with the given inputs and outputs only, in this order."""
@@ -39,6 +39,11 @@ class System:
         rows = [self.outputs.index(name) for name in outputs]
         b, c, d = self.b[..., columns], self.c[..., rows, :], self.d[..., rows, :][..., columns]
         return System(self.a, b, c, d, self.states, tuple(inputs), tuple(outputs))
+
+    def keep(self, numbers: Sequence[int]) -> System:
+        """Return the system with some of its states only, the others being 0."""
+        a, b, c = self.a[:, numbers][:, :, numbers], self.b[:, numbers], self.c[:, :, numbers]
+        return replace(self, a=a, b=b, c=c, states=tuple(self.states[i] for i in numbers))
 
     def sees(self, name: str) -> bool:
         """Tell whether any state or output depends on the input with this name."""
@@ -50,8 +55,7 @@ class System:
 
         The result has shape (members, k, p, m).
         """
-        n = len(self.states)
-        shifted = points[..., None, None] * np.eye(n) - self.a[:, None]
+        shifted = points[..., None, None] * np.eye(self.a.shape[-1]) - self.a[:, None]
         answers = np.linalg.solve(shifted, self.b[:, None])
         return (self.c[:, None] @ answers + self.d[:, None]).astype(complex)
 

@@ -25,7 +25,7 @@ from friso.interface.output_folder import UNFINISHED, write
 from friso.progress import Tally, silent
 from friso.stage import Stage
 from friso_thesis.questions.guideline.words import parasitic_sentences, sentences
-from friso_thesis.studies.guideline import checks, compute, parasitic, persistence, sweeps, worked
+from friso_thesis.studies.guideline import compute, persistence, sweeps, worked
 from friso_thesis.studies.guideline.claims import judged_claims, least_gap
 from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
 from friso_thesis.studies.guideline.groups import (
@@ -39,9 +39,9 @@ from friso_thesis.studies.guideline.groups import (
     values_of,
 )
 from friso_thesis.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fit_law, rates_in_series
-from friso_thesis.studies.guideline.parasitic import ParasiticLimits, holding
 from friso_thesis.studies.guideline.persistence import swings_from_any_distance
 from friso_thesis.studies.guideline.thesis_rig import plain_rig
+from friso_thesis.studies.guideline.worked import ParasiticLimits, holding
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 RIGID = pytest.mark.xdist_group("rigid")
@@ -386,11 +386,11 @@ def quick() -> compute.Guideline:
 def shortened(patch: pytest.MonkeyPatch) -> None:
     """Leave out all that takes long after the sweeps."""
     patch.setattr(
-        compute, "simulate_samples", lambda sweep, most: checks.SimulationCheck(most, most, 0, most, 0, 100, 0)
+        compute, "simulate_samples", lambda sweep, most: compute.SimulationCheck(most, most, 0, most, 0, 100, 0)
     )
     patch.setattr(compute, "worked", shown)
     patch.setattr(compute, "_compile", lambda: None)
-    patch.setattr(parasitic, "FREQUENCIES", (300.0,))
+    patch.setattr(worked, "FREQUENCIES", (300.0,))
 
 
 def invented(stages: Any, grid: np.ndarray) -> Edges:

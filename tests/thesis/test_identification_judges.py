@@ -17,8 +17,7 @@ from friso_thesis.studies.thesis.experiments import (
     joint_steps,
     slow_motion,
 )
-from friso_thesis.studies.thesis.judges.identified_in_time import judged_slips, judged_speeds, judged_steps
-from friso_thesis.studies.thesis.judges.identified_responses import judged_line
+from friso_thesis.studies.thesis.judges.identified_in_time import judged_line, judged_slips, judged_speeds, judged_steps
 from friso_thesis.studies.thesis.linear import analysed
 from friso_thesis.studies.thesis.linear.plants import limit_cases_of
 from friso_thesis.studies.thesis.studies import thesis_rig

@@ -12,17 +12,18 @@ import sympy as sp
 from friso.frequency.bode import bode
 from friso.frequency.family import spectral_abscissa
 from friso.frequency.members import Members, concatenate_families, limit_cases
-from friso_thesis.studies.thesis import Evidence, Finding, thesis_rig
-from friso_thesis.studies.thesis.claims import registered
-from friso_thesis.studies.thesis.judges.series_stiffness import (
+from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
+from friso_thesis.studies.thesis.judges.control_law import (
     PRINTED_SENSITIVITY,
     PRINTED_STIFFNESS,
     in_the_plant,
     judged_formulas,
 )
-from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, Springs, analysed
+from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, analysed
+from friso_thesis.studies.thesis.linear.plants import Springs
 from friso_thesis.studies.thesis.linear.speeds import abscissa_with_bristles
 from friso_thesis.studies.thesis.space import OPEN
+from friso_thesis.studies.thesis.studies import thesis_rig
 
 pytestmark = pytest.mark.xdist_group("linear-claims")
 

@@ -22,6 +22,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 from friso.engine.tolerance import checked_rtol
 from friso.frequency.describing.function import checked_positive, dynamic_stiffness
@@ -159,38 +160,15 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
     above = reached >= forces[:, None, None]
     computed = np.isfinite(reached[:, :-1] + reached[:, 1:])
     force, frequency, cell = np.nonzero((above[:, :, :-1] != above[:, :, 1:]) & inside & computed)
-    low, high = (np.log(amplitudes[frequency, cell + side]) for side in (0, 1))
-    f_low, f_high = (np.log(reached[frequency, cell + side] / forces[force]) for side in (0, 1))
-    rising = f_high > f_low
-    middle, error = _illinois(
-        lambda x, which: np.log(driven.answer(np.exp(x), frequency[which])[0] / forces[force[which]]),
-        (low, high),
-        (f_low, f_high),
+    root = find_root(
+        lambda x, at, size: np.log(driven.answer(np.exp(x), at)[0] / size),
+        tuple(np.log(amplitudes[frequency, cell + side]) for side in (0, 1)),
+        args=(frequency, forces[force]),
+        tolerances={"fatol": settings.force_error},
+        maxiter=settings.most_root_steps,
     )
-    return Roots(force, frequency, np.exp(middle), rising, np.abs(error), np.any(inside & ~computed, axis=2))
-
-
-def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Return zeros of many functions between ends of opposite sign, and the remaining values.
-
-    `ends` are the lower and upper ends, `values` the functions there. The method takes the secant of the bracket, and
-    halves the value at an end that stays (Illinois).
-    """
-    (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)
-    best, left = low.copy(), np.full(len(low), np.inf)
-    open_ = np.arange(len(low))
-    for _ in range(settings.most_root_steps):
-        if not open_.size:
-            break
-        a, b, f_a, f_b = low[open_], high[open_], f_low[open_], f_high[open_]
-        x = (a * f_b - b * f_a) / (f_b - f_a)
-        f = function(x, open_)
-        best[open_], left[open_] = x, f
-        upper = np.sign(f) == np.sign(f_b)
-        f_low[open_], f_high[open_] = np.where(upper, f_a / 2, f), np.where(upper, f, f_b / 2)
-        low[open_], high[open_] = np.where(upper, a, x), np.where(upper, x, b)
-        open_ = open_[np.abs(f) > settings.force_error]
-    return best, left
+    rising = reached[frequency, cell + 1] > reached[frequency, cell]
+    return Roots(force, frequency, np.exp(root.x), rising, np.abs(root.f_x), np.any(inside & ~computed, axis=2))
 
 
 NOT_FOUND = "no amplitude was found at which this force moves the cart"

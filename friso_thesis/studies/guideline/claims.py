@@ -152,9 +152,8 @@ def _edges(worked: Worked) -> GuidelineClaim:
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
         text,
-        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of "
-        f"{OWN.about:g} of both "
-        "numbers",
+        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of {OWN.about:g} of "
+        "both numbers",
         _judgement(near),
     )
 

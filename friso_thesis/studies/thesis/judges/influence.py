@@ -92,23 +92,21 @@ def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Find
         for name, of in (("locked", locked), ("free", free))
         for place, key in enumerate(orders[name], 1)
     )
-    return Finding(
-        (
-            Part(
-                "with the joint locked the crossover separates the stages that hunt from the others best",
-                orders["locked"][0] == "crossover",
-                _listed(locked, orders["locked"]),
-                why="Another parameter of Table 3 decides more, over its range.",
-            ),
-            Part(
-                "with it free, of the parameters of the joint and the friction, stroke and stiffness do best, the "
-                "crossover apart",
-                {"stroke", "joint stiffness"} == set([key for key in orders["free"] if key != "crossover"][:2]),
-                _listed(free, orders["free"]),
-                why="Another parameter of Table 3 decides more, over its range.",
-            ),
+    return Finding.of(
+        Part(
+            "with the joint locked the crossover separates the stages that hunt from the others best",
+            orders["locked"][0] == "crossover",
+            _listed(locked, orders["locked"]),
+            why="Another parameter of Table 3 decides more, over its range.",
         ),
-        FindingTable(("joint", "rank", "parameter", "rank-biserial correlation"), rows),
+        Part(
+            "with it free, of the parameters of the joint and the friction, stroke and stiffness do best, the "
+            "crossover apart",
+            {"stroke", "joint stiffness"} == set([key for key in orders["free"] if key != "crossover"][:2]),
+            _listed(free, orders["free"]),
+            why="Another parameter of Table 3 decides more, over its range.",
+        ),
+        table=FindingTable(("joint", "rank", "parameter", "rank-biserial correlation"), rows),
     )
 
 
