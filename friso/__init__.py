@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from friso.frequency.analysis import linear
     from friso.frequency.describing.function import describing
     from friso.frequency.describing.response import mass_line, plant_response
+    from friso.frequency.margins import Tuning, tuning
     from friso.frequency.members import Members, member
-    from friso.frequency.tuning import Tuning, tuning
     from friso.interface.starting import example, init, schema
     from friso.questions.bode.question import bode
     from friso.questions.boundary.question import boundary
@@ -46,7 +46,7 @@ _PLACES = {
     "friso.frequency.describing.function": ("describing",),
     "friso.frequency.describing.response": ("mass_line", "plant_response"),
     "friso.frequency.members": ("Members", "member"),
-    "friso.frequency.tuning": ("Tuning", "tuning"),
+    "friso.frequency.margins": ("Tuning", "tuning"),
     "friso.stage": ("Stage", "load", "loads", "save"),
     "friso.studies.harmonic_balance": ("harmonic_balance",),
     "friso.studies.axes": ("Samples",),

@@ -29,10 +29,9 @@ from variants import (
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.imposed import imposed_form
-from friso.frequency.describing.function import describing, dynamic_stiffness
-from friso.frequency.describing.loop import TOUCHES
+from friso.frequency.describing.balance import TOUCHES
+from friso.frequency.describing.function import Imposition, describing, dynamic_stiffness, steady
 from friso.frequency.describing.response import MISSING, NOT_FOUND, mass_line, plant_response
-from friso.frequency.describing.steady import Imposition, steady
 from friso.frequency.settings import FrequencySettings
 from friso.stage import Stage
 from friso.stage.tables import FRICTION

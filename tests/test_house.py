@@ -39,7 +39,7 @@ ABOUT_TUNING = (
         "friso_thesis/",
         "studies/compare/options.py",
     ),
-    *("frequency/tuning.py", "identification/stage_file.py", "identification/output_error/problem.py"),
+    *("frequency/margins.py", "identification/stage_file.py", "identification/output_error/problem.py"),
 )
 """Modules that import a form of the PID controller: the design method, the thesis and the guideline are about van
 Dijk's rules (Eq. 7, 8); identify makes controllers of its own, and compare one with an observer."""

@@ -19,7 +19,7 @@ from friso.equations.friction.common import direction
 from friso.equations.friction.gms import STIFFNESS
 from friso.equations.friction.measured import power_law
 from friso.errors import InputError
-from friso.frequency.friction import steady_force
+from friso.frequency.members import steady_force
 from friso.identification.readings.common import stribeck_curve
 from friso.shown.drawing import matplotlib_renderer
 from friso.stage import Stage

@@ -10,7 +10,7 @@ import friso
 from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.progress import silent
 from friso.stage import Stage
-from friso.studies.rig import excitation, many_speeds, outcome
+from friso.studies.rig import many_speeds, outcome
 from friso.studies.rig.experiments import constant_speed, frf, stiction, stiffness
 from friso.studies.rig.outcome import rig_log
 
@@ -90,8 +90,8 @@ def test_the_measured_loop_is_the_one_computed_and_crosses_where_tuned(built: St
     _, loops = frf.open_loops(stage, PLACE, 1, frf.SETTINGS)
     for item in loops[2:]:
         assert frf.crossing_near_target(item) == pytest.approx(item.tuned, rel=0.15)
-    log = rig_log(excitation.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)
-    plant, loop = excitation.estimate_plant([log]), excitation.loop(log)
+    log = rig_log(outcome.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)
+    plant, loop = outcome.estimate_plant([log]), outcome.loop(log)
     hertz = plant.frequency
     control = _controller(stage, hertz)
     inside = (hertz > 4) & (hertz < 150)
@@ -127,7 +127,7 @@ def test_an_experiment_on_the_joint_needs_one(built: Stage, refused: Refused) ->
 
 def test_a_standing_stage_is_simulated_as_exactly_as_a_moving_one(built: Stage) -> None:
     """A motion of no length gave tolerances without bound: the cart's velocity changed its sign unseen."""
-    log = rig_log(excitation.excite(outcome.locked_stage(built), PLACE, 1), 0, "", None, built, 1)
+    log = rig_log(outcome.excite(outcome.locked_stage(built), PLACE, 1), 0, "", None, built, 1)
     flat = built.flat()
     assert not log.failure
     deflection = log.true["bristle_deflection"] * flat["friction.bristle_stiffness"]

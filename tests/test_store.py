@@ -39,8 +39,7 @@ from friso.studies.metric import is_text
 from friso.studies.sealed_store import SealedStore
 from friso.studies.settings import StudySettings
 from friso.studies.store import KeptCells, Store, check_store, read_store
-from friso.studies.store_files import keep_arrays, kept_arrays
-from friso.studies.store_folder import LOCK, make
+from friso.studies.store_files import LOCK, keep_arrays, kept_arrays, make
 from friso.studies.study import Request, study_of
 from friso.studies.sweep import run_in_store, sweep
 
@@ -316,7 +315,7 @@ HOLD = """
 import sys, time
 from pathlib import Path
 import friso
-from friso.studies.store_folder import LOCK
+from friso.studies.store_files import LOCK
 from friso.studies.study import Request
 from friso.studies.store import Store
 

@@ -63,7 +63,7 @@ from friso.questions.tune.words import (
 from friso.remedies import method
 from friso.remedies import search as search_module
 from friso.remedies import verified as verified_module
-from friso.remedies.catalogue import BANDWIDTH, Remedy, of_key, remedies
+from friso.remedies.catalogue import BANDWIDTH, Remedy, of_key, remedies, suggestion
 from friso.remedies.least import LEAST, ChangeSize, candidates, change_costs, change_size, least_changes, least_remedy
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import Advice, _not_seen, _Session, pairs, tune
@@ -71,7 +71,6 @@ from friso.remedies.relax import _tolerances, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints, _evolve
 from friso.remedies.sensitivities import Sensitivities, _is_smooth, _of_settling, sensitivity
 from friso.remedies.settings import RemedySettings
-from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.verified import (
     ONE,

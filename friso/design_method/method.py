@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.choice import ChosenLeaves, Confirmed, chosen, confirmed
+from friso.design_method.choice import Candidate, ChosenLeaves, Confirmed, chosen, confirmed, front
 from friso.design_method.controller import (
     DesignedController,
     Modal,
@@ -21,12 +21,18 @@ from friso.design_method.controller import (
     comfortable_below,
     dampings,
 )
-from friso.design_method.edges import Corners, OtherLaws, edges_over, rigid, under_law, worst_edges
-from friso.design_method.front import Candidate, front
-from friso.design_method.population import Population, corners
+from friso.design_method.population import (
+    Corners,
+    OtherLaws,
+    Population,
+    corners,
+    edges_over,
+    rigid,
+    under_law,
+    worst_edges,
+)
 from friso.design_method.prepare import prepared, with_leaves
-from friso.design_method.relax import Relaxation, relaxed_requirements
-from friso.design_method.requirements import LeafTask
+from friso.design_method.requirements import LeafTask, Relaxation, relaxed_requirements
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.design_method.verification import HuntingMap, Verification, hunting_map, verification

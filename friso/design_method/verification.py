@@ -15,6 +15,7 @@ import numpy as np
 from friso.design_method.population import Population, random_machines, typical_move
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
+from friso.engine.arrays import ArrayColumns
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.engine.settings import room_settings
@@ -38,7 +39,7 @@ THERE_AND_BACK = {
 
 
 @dataclass(frozen=True)
-class MachineOutcomes:
+class MachineOutcomes(ArrayColumns):
     """Outcomes of machines after their moves, as arrays of shape (count,).
 
     `words` say what the run does until its end (`friso.hunting.criteria.run_outcome`), with the position window as
@@ -51,10 +52,6 @@ class MachineOutcomes:
     words: np.ndarray
     settling: np.ndarray
     swing: np.ndarray
-
-    def first(self, count: int) -> MachineOutcomes:
-        """Return the outcomes of the first machines, `count` of them."""
-        return MachineOutcomes(self.words[:count], self.settling[:count], self.swing[:count])
 
     @property
     def completed(self) -> np.ndarray:
@@ -125,7 +122,7 @@ class Verification:
 
     @property
     def compared(self) -> MachineOutcomes:
-        return self.free.first(len(self.locked.words))
+        return self.free.take(slice(len(self.locked.words)))
 
 
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:

@@ -17,7 +17,7 @@ from friso.equations.continuous import slow_gains
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage.controllers import ControllerSection, controller_of
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 
 FlatMachine = Mapping[str, Any]
 Sizes = Callable[[FlatMachine, float], dict[str, float]]

@@ -27,8 +27,7 @@ from friso.stage.filters import FILTER_RULE, FilterForm, FilterRule, filter_form
 from friso.stage.motion import KIND as MOTION_KIND
 from friso.stage.motion import QUADRATIC, ReferenceForm, motion_of
 from friso.stage.rig import LOOPS, IntegralRule
-from friso.stage.tables import friction_law
-from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
+from friso.stage.tables import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction, friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
 

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from friso.errors import InputError
-from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
-from friso.frequency.members import Members, limit_cases, limiter_in_series, limiter_states
+from friso.frequency.members import Members, level, limit_cases, limiter_in_series, limiter_states
 from friso.frequency.parts import FORCE, RATED, REFERENCE, STAGE, VELOCITY, compensator, plant, reference_derivatives
 from friso.frequency.system import System
 from friso.quantities import quoted

@@ -16,7 +16,6 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster, sped_up
 from friso.equations.settings import gain_states
-from friso.frequency.drive import DriveTiming
 from friso.frequency.family import (
     PoleStability,
     bare_loops,
@@ -27,9 +26,9 @@ from friso.frequency.family import (
 )
 from friso.frequency.loops import poles
 from friso.frequency.margins import margins, with_resonances
-from friso.frequency.members import Members, concatenate_families, family, limit_cases
+from friso.frequency.members import Members, family, limit_cases
 from friso.frequency.settings import settings
-from friso.frequency.system import Complex
+from friso.frequency.system import Complex, DriveTiming
 from friso.stage import Stage
 
 GRID = np.geomspace(0.01, 1e4, 800)
@@ -241,7 +240,7 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
     A stage is in one of them unless it creeps or has just broken away, while its friction falls with speed.
     """
     members = family(flat, settings.search_biases, 2)
-    return concatenate_families([*limit_cases(flat).values(), members[members.stuck]])
+    return Members.joined([*limit_cases(flat).values(), members[members.stuck]])
 
 
 def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:

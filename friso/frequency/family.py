@@ -17,11 +17,9 @@ import numpy as np
 
 from friso.engine.side_by_side import side_by_side
 from friso.equations.structure import shared_structure
-from friso.frequency.drive import DriveTiming
-from friso.frequency.friction import law_of
-from friso.frequency.loops import Poles, poles
+from friso.frequency.loops import Poles, controller_over_period, poles, samples_controller
 from friso.frequency.margins import frequencies, margins
-from friso.frequency.members import Members, concatenate_families, limit_cases
+from friso.frequency.members import Members, law_of, limit_cases
 from friso.frequency.parts import (
     FORCE,
     RATED,
@@ -33,9 +31,8 @@ from friso.frequency.parts import (
     operating_point,
     plant,
 )
-from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.settings import settings
-from friso.frequency.system import Complex, System
+from friso.frequency.system import Complex, DriveTiming, System
 
 _T = TypeVar("_T")
 
@@ -184,7 +181,7 @@ def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
 
     There are `density` per decade, and more about the resonances of plant and closed loop.
     """
-    cases = concatenate_families([*limit_cases(flat).values()])
+    cases = Members.joined(limit_cases(flat).values())
     return frequencies(
         flat, cases, DriveTiming.of(flat), density, [plant_poles(flat, cases), closed_loop_poles(flat, cases)]
     )

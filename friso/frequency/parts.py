@@ -23,10 +23,9 @@ from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
 from friso.equations.transmission import flanks
 from friso.errors import InputError
-from friso.frequency.friction import FORWARD, law_of, motor_law_of
-from friso.frequency.members import Members
+from friso.frequency.members import FORWARD, Members, law_of, motor_law_of
 from friso.frequency.system import Declared, System
-from friso.stage.transmission import MOTOR_STATES, STATE_PREFIX, of_motor
+from friso.stage.tables import MOTOR_STATES, STATE_PREFIX, of_motor
 
 
 def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.settings import check_settings
 from friso.stage import Stage
 from friso.stage.controllers import NO_SETTINGS, controller_of
-from friso.stage.transmission import BACKLASH, MOTOR_MASS, MOTOR_STATES
+from friso.stage.tables import BACKLASH, MOTOR_MASS, MOTOR_STATES
 
 LoopState = Literal["sticks", "slides"]
 LowerGains = Literal["stable", "unstable", "unknown"]

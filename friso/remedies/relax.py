@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.design_method.relax import Relaxation
+from friso.design_method.requirements import Relaxation
 from friso.engine.allowance import Exhausted
 from friso.quantities import outwards
 from friso.remedies.catalogue import Remedy

@@ -16,6 +16,7 @@ from scipy.optimize import brentq, differential_evolution
 from scipy.stats import qmc
 
 from friso.engine.allowance import Allowance, Exhausted, allowance
+from friso.engine.arrays import ArrayColumns
 from friso.frequency.crossover import loop_bandwidths
 from friso.remedies.catalogue import Remedy
 from friso.remedies.machines import Fleet, Goal
@@ -43,7 +44,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class TriedPoints:
+class TriedPoints(ArrayColumns):
     """The settings that were tried, one point in each row, and how the machines performed.
 
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Three
@@ -74,10 +75,6 @@ class TriedPoints:
         """Return a table without any points, for `variables` variables."""
         none = np.zeros(0)
         return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool), none)
-
-    def take(self, numbers: np.ndarray) -> TriedPoints:
-        """Return the points with these indices."""
-        return TriedPoints(*(column[numbers] for column in vars(self).values()))
 
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
         """Return for each part of the goal, by name, which points break it, shape (n,)."""
@@ -158,8 +155,7 @@ class Search:
     @property
     def begun(self) -> TriedPoints:
         """Return all settings tried, if any, including those that were stopped early."""
-        tried = self.tried or [TriedPoints.none(len(self.remedy.variables))]
-        return TriedPoints(*(np.concatenate(column) for column in zip(*(vars(s).values() for s in tried), strict=True)))
+        return TriedPoints.joined(self.tried or [TriedPoints.none(len(self.remedy.variables))])
 
     def optimise(
         self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None

@@ -262,10 +262,9 @@ class Performance:
 
     def _first(self, count: int) -> Performance:
         """Return the performance of the first `count` machines only."""
-        moves = Moves(*(column[:, :count] for column in vars(self.moves).values()))
-        attracted = Attraction(*(column[:, :count] for column in vars(self.attraction).values()))
-        margin, sizes = self.margin[:, :count], self.sizes[:count]
-        return replace(self, moves=moves, margin=margin, attraction=attracted, sizes=sizes)
+        some = np.s_[:, :count]
+        moves, attracted = self.moves.take(some), self.attraction.take(some)
+        return replace(self, moves=moves, margin=self.margin[some], attraction=attracted, sizes=self.sizes[:count])
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
         """Return the performance with `further` machines added.

@@ -42,18 +42,23 @@ from friso.stage.section import (
 from friso.stage.tables import (
     FRICTION,
     MOTOR_CONSTANT,
+    MOTOR_FRICTION,
+    MOTOR_MASS,
     Actuator,
     AxisTable,
     Bias,
     Conditions,
+    Encoder,
     FrictionSection,
     Joint,
     Masses,
     Parasitic,
     StatedMoves,
+    Transmission,
     friction_law,
+    motor_mass,
+    of_motor,
 )
-from friso.stage.transmission import MOTOR_FRICTION, MOTOR_MASS, Encoder, Transmission, motor_mass, of_motor
 
 LOGGER = logging.getLogger("friso")
 

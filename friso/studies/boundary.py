@@ -38,9 +38,8 @@ from friso.hunting import (
 )
 from friso.progress import Progress, silent
 from friso.stage import Stage, violations
-from friso.studies.axes import SweptAxis, read_axis
+from friso.studies.axes import SweptAxis, check_links, linked_names, read_axis
 from friso.studies.cells import flat_cells
-from friso.studies.links import check_links, names
 from friso.studies.settings import settings
 
 
@@ -65,7 +64,7 @@ def boundary(
     """
     checked_rtol(rtol)
     followers, example = dict(links or {}), range_example(stage.flat())
-    ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
+    ranges = tuple(_range(stage, name, text, linked_names(followers), log) for name, text in axes.items())
     if len(ranges) not in (1, 2):
         raise InputError("axes", f"{len(ranges)} keys", "one key or two", example)
     check_links(stage, followers, frozenset(swept.key for swept in ranges))

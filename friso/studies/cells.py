@@ -23,8 +23,7 @@ from friso.hunting.criteria import FAILED
 from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.stage import Stage, violations
 from friso.stage.rig import is_as_built
-from friso.studies.axes import scaled
-from friso.studies.links import linked
+from friso.studies.axes import linked, scaled
 from friso.studies.metric import (
     STATUS,
     Metric,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from friso.engine.allowance import allowance
+from friso.engine.arrays import ArrayColumns
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import at_bandwidth, bandwidth
 from friso.equations.structure import shared_structure
@@ -21,7 +22,7 @@ from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
-class Fates:
+class Fates(ArrayColumns):
     """Verdicts on drawn stages, and which of their linear loops are unstable, both (count,).
 
     Verdicts are words of `friso.hunting.criteria.VERDICTS`. A loop counts as `unstable` if it is so while the stage
@@ -84,7 +85,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     except KeyboardInterrupt:
         if not all(parts.values()):
             raise
-    by_variant = {name: _joined(some) for name, some in parts.items()}
+    by_variant = {name: Fates.joined(some) for name, some in parts.items()}
     return {
         name: by_variant[next(other for other, same in variants.items() if same == variant)]
         for name, variant in stage.variants().items()
@@ -210,8 +211,3 @@ def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally
     swings = (np.where(sure, values, np.nan) for values in (attracted.amplitude, attracted.period))
     tally.add(count, "machines drawn")
     return Fates(verdicts, loops_unstable(flat, count), *swings)
-
-
-def _joined(parts: Sequence[Fates]) -> Fates:
-    """Join the verdicts on several groups of stages into one `Fates`."""
-    return Fates(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Fates)))

@@ -37,11 +37,15 @@ from friso.studies.metadata import annotate_metadata, checked_metadata, is_store
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
 from friso.studies.refine import Ask, asked_for
 from friso.studies.settings import settings
-from friso.studies.store_files import ANSWERS, Ledger, keep_arrays, kept_arrays, refuse_foreign
-from friso.studies.store_folder import (
+from friso.studies.store_files import (
+    ANSWERS,
+    Ledger,
     exchange,
+    keep_arrays,
+    kept_arrays,
     lock_store,
     make,
+    refuse_foreign,
     refuse_others_files,
     remove_leftovers,
     remove_partial_files,

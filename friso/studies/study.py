@@ -19,10 +19,19 @@ from friso.engine.cache import code_digest, machine
 from friso.engine.tolerance import checked_rtol
 from friso.errors import InputError
 from friso.stage import Stage, loads
-from friso.studies import links as linking
-from friso.studies.axes import SAMPLE, SCALINGS, AxisValues, Samples, SweptAxis, SweptRange, read_axes, sample_axes
+from friso.studies.axes import (
+    SAMPLE,
+    SCALINGS,
+    AxisValues,
+    Samples,
+    SweptAxis,
+    SweptRange,
+    check_links,
+    linked_names,
+    read_axes,
+    sample_axes,
+)
 from friso.studies.cells import flat_cells
-from friso.studies.links import names as linked_names
 from friso.studies.metric import every_variable, in_order, metrics, usual_metrics
 from friso.version import VERSION
 
@@ -212,7 +221,7 @@ def cells_of(block: CellBlock) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
-_STUDIES = ("axes", "cells", "links", "metric", "refine", "settings", "study")
+_STUDIES = ("axes", "cells", "metric", "refine", "settings", "study")
 _DECISIVE = (
     *("quantities.py", "stage", "equations", "engine", "hunting", "studies/metrics"),
     *(f"studies/{name}.py" for name in _STUDIES),
@@ -282,7 +291,7 @@ class Request:
     log: bool = False
 
     def _read(self, axes: Mapping[str, AxisValues]) -> tuple[SweptAxis | SweptRange, ...]:
-        return read_axes(self.stage, axes, linking.names(self.links), self.log)
+        return read_axes(self.stage, axes, linked_names(self.links), self.log)
 
     def size(self) -> int:
         """Return the number of cells of the study, without making any array.
@@ -318,13 +327,13 @@ class Request:
             raise InputError("axes", "none", "at least one key with its values", example)
         dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
         if self.samples is not None:
-            free = linking.names(self.links)
+            free = linked_names(self.links)
             dimensions.append(Dimension(SAMPLE, sample_axes(self.stage, self.samples, free, self.log)))
         names = [axis.name for dimension in dimensions for axis in dimension.axes]
         for name in names:
             if names.count(name) > 1 or name in (*every_variable(), SAMPLE):
                 raise InputError(name, "a name that is taken", "each axis once, each under a different name")
-        linking.check_links(self.stage, self.links, frozenset(names))
+        check_links(self.stage, self.links, frozenset(names))
         return Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
 
 

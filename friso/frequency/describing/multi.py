@@ -30,7 +30,7 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import DIRECTION, direction
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
-from friso.frequency.describing.loop import TOUCHES, beyond_stroke, receptance
+from friso.frequency.describing.balance import TOUCHES, beyond_stroke, receptance
 from friso.frequency.settings import settings
 from friso.stage.tables import friction_law
 

@@ -25,9 +25,8 @@ import numpy as np
 from scipy.optimize.elementwise import find_root
 
 from friso.engine.tolerance import checked_rtol
-from friso.frequency.describing.function import checked_positive, dynamic_stiffness
-from friso.frequency.describing.loop import TOUCHES, beyond_stroke
-from friso.frequency.describing.steady import RTOL, Imposition
+from friso.frequency.describing.balance import TOUCHES, beyond_stroke
+from friso.frequency.describing.function import RTOL, Imposition, checked_positive, dynamic_stiffness
 from friso.frequency.parts import mechanics
 from friso.frequency.settings import settings
 from friso.stage import Stage
@@ -177,10 +176,7 @@ MISSING = "answers are missing: friction was not found at some amplitude, or the
 
 @check_arguments
 def plant_response(
-    stage: Stage,
-    forces: Sequence[float] | np.ndarray,
-    frequencies: Sequence[float] | np.ndarray,
-    rtol: float = RTOL,
+    stage: Stage, forces: Sequence[float] | np.ndarray, frequencies: Sequence[float] | np.ndarray, rtol: float = RTOL
 ) -> xr.Dataset:
     """First-harmonic response of the plant to sinusoidal actuator forces `forces` [N].
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.design_method.edges import Corners
 from friso.design_method.method import Design
+from friso.design_method.population import Corners
 from friso.frequency.crossover import WANTED, Range
 from friso.questions.design.window import stiffest, view
 from friso.questions.design.words import hertz

@@ -58,7 +58,7 @@ from friso.studies.cells import of_runs_alone, runs_as_built
 from friso.studies.execute import Crew, local_crew
 from friso.studies.settings import settings
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
-from friso.studies.store_folder import ReadOnlyStoreError
+from friso.studies.store_files import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
 from friso.studies.verify import checked_share, loosest_rtol, verify_cells

@@ -134,7 +134,7 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     `overwrite` is set.
     """
     from friso.studies.store import read_store
-    from friso.studies.store_folder import remove_leftovers
+    from friso.studies.store_files import remove_leftovers
 
     remove_leftovers(store)  # a store that was being replaced is put back
     try:
@@ -241,7 +241,7 @@ def write_beside(
     cannot be written.
     """
     from friso.studies.metadata import annotate_metadata
-    from friso.studies.store_folder import lock_store
+    from friso.studies.store_files import lock_store
 
     with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE) if can_note else nullcontext():
         own = _own_files(store, files)

@@ -43,7 +43,7 @@ from friso.shown.loop_words import unstable_loop
 from friso.shown.machine_words import spread_sentences
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
-from friso.stage.transmission import leading_friction
+from friso.stage.tables import leading_friction
 
 COLUMNS = (
     "Works",

@@ -5,14 +5,14 @@ Compute medians and paired differences of machines, with 95 % intervals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import binom
 
-from friso.engine.arrays import Status
+from friso.engine.arrays import ArrayColumns, Status
 from friso.equations.motion import Stand
 from friso.frequency.family import about_resonances, for_poles
 from friso.frequency.loops import Poles
@@ -86,7 +86,7 @@ CLOSER, WITHIN = 2, 9
 
 
 @dataclass(frozen=True)
-class MachineMeasures:
+class MachineMeasures(ArrayColumns):
     """Measures of the runs of machines, arrays of shape (count,).
 
     Runs that were not completed have NaN, and no peaks. `outcome` are words of `friso.hunting.criteria.run_outcome`,
@@ -120,15 +120,6 @@ class MachineMeasures:
         return self.outcome == RESTS
 
 
-AnyMeasures = TypeVar("AnyMeasures", "MachineMeasures", "Later")
-
-
-def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
-    """Join the measures of chunks of runs."""
-    names = [field.name for field in fields(parts[0])]
-    return type(parts[0])(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
 def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
     """Measure a chunk of runs of machines, whose reference comes to stand at `stands`.
@@ -152,7 +143,7 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
 
 
 @dataclass(frozen=True)
-class Later:
+class Later(ArrayColumns):
     """Runs that were continued, arrays of shape (runs,).
 
     `done` is true for runs that were completed, and `stays` for machines in position throughout the last half.

@@ -24,7 +24,7 @@ from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
 from friso.stage import ControllerSection, Stage
 from friso.stage.controllers import CONTROLLER, KIND, controller_of
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 from friso.studies.compare.machines import Machines
 from friso.studies.settings import settings
 
@@ -219,11 +219,7 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     """
     current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
-    return {
-        **flat,
-        **{key: ratio * flat[key] for key in map(controller.key, controller.loop_gain)},
-        **current_loop,
-    }
+    return {**flat, **{key: ratio * flat[key] for key in map(controller.key, controller.loop_gain)}, **current_loop}
 
 
 def options(

@@ -32,7 +32,6 @@ from friso.studies.compare.measures import (
     Later,
     LoopRobustness,
     MachineMeasures,
-    concatenate_chunks,
     difference,
     linear_loops,
     measure_chunk,
@@ -367,13 +366,13 @@ class _Work:
         for recorded in self._recorded(option, self.task, count, 1):
             parts.append(measure_chunk(recorded, self.places, self.within))
             self.progress(before * count + int(recorded.numbers[-1]) + 1, total, label)
-        return concatenate_chunks(parts)
+        return MachineMeasures.joined(parts)
 
     def longer(self, option: Option) -> Later:
         """Run an option on the first machines for longer, and return which stay in position."""
         task = replace(self.task, duration=LONGER * self.task.duration)
         count = min(FOLLOWED, self.machines.count)
-        return concatenate_chunks(
+        return Later.joined(
             [staying_in_position(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)]
         )
 

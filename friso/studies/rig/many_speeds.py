@@ -21,13 +21,13 @@ import numpy as np
 
 from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.rail import friction_factors
-from friso.frequency.friction import steady_force
+from friso.frequency.members import steady_force
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identification.readings.at_bearing import machine_between
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.identification.readings.passes import passes
 from friso.stage import Stage
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 from friso.studies.rig.outcome import RigLog, interval, longest_travel, pace, quicker, rig_log, travel
 from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs

@@ -10,8 +10,7 @@ from friso.shown.drawing.prefixes import listed
 from friso_thesis.studies.guideline.compute import Guideline
 from friso_thesis.studies.guideline.groups import GROUPS
 from friso_thesis.studies.guideline.laws import REFERENCE, FittedLaw
-from friso_thesis.studies.guideline.thesis_rig import ThesisCase
-from friso_thesis.studies.guideline.worked import ParasiticLimits
+from friso_thesis.studies.guideline.worked import ParasiticLimits, ThesisCase
 
 BASES = {
     "slip": "sigma_0 v_s/F_s",

@@ -11,8 +11,7 @@ import numpy as np
 from friso.quantities import percent
 from friso_thesis.studies.guideline.edges import ABOVE, BELOW, KINDS
 from friso_thesis.studies.guideline.edges import UNKNOWN as NOT_TOLD
-from friso_thesis.studies.guideline.thesis_rig import ThesisCase
-from friso_thesis.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
+from friso_thesis.studies.guideline.worked import CLAIMED_AT, STUDIED, ThesisCase, Worked
 from friso_thesis.studies.thesis.reading import OWN, about
 
 HOLDS, IN_PART, DIFFERS, UNKNOWN = "holds", "holds in part", "differs", "unknown"

@@ -27,9 +27,9 @@ from friso.hunting import Ensemble
 from friso.platform.system import usable_cores
 from friso.progress import Progress, Tally, silent
 from friso.quantities import quoted
+from friso_thesis.studies.guideline.edges import DISTANCES, Begin, from_rest, still_swings
 from friso_thesis.studies.guideline.groups import Count, flat_of, group_count, values_of
 from friso_thesis.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fit_law
-from friso_thesis.studies.guideline.persistence import DISTANCES, Begin, from_rest, still_swings
 from friso_thesis.studies.guideline.sweeps import (
     FREE_FIT,
     FREE_TEST,
@@ -44,8 +44,15 @@ from friso_thesis.studies.guideline.sweeps import (
     free_sweep,
     locked_sweep,
 )
-from friso_thesis.studies.guideline.thesis_rig import Laws, plain_rig
-from friso_thesis.studies.guideline.worked import ParasiticLimits, Worked, friction_range, parasitic_limits, worked
+from friso_thesis.studies.guideline.worked import (
+    Laws,
+    ParasiticLimits,
+    Worked,
+    friction_range,
+    parasitic_limits,
+    plain_rig,
+    worked,
+)
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 BELOW, ABOVE = 0.9, 1.15

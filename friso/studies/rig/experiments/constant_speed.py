@@ -13,7 +13,7 @@ from friso.identification.readings.friction_position import FrictionPosition, fr
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, Slow, many_speeds, mean_friction, slow_sliding
 from friso.studies.rig.outcome import (
     Outcome,

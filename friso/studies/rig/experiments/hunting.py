@@ -19,7 +19,6 @@ from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
     at_crossovers,
-    concatenate_runs,
     distance,
     move,
     numbers_of,
@@ -180,7 +179,7 @@ def _moves_and_releases(
         ]
     )
     moves = {case: part.shaped(*shape) for case, part in zip(stages, runs, strict=False)}
-    return moves, concatenate_runs(runs[len(moved) :]).shaped(len(DISPLACEMENTS), *shape)
+    return moves, RailRuns.joined(runs[len(moved) :]).shaped(len(DISPLACEMENTS), *shape)
 
 
 def _startable(

@@ -18,8 +18,7 @@ from friso_thesis.studies.thesis.experiments import BUILT
 from friso_thesis.studies.thesis.judges.rig_loops import RAIL, measured_free, measured_locked, on_the_rig
 from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, PLANT, Linear
 from friso_thesis.studies.thesis.linear.loops import FURTHER, IDENTIFIED, LITTLE, SAMPLED, Contact, CrossoverLoops
-from friso_thesis.studies.thesis.linear.plants import PARASITIC, LimitCase
-from friso_thesis.studies.thesis.linear.speeds import Speeds
+from friso_thesis.studies.thesis.linear.plants import PARASITIC, LimitCase, Speeds
 from friso_thesis.studies.thesis.reading import about, words
 
 _FIRST = 10.0

@@ -146,5 +146,5 @@ def slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
 
 
 def seconds(time: float) -> str:
-    """Write a time in seconds."""
+    """Write a time [s]."""
     return f"{time:.2f} s"

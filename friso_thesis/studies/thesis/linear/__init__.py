@@ -18,8 +18,14 @@ from friso_thesis.studies.thesis.linear.loops import (
     loops_of,
     soft_contact,
 )
-from friso_thesis.studies.thesis.linear.plants import LimitCase, Springs, limit_cases_of, springs_of
-from friso_thesis.studies.thesis.linear.speeds import Speeds, loop_over_speed
+from friso_thesis.studies.thesis.linear.plants import (
+    LimitCase,
+    Speeds,
+    Springs,
+    limit_cases_of,
+    loop_over_speed,
+    springs_of,
+)
 from friso_thesis.studies.thesis.studies import LOCKED
 
 PLANT, FREE, LOCKED_LOOP = "limit cases", "loop, joint free", "loop, joint locked"

@@ -16,11 +16,11 @@ import numpy as np
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.frequency.crossover import range_end, ranges_below, searched_crossovers, stable_crossovers
-from friso.frequency.drive import DriveTiming
 from friso.frequency.family import controller_response, loops, plant_poles, plants
 from friso.frequency.margins import Margins, frequencies, margins, with_resonances
-from friso.frequency.members import concatenate_families, in_series, limit_cases
+from friso.frequency.members import Members, in_series, limit_cases
 from friso.frequency.settings import settings as frequency_settings
+from friso.frequency.system import DriveTiming
 from friso.stage import Stage
 from friso.studies.rig.experiments.frf import SETTINGS as MEASURED_SETTINGS
 from friso_thesis.studies.thesis.studies import LOCKED
@@ -125,7 +125,7 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> CrossoverLoops:
     """Return the loops of a stage, tuned to the crossovers `settings` [Hz]."""
     flat = stage.flat()
     tuned = {f: _tuned(flat, f) for f in settings}
-    resonances = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
+    resonances = plant_poles(flat, Members.joined(limit_cases(flat).values()))
     omega = with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [resonances])
     moving = limit_cases(flat)["sliding"]
     drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
@@ -173,7 +173,7 @@ def _highest(flat: Mapping[str, Any]) -> float | None:
 
     The result is None if it is stable up to the end of the search, and 0 if it is at no crossover.
     """
-    ranges = stable_crossovers(flat, concatenate_families([*limit_cases(flat).values()]))
+    ranges = stable_crossovers(flat, Members.joined(limit_cases(flat).values()))
     end = range_end(ranges, flat[CROSSOVER]) or 0.0
     return None if end == searched_crossovers(flat)[1] else end
 
