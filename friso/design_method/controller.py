@@ -73,7 +73,9 @@ class Modal:
         """
         shape = controller_response(faster(self.flat, factor), self.omega)
         bare, loop = self.bare * shape, self.with_modes * shape
-        stable = np.abs(_turns((1 + loop) / (1 + bare))) < 0.5
+        ratio = (1 + loop) / (1 + bare)
+        turns = np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)  # around 0 in the complex plane
+        stable = np.abs(turns) < 0.5
         return float(distance_to_lines(loop).min()) if stable.all() else 0.0
 
     @property
@@ -83,11 +85,6 @@ class Modal:
             np.geomspace(*searched_crossovers(self.flat), frequency_settings.crossover_steps),
             lambda at: WANTED - self.margin(at),
         )
-
-
-def _turns(ratio: np.ndarray) -> np.ndarray:
-    """Return how often curves `ratio` in the complex plane, (..., frequencies), run around 0."""
-    return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
 
 
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
@@ -196,6 +193,5 @@ def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
 
 def dampings(flat: Mapping[str, Any]) -> np.ndarray:
     """Return the joint dampings to try [N s/m]: the stage's own, then larger ones, ascending."""
-    critical = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
-    given_damping = flat["joint.damping"]
-    return np.array([given_damping, *(damping for damping in RATIOS * critical if damping > given_damping)])
+    tried = RATIOS * 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
+    return np.append(flat["joint.damping"], tried[tried > flat["joint.damping"]])

@@ -85,18 +85,10 @@ def _control(system: System, name: str) -> StateSpace:
     return StateSpace(system.a[0], system.b[0], system.c[0], system.d[0], name=name, **names)
 
 
-def _plant(flat: Mapping[str, Any], member: Members) -> System:
-    return _at_axis(plant(flat, member))
-
-
 def _controller(flat: Mapping[str, Any], member: Members) -> System:
     controller = compensator(flat, len(member))
     measured = (REFERENCE, STAGE, VELOCITY) if controller.sees(VELOCITY) else (REFERENCE, STAGE)
     return controller.take((*measured, *reference_derivatives(controller)), (FORCE,))
-
-
-def _closed(flat: Mapping[str, Any], member: Members) -> System:
-    return _at_axis(closed_loop(flat, member))
 
 
 def _at_axis(system: System) -> System:
@@ -105,10 +97,10 @@ def _at_axis(system: System) -> System:
 
 
 _PARTS: dict[str, Callable[[Mapping[str, Any], Members], System]] = {
-    "plant": _plant,
+    "plant": lambda flat, member: _at_axis(plant(flat, member)),
     "controller": _controller,
     "open": open_loop,
-    "closed": _closed,
+    "closed": lambda flat, member: _at_axis(closed_loop(flat, member)),
 }
 
 

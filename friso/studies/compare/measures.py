@@ -38,10 +38,10 @@ def median(values: np.ndarray) -> EstimatedValue:
 
     Infinite values are allowed.
     """
-    ranked = np.sort(values[~np.isnan(values)])
-    if not ranked.size:
+    numbers = values[~np.isnan(values)]
+    if not numbers.size:
         return EstimatedValue(np.nan, np.nan, np.nan)
-    return EstimatedValue(_middle(ranked), *quantile_interval(ranked, 0.5))
+    return EstimatedValue(float(np.median(numbers)), *quantile_interval(numbers, 0.5))
 
 
 def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
@@ -53,12 +53,6 @@ def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
     ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
     low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))
     return float(ranked[low]), float(ranked[high + 1])
-
-
-def _middle(ordered: np.ndarray) -> float:
-    """Return the median of ordered values, which may be infinite."""
-    low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
-    return float(low if low == high else (low + high) / 2)
 
 
 def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:

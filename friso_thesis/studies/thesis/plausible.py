@@ -15,7 +15,7 @@ import numpy as np
 from friso.engine.side_by_side import side_by_side
 from friso.escapes import one_line
 from friso.progress import Tally
-from friso.shares import Share, share
+from friso.shares import Share, separation, share
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Registered, by_peak_count, by_way
 from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
@@ -264,17 +264,13 @@ def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) ->
 
     The test is Mann and Whitney's, with Bonferroni's correction.
     """
-    from scipy.stats import mannwhitneyu  # 0.7 s to import
-
     if holds.all() or not holds.any():
         return
     values = [value for value in OPEN if enters(value, entry.needs, RESPONSES, PARTS)]
     every = []
     for value in values:
         numbers = np.array([one.values[value.name] for one in drawn])
-        test = mannwhitneyu(numbers[holds], numbers[~holds])
-        correlation = 2 * float(test.statistic) / (holds.sum() * (~holds).sum()) - 1
-        every.append(Separation(value.name, correlation, float(test.pvalue)))
+        every.append(Separation(value.name, *separation(numbers, holds)))
     chosen = [item for item in every if item.chance < DOUBT / len(values)]
     yield from sorted(chosen, key=lambda item: -abs(item.correlation))
 
