@@ -247,7 +247,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
         cases={
             name: BodeCase(
                 member,
-                _plant(keys, member, omega),
+                plant(keys, member).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0],
                 response(keys, member, DriveTiming.of(keys))(omega),
                 margins_of[name],
             )
@@ -261,11 +261,6 @@ def _by_joint(stage: Stage) -> dict[str, Mapping[str, Any]]:
     """Return the stage's keys with its joint "locked" and "free", or as "given" without a joint."""
     variants = stage.variants()
     return {name: member.flat() for name, member in variants.items() if name != "given" or len(variants) == 1}
-
-
-def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Complex:
-    """Return stage position over force [m/N] of a stage in one state, exactly."""
-    return plant(flat, member).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0]
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:

@@ -181,9 +181,7 @@ def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOu
     if not working:
         return ()
     fastest = min(working, key=lambda outcome: slowest(outcome, goal))
-    if fastest is working[0]:
-        return tuple(working[:2])
-    return working[0], fastest
+    return tuple(working[:2]) if fastest is working[0] else (working[0], fastest)
 
 
 def tune(
@@ -604,13 +602,10 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
     """Return the outcome of an interrupted search: its best settings so far, not verified."""
-    if not search.tried:
-        return outcome
     points = search.points
     if not points.meets(search.goal).any():
         return outcome
-    best = int(points.cost(search.goal).argmin())
-    shares = points.shares[best]
+    shares = points.shares[points.cost(search.goal).argmin()]
     return replace(outcome, stage=search.remedy.tuned(shares), points=points, shares=shares)
 
 

@@ -103,9 +103,7 @@ def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) 
     """
     read, example = read_axis(stage, name, text, name in free, log), range_example(stage.flat())
     if isinstance(read, SweptAxis) or read.count is not None:
-        raise InputError(
-            name, repr(text), "a range FIRST..LAST, without a number of points", range_example(stage.flat())
-        )
+        raise InputError(name, repr(text), "a range FIRST..LAST, without a number of points", example)
     field = stage.numeric_keys().get(name)
     if field is not None and not (field.bound.holds(read.first) and field.bound.holds(read.last)):
         raise InputError(name, repr(text), f"values {field.bound.text}", example)

@@ -119,10 +119,6 @@ def _still_swing(sweep: Sweep, share: float, begin: _Begins, tried: int) -> tupl
     return swings.reshape(count, tried), completed.reshape(count, tried)
 
 
-def _stuck(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
-    return from_rest(stages, np.tile(DISTANCES, count))
-
-
 def _random_moves(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
     """Return moves there and back whose sizes and times are a Sobol sample.
 
@@ -142,7 +138,8 @@ def _random_moves(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
     return Begin(motion, None, back + 2 * duration)
 
 
-_STUCK, _MOVED = (_stuck, len(DISTANCES)), (_random_moves, MOVES)
+_STUCK = (lambda stages, crossover, count: from_rest(stages, np.tile(DISTANCES, count))), len(DISTANCES)
+_MOVED = _random_moves, MOVES
 
 
 SAMPLES = 512

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.evidence import findings_on_file
 from friso.hunting.criteria import SWINGS
 from friso.quantities import percent
+from friso.stage import Stage
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
 from friso_thesis.studies.thesis.reading import words
 from friso_thesis.studies.thesis.studies import thesis_rig
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 EVIDENCE = "thesis.solver"
 """Name of the finding on ode23s (`benchmarks/ode23s.py`), which takes 200 000 steps a run."""
@@ -78,15 +76,11 @@ def own_runs(rtol: float) -> Mapping[str, Counted]:
 
     The swing is 0 for a stage that does not swing at the end.
     """
-    return {name: _counted(_run(changes, rtol)) for name, changes in CASES.items()}
+    return {name: _counted(thesis_rig().replace(dict(changes)), rtol) for name, changes in CASES.items()}
 
 
-def _run(changes: Mapping[str, Any], rtol: float) -> xr.Dataset:
-    stage = thesis_rig().replace(dict(changes))
-    return sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
-
-
-def _counted(cell: xr.Dataset) -> Counted:
+def _counted(stage: Stage, rtol: float) -> Counted:
+    cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
     swing = float(cell["peak_to_peak"]) if cell["outcome"].item() == SWINGS else 0.0
     return int(cell["peaks"]), swing, float(cell["steps"])
 
