@@ -187,10 +187,13 @@ class Table:
     example: str
     variants: "Variants | None" = None
 
+    def picked_by(self, annotation: Any) -> PickClass:
+        """Return the function that chooses the class by a table's keys, for a key with this annotation."""
+        section = next(part for part in get_args(annotation) or (annotation,) if part is not NoneType)
+        return (self.variants or OneTable(section)).pick
+
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        section = next(part for part in get_args(source) or (source,) if part is not NoneType)
-        pick = self.variants.pick if self.variants else lambda table: section
-        read = partial(read_table, pick, self.example)
+        read = partial(read_table, self.picked_by(source), self.example)
         return core_schema.with_info_before_validator_function(read, handler(source))
 
 
