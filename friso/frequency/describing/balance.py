@@ -1,10 +1,9 @@
 """Solve the single-harmonic balance: a test for a limit cycle, but none for hunting.
 
 The friction is replaced by its describing function N(A, omega). The loop then has a periodic motion where 1/R(i omega)
-= N(A, omega), with R the receptance of the loop for a friction force (`loop`). So -1/R + N = 0 is one complex equation
-in A and omega (Gelb, Vander Velde 1968). For every cell of a grid in amplitude and frequency, it is checked whether the
-left side turns around zero along the edges. "No cycle" is then the result of a computation, and not of a solver that
-failed.
+= N(A, omega), with R the receptance of the loop for a friction force. So -1/R + N = 0 is one complex equation in A and
+omega (Gelb, Vander Velde 1968). For every cell of a grid in amplitude and frequency, it is checked whether the left
+side turns around zero along the edges. "No cycle" is then the result of a computation, and not of a solver that failed.
 
 Hunting is a jump out of a long rest. Its motion is so far from a sine that this balance finds no cycle even if there is
 one: see docs/describing.md.

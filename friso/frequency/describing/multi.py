@@ -1,10 +1,10 @@
 """Find a periodic motion of a loop with friction as a Fourier series.
 
 The method is multi-harmonic balance with Newton's method, alternating frequency and time (Cameron, Griffin 1989,
-doi:10.1115/1.3176036). The series gives the velocity in time, and the velocity the friction force (`waveform`). The
-harmonics of that force must move the loop by the series. Mechanics and controller may be any linear ones. The method
-cannot find a cycle by itself, and single-harmonic balance, the usual start, may have none (`balance`). So it starts
-from a known motion, such as a simulated one.
+doi:10.1115/1.3176036). The series gives the velocity in time, and the velocity the friction force. The harmonics of
+that force must move the loop by the series. Mechanics and controller may be any linear ones. The method cannot find a
+cycle by itself, and single-harmonic balance, the usual start, may have none (`balance`). So it starts from a known
+motion, such as a simulated one.
 
 Compute the friction force on any periodic motion, and its derivative by the motion.
 

@@ -7,8 +7,8 @@ end behind it, if necessary beyond the stage's own travel, because the rig's rai
 
 Run slow sliding with a locked joint, so slow that no controller holds a constant speed.
 
-At such speeds friction falls steeply. Short, finely logged passes follow those of `many_speeds`, at speeds at the limit
-of steady motion: the motion swings through the whole falling branch of the friction curve.
+At such speeds friction falls steeply. Short, finely logged passes follow the passes at many speeds, at speeds at the
+limit of steady motion: the motion swings through the whole falling branch of the friction curve.
 """
 
 from __future__ import annotations
