@@ -1692,7 +1692,7 @@ def test_points_given_up_early_are_those_that_no_search_would_have_kept(
         monkeypatch.setattr(search_module, "moves_of_points", moves)
         search.optimise(changed)
         points = search.points
-        costs = points.cost(goal, None if changed is None else changed(points.shares))
+        costs = points.cost(goal, changed)
         best.append(points.shares[costs.argmin()])
         runs.append(sum(counted))
     assert np.array_equal(*best)
