@@ -12,8 +12,7 @@ import numpy as np
 
 import friso
 from friso.frequency.describing.function import describing
-from friso.frequency.describing.mass_line import mass_line
-from friso.frequency.describing.response import plant_response
+from friso.frequency.describing.response import mass_line, plant_response
 from friso.stage import Stage
 from friso.studies.harmonic_balance import harmonic_balance
 

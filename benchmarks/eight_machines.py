@@ -21,8 +21,7 @@ import numpy as np
 from benchmarks.machines_by_hand import machine
 from benchmarks.report import print_table
 from friso.questions.tune.words import changes
-from friso.remedies.goal import Goal
-from friso.remedies.machines import draw_fleet
+from friso.remedies.machines import Goal, draw_fleet
 from friso.remedies.method import tune
 from friso.stage import Stage, load
 from friso.stage.correlations import Correlations

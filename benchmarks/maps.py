@@ -24,11 +24,9 @@ from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from benchmarks.rigs import rig_of
 from friso.platform.system import usable_cores
 from friso.stage import Stage
-from friso.studies.execute import Crew, local_crew
-from friso.studies.processes import processes
-from friso.studies.request import Request
-from friso.studies.samples import Samples
-from friso.studies.study import Study
+from friso.studies.axes import Samples
+from friso.studies.execute import Crew, local_crew, processes
+from friso.studies.study import Request, Study
 from friso.studies.sweep import run_in_memory, run_in_store
 from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 

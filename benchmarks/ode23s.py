@@ -156,8 +156,8 @@ def thesis_solver() -> dict[str, float]:
 
     An example of a name is `locked_8_hz_peaks`.
     """
-    from friso_thesis.studies.thesis import thesis_rig
     from friso_thesis.studies.thesis.judges.solver import CASES
+    from friso_thesis.studies.thesis.studies import thesis_rig
 
     values: dict[str, float] = {}
     for name, changes in CASES.items():
@@ -175,7 +175,7 @@ def other_solvers() -> dict[str, float]:
     differentiation of variable order (the method of ode15s) and of Dormand and Prince's (ode45), with the joint locked
     and free. An example of a name is `locked_ode45_evaluations`.
     """
-    from friso_thesis.studies.thesis import thesis_rig
+    from friso_thesis.studies.thesis.studies import thesis_rig
 
     values: dict[str, float] = {}
     for joint in ("locked", "free"):

@@ -37,10 +37,8 @@ from friso.studies.rig.experiments.frf import plant_log
 from friso.studies.rig.experiments.presliding import presliding_log
 from friso.studies.rig.experiments.stiction import slow_legs
 from friso.studies.rig.experiments.stiffness import steps
-from friso.studies.rig.many_speeds import many_speeds_logs
-from friso.studies.rig.outcome import RigLog
-from friso.studies.rig.sizes import freed, locked_stage, travel
-from friso.studies.rig.slow_sliding import slow_sliding_logs
+from friso.studies.rig.many_speeds import many_speeds_logs, slow_sliding_logs
+from friso.studies.rig.outcome import RigLog, freed, locked_stage, travel
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from rig_machines import Machine, built, mean_level, sources, through_files

@@ -23,16 +23,13 @@ from scipy.stats import qmc
 
 from benchmarks.report import Goal as Target
 from benchmarks.report import print_goals, print_table
-from friso.frequency.bandwidth import loop_bandwidths
-from friso.frequency.crossover import limits
+from friso.frequency.crossover import limits, loop_bandwidths
 from friso.questions.tune.words import changes
-from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet, MoveRange, draw_fleet
+from friso.remedies.catalogue import BANDWIDTH, Remedy
+from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import machines_of_search, tune
 from friso.remedies.search import Budget, Search
 from friso.remedies.trials import modulus_margins, moves_of_points
-from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import ONE, Performance, moving
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations

@@ -13,10 +13,9 @@ if TYPE_CHECKING:
     from friso.errors import InputError, LogError, SpecError, StageError, StoreError
     from friso.frequency.analysis import linear
     from friso.frequency.describing.function import describing
-    from friso.frequency.describing.mass_line import mass_line
-    from friso.frequency.describing.response import plant_response
+    from friso.frequency.describing.response import mass_line, plant_response
+    from friso.frequency.margins import Tuning, tuning
     from friso.frequency.members import Members, member
-    from friso.frequency.tuning import Tuning, tuning
     from friso.interface.starting import example, init, schema
     from friso.questions.bode.question import bode
     from friso.questions.boundary.question import boundary
@@ -35,8 +34,8 @@ if TYPE_CHECKING:
     from friso.questions.tune.question import tune
     from friso.remedies.sensitivities import Sensitivities, sensitivity
     from friso.stage import Stage, load, loads, save
+    from friso.studies.axes import Samples
     from friso.studies.harmonic_balance import harmonic_balance
-    from friso.studies.samples import Samples
     from friso.studies.store import read_store
 
 _PLACES = {
@@ -45,13 +44,12 @@ _PLACES = {
     "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
     "friso.frequency.analysis": ("linear",),
     "friso.frequency.describing.function": ("describing",),
-    "friso.frequency.describing.mass_line": ("mass_line",),
-    "friso.frequency.describing.response": ("plant_response",),
+    "friso.frequency.describing.response": ("mass_line", "plant_response"),
     "friso.frequency.members": ("Members", "member"),
-    "friso.frequency.tuning": ("Tuning", "tuning"),
+    "friso.frequency.margins": ("Tuning", "tuning"),
     "friso.stage": ("Stage", "load", "loads", "save"),
     "friso.studies.harmonic_balance": ("harmonic_balance",),
-    "friso.studies.samples": ("Samples",),
+    "friso.studies.axes": ("Samples",),
     "friso.studies.store": ("read_store",),
 }
 """Where everything public stands that is no function of a question."""

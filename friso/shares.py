@@ -36,6 +36,19 @@ def share(flags: np.ndarray, decided: np.ndarray) -> Share:
     return Share(hits / (count - unknown) if unknown < count else np.nan, low, high)
 
 
+def separation(values: np.ndarray, flags: np.ndarray) -> tuple[float, float]:
+    """Return how well `values` separate the flagged runs from others, and how probable it is by chance.
+
+    The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if all flagged runs have the
+    larger values, -1 if they have the smaller ones, 0 if the values separate nothing. Some runs must be flagged, and
+    some not. The probability is that of Mann and Whitney's test.
+    """
+    from scipy.stats import mannwhitneyu  # 0.7 s to import
+
+    test = mannwhitneyu(values[flags], values[~flags])
+    return 2 * float(test.statistic) / (flags.sum() * (~flags).sum()) - 1, float(test.pvalue)
+
+
 def share_interval(hits: int, count: int) -> tuple[float, float]:
     """Return the 95 % interval of a probability: `hits` of `count` independent trials.
 

@@ -22,9 +22,8 @@ from friso.frequency.members import limit_cases
 from friso.questions.compare.figures import COLOURS
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
-from friso.studies.compare.disturbance_rejection import ADRC, rejection
 from friso.studies.compare.machines import draw_machines
-from friso.studies.compare.options import OPTIONS, Option, linear_flat, options
+from friso.studies.compare.options import ADRC, OPTIONS, Option, linear_flat, options, rejection
 
 MASS, RATIO = 1.7, 5.0
 STATIC, COULOMB, STRIBECK, SIGMA_0, SIGMA_1, SIGMA_2 = 3.0, 1.0, 1.6e-3, 1e5, 1e5**0.5, 0.5

@@ -57,7 +57,7 @@ from friso.interface.schema import stage_schema
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Cloud, Figure, Panel, Series
 from friso.studies.execute import local_crew
-from friso.studies.request import Request
+from friso.studies.study import Request
 from friso.studies.sweep import run_in_memory
 
 RIG = Path(friso.example("thesis_rig"))

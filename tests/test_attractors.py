@@ -52,7 +52,7 @@ from friso.hunting.settings import CheckSettings, EdgeSettings
 from friso.hunting.verdict import STILL_SWINGS, own_motion
 from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
-from friso.studies.boundary_lines import REPELS, UNKNOWN, place_verdicts
+from friso.studies.boundary import REPELS, UNKNOWN, place_verdicts
 from friso.studies.sweep import sweep
 
 pytestmark = pytest.mark.inner

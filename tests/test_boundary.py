@@ -17,7 +17,7 @@ from friso.hunting.boundary.diagram import each_once
 from friso.hunting.boundary.locate import changes, met
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.stage import Stage
-from friso.studies.boundary_lines import stability_changes
+from friso.studies.boundary import stability_changes
 
 pytestmark = pytest.mark.xdist_group("rigid")
 

@@ -45,7 +45,7 @@ from friso.questions.boundary.words import (
 )
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.stage import Stage
-from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines, plane_edge
+from friso.studies.boundary import corner_verdicts, end_verdicts, lines, plane_edge
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, STICK_SLIP = EXAMPLES / "thesis_rig.toml", EXAMPLES / "lugre_stick_slip.toml"

@@ -29,7 +29,7 @@ from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.describing.function import describing
-from friso.frequency.describing.waveform import OneStateLaw
+from friso.frequency.describing.multi import OneStateLaw
 from friso.frequency.members import member
 from friso.frequency.parts import plant
 from friso.hunting import Ensemble, find_cycles

@@ -22,7 +22,7 @@ from friso.equations.settings import SETTINGS, settings_named
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency import crossover
-from friso.frequency.bandwidth import loop_bandwidth
+from friso.frequency.crossover import loop_bandwidth
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
 from friso.frequency.settings import FrequencySettings
@@ -40,11 +40,9 @@ from friso.stage.correlations import Correlations
 from friso.stage.lists import element_keys
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
-from friso.studies.compare.measures import linear_loops
-from friso.studies.compare.needed_bandwidth import NeededBandwidth
+from friso.studies.compare.measures import difference, linear_loops, median, quantile_interval
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, OPTIONS, CompareOptions, Option, linear_flat, options
-from friso.studies.compare.statistics import difference, median, quantile_interval
-from friso.studies.compare.study import Comparison, OptionResult, compare
+from friso.studies.compare.study import Comparison, NeededBandwidth, OptionResult, compare
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}

@@ -8,7 +8,7 @@ from variants import CONDITIONS, VARIANTS
 
 import friso
 from friso.equations.rail import friction_factors
-from friso.frequency.friction import level
+from friso.frequency.members import level
 from friso.stage import Stage
 from friso.virtual_rig.run import as_built_keys
 

@@ -29,11 +29,9 @@ from variants import (
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.imposed import imposed_form
-from friso.frequency.describing.function import describing, dynamic_stiffness
-from friso.frequency.describing.loop import TOUCHES
-from friso.frequency.describing.mass_line import mass_line
-from friso.frequency.describing.response import MISSING, NOT_FOUND, plant_response
-from friso.frequency.describing.steady import Imposition, steady
+from friso.frequency.describing.balance import TOUCHES
+from friso.frequency.describing.function import Imposition, describing, dynamic_stiffness, steady
+from friso.frequency.describing.response import MISSING, NOT_FOUND, mass_line, plant_response
 from friso.frequency.settings import FrequencySettings
 from friso.stage import Stage
 from friso.stage.tables import FRICTION
@@ -417,7 +415,7 @@ def test_missing_answers_are_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
     def partly(flat: dict[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> np.ndarray:
         return np.where(amplitudes < 1e-4, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
 
-    monkeypatch.setattr("friso.frequency.describing.driven.dynamic_stiffness", partly)
+    monkeypatch.setattr("friso.frequency.describing.response.dynamic_stiffness", partly)
     response = plant_response(rigid(LAWS["lugre"]), [1.0, 1.8], [5.0])
     assert set(np.ravel(response["status"])) <= {MISSING, NOT_FOUND}
     assert np.isnan(response["up"].values[0, 0])

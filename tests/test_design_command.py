@@ -25,10 +25,10 @@ from snapshots import Snapshots
 import friso
 from friso.cli.app import main
 from friso.design_method import controller, method
-from friso.design_method.edges import Corners
 from friso.design_method.geometry import Geometry, Sheet
 from friso.design_method.method import Design, Frictions, NoDesign
-from friso.design_method.relax import Relaxation
+from friso.design_method.population import Corners
+from friso.design_method.requirements import Relaxation
 from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Position, Spec, load_spec
 from friso.interface.output_folder import MARKER, OutputFolder

@@ -10,23 +10,19 @@ from beyond_flip import CREEPING
 
 import friso
 from friso.design_method import method as method_module
-from friso.design_method.choice import chosen, confirmed
-from friso.design_method.controller import choose_controller, comfortable_below, dampings
-from friso.design_method.edges import Corners, edges_over, rigid
-from friso.design_method.front import Candidate, evaluate_geometries, front
+from friso.design_method.choice import Candidate, chosen, confirmed, evaluate_geometries, front
+from friso.design_method.controller import Modal, choose_controller, comfortable_below, dampings
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
 from friso.design_method.method import NoDesign, design, fit_leaves, leaves
-from friso.design_method.modal import Modal
-from friso.design_method.population import Population, corners
+from friso.design_method.population import Corners, Population, corners, edges_over, rigid
 from friso.design_method.prepare import prepared, with_leaves
-from friso.design_method.relax import relaxed_requirements
-from friso.design_method.requirements import PARASITIC, LeafTask, requirements
+from friso.design_method.requirements import PARASITIC, LeafTask, relaxed_requirements, requirements
 from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec, load_spec
 from friso.design_method.verification import MachineOutcomes, move_machines, verification
 from friso.equations.breakaway import least_breakaway
 from friso.frequency.crossover import limits, settled_margin
-from friso.frequency.tuning import Tuning
+from friso.frequency.margins import Tuning
 from friso.hunting import find_margin
 from friso.hunting.measures import measured_run
 from friso.leaf_springs import beams as beams_module

@@ -17,11 +17,11 @@ from distributed.security import Security
 from refusals import Refused
 
 from friso.stage import Stage
-from friso.studies import distribute
-from friso.studies.distribute import connected
-from friso.studies.request import Request
+from friso.studies import execute
+from friso.studies.execute import connected
 from friso.studies.settings import StudySettings
 from friso.studies.store import Store
+from friso.studies.study import Request
 from friso.studies.sweep import run_in_memory, run_in_store, sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -147,7 +147,7 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
 def test_a_worker_with_another_friso_is_refused(
     cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch, refused: Refused
 ) -> None:
-    monkeypatch.setattr(distribute, "equations_version", lambda: "9.9.9 (0123456789ab)")
+    monkeypatch.setattr(execute, "equations_version", lambda: "9.9.9 (0123456789ab)")
     with refused() as error, connected(cluster.scheduler_address):
         pass
     assert "9.9.9 (0123456789ab)" in str(error.value)

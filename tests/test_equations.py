@@ -17,10 +17,10 @@ from friso.equations import motion
 from friso.equations.component import TIME
 from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.structure import TransmissionForm, structure
-from friso.frequency.declared import sine
+from friso.frequency.system import sine
 from friso.stage import Stage
+from friso.stage.controllers import NO_SETTINGS
 from friso.stage.filters import FilterForm
-from friso.stage.standstill import NO_SETTINGS
 
 Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]
 

@@ -24,7 +24,7 @@ from friso.escapes import escaped, one_line, table_cell
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.studies.export import export
+from friso.studies.store import export
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 HOSTILE = "\x1b[2J\x1b]0;owned\x07 \u202egnp.exe \x9b31m \u2066x\r"

@@ -21,8 +21,7 @@ from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator
 from friso.stage import Stage, numeric_keys
 from friso.stage.filters import FILTER_RULE, FILTERS, FilterSection, filter_forms
-from friso.studies.axes import SweptAxis, read_axis
-from friso.studies.links import check_links, linked
+from friso.studies.axes import SweptAxis, check_links, linked, read_axis
 
 PLACE = "controller.filters"
 

@@ -145,7 +145,7 @@ STORES = """
 import shutil, sys
 from pathlib import Path
 import friso
-from friso.studies.request import Request
+from friso.studies.study import Request
 from friso.studies.store import Store, read_store
 
 def opened(text, **options):

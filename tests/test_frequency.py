@@ -23,14 +23,12 @@ from friso.equations.structure import Structure, structure
 from friso.errors import InputError
 from friso.frequency.bode import bode
 from friso.frequency.crossover import WANTED, limits, settled_members
-from friso.frequency.drive import DriveTiming, exponentials
 from friso.frequency.family import impedance, loops, plants, scan_stability, spectral_abscissa
-from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop, poles, response
 from friso.frequency.margins import margins, of_loop, with_resonances
-from friso.frequency.members import Members, family, limit_cases, member
+from friso.frequency.members import Members, family, in_series, level, limit_cases, member
 from friso.frequency.parts import mechanics, plant
-from friso.frequency.stiffness import in_series
+from friso.frequency.system import DriveTiming, exponentials
 from friso.stage import Stage
 
 HZ = 2 * np.pi

@@ -17,7 +17,7 @@ from friso.engine.arrays import Results, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.frequency.friction import steady_force
+from friso.frequency.members import steady_force
 from friso.hunting import Ensemble
 from friso.hunting.attractors import Attractors
 from friso.hunting.cycle.hunting import NARROW_PLAY, beyond_the_survey, small_cycles_possible

@@ -12,11 +12,9 @@ from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains
 
 from friso.errors import InputError
 from friso.frequency.describing import balance
-from friso.frequency.describing.balance import FREQUENCIES, single_harmonic
+from friso.frequency.describing.balance import FREQUENCIES, receptance, single_harmonic
 from friso.frequency.describing.function import dynamic_stiffness
-from friso.frequency.describing.loop import receptance
-from friso.frequency.describing.multi import DONE, OPEN, REST, HarmonicSeries, balanced
-from friso.frequency.describing.waveform import OneStateLaw, friction_answer
+from friso.frequency.describing.multi import DONE, OPEN, REST, HarmonicSeries, OneStateLaw, balanced, friction_answer
 from friso.frequency.settings import FrequencySettings
 from friso.hunting import Ensemble, find_cycles
 from friso.stage import Stage

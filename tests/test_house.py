@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "CONTRIBUTING.md"
 
 KNOW_CONTROLLERS = (
-    *("equations/controllers/", "drives/formats/", "stage/stage.py", "stage/standstill.py", "templates/"),
+    *("equations/controllers/", "drives/formats/", "stage/stage.py", "stage/controllers.py", "templates/"),
     "identification/state_space_controller.py",
 )
 """Where keys of a controller may be named: its own files (one that reads logs stands beside their readers), the schema
@@ -37,9 +37,9 @@ ABOUT_TUNING = (
         "design_method/",
         "questions/design/",
         "friso_thesis/",
-        "studies/compare/disturbance_rejection.py",
+        "studies/compare/options.py",
     ),
-    *("frequency/tuning.py", "identification/stage_file.py", "identification/output_error/problem.py"),
+    *("frequency/margins.py", "identification/stage_file.py", "identification/output_error/problem.py"),
 )
 """Modules that import a form of the PID controller: the design method, the thesis and the guideline are about van
 Dijk's rules (Eq. 7, 8); identify makes controllers of its own, and compare one with an observer."""

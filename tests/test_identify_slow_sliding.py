@@ -15,9 +15,8 @@ from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.at_bearing import BearingRecord, Between, at_bearing, machine_between
 from friso.identification.readings.common import deflections, record
-from friso.studies.rig import many_speeds, slow_sliding
-from friso.studies.rig.outcome import RigLog
-from friso.studies.rig.sizes import locked_stage
+from friso.studies.rig import many_speeds
+from friso.studies.rig.outcome import RigLog, locked_stage
 
 DT, SECONDS, FINE = 2e-4, 2.0, 10
 MASS, STIFFNESS, DAMPING, VISCOUS = 1.7, 1e5, 300.0, 2.0
@@ -173,13 +172,13 @@ def test_friction_without_a_falling_curve_is_not_slid_on_the_rig() -> None:
     tables = {key: table for key, table in friso.load(EXAMPLE).as_written().items() if key != "rail"}
     stage = friso.Stage(**{**tables, "friction": dahl})
     still = {"position": np.zeros(200), "force": np.zeros(200)}
-    assert slow_sliding.slow_sliding_logs(stage, [RigLog("x", None, DT, still, {}, stage, 1)], 1) == ()
+    assert many_speeds.slow_sliding_logs(stage, [RigLog("x", None, DT, still, {}, stage, 1)], 1) == ()
 
 
 @pytest.fixture
 def one_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(many_speeds, "PLACES", 1)
-    monkeypatch.setattr(slow_sliding, "PLACES", 2)
+    monkeypatch.setattr(many_speeds, "SLOW_PLACES", 2)
 
 
 @pytest.mark.usefixtures("one_place")
@@ -190,7 +189,7 @@ def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig
     stage, flat = locked_stage(machine.truth), machine.flat
     passes = many_speeds.many_speeds(stage, 1)
     assert not passes.places[0].velocity.both.stribeck_velocity.determined
-    for item in slow_sliding.slow_sliding(stage, [place.log for place in passes.places], 1):
+    for item in many_speeds.slow_sliding(stage, [place.log for place in passes.places], 1):
         places = item.log.true["cart_position"]
         there = friction_factors(flat, np.linspace(places.min(), places.max(), 500)).mean(axis=1)
         coulomb, static, stribeck = item.result.estimates
@@ -207,9 +206,7 @@ def test_the_stage_file_takes_it_with_what_presliding_shows() -> None:
     machine = built(93)
     stage, flat = locked_stage(machine.truth), machine.flat
     passed = many_speeds.many_speeds_logs(stage, 1)
-    slow: list[tuple[Any, str]] = [
-        (log.log, "slow-sliding") for log in slow_sliding.slow_sliding_logs(stage, passed, 1)
-    ]
+    slow: list[tuple[Any, str]] = [(log.log, "slow-sliding") for log in many_speeds.slow_sliding_logs(stage, passed, 1)]
     alone = identify(slow, machine.guess)
     assert not any(estimate.determined for estimate in alone.estimates)
     assert alone.stage is None  # no file from nothing

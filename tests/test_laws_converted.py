@@ -19,14 +19,13 @@ from friso.equations.friction.common import direction
 from friso.equations.friction.gms import STIFFNESS
 from friso.equations.friction.measured import power_law
 from friso.errors import InputError
-from friso.frequency.friction import steady_force
+from friso.frequency.members import steady_force
 from friso.identification.readings.common import stribeck_curve
 from friso.shown.drawing import matplotlib_renderer
 from friso.stage import Stage
 from friso.stage.lists import element_keys
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import convert, convertible, measure_friction
-from friso.studies.laws.loops import hysteresis_loop
+from friso.studies.laws.conversion import convert, convertible, hysteresis_loop, measure_friction
 from friso.studies.laws.virgin import with_virgin_curve
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"

@@ -11,7 +11,7 @@ import pytest
 from friso import Stage, load, loads
 from friso.design_method.geometry import Sheet, mechanisms
 from friso.design_method.leaves_for_joint import leaves_for_joint
-from friso.design_method.outline import outline
+from friso.design_method.prepare import outline
 from friso.design_method.spec import read_spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
@@ -22,7 +22,7 @@ from friso.questions.tune.present_words import DOUBTS
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.words import UNMADE, answer
 from friso.remedies.catalogue import remedies
-from friso.remedies.goal import Goal
+from friso.remedies.machines import Goal
 from friso.remedies.method import Advice, Unmade, _Session, tune
 from friso.remedies.search import Budget
 

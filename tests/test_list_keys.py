@@ -14,9 +14,8 @@ from friso.errors import InputError, StageError
 from friso.stage import Stage, numeric_keys, parse_set, violations
 from friso.stage.correlations import Correlations, correlations_text, draw, read_correlations
 from friso.stage.plug_ins import plug_ins
-from friso.studies.axes import SweptAxis, read_axis
+from friso.studies.axes import SweptAxis, check_links, linked, read_axis
 from friso.studies.cells import allowed_cells, flat_cells
-from friso.studies.links import check_links, linked
 
 STIFFNESS, STRENGTH = "friction.element_stiffness", "friction.element_strength"
 

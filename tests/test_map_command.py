@@ -296,7 +296,7 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
         def acquire(self, *arguments: object, **options: object) -> NoReturn:
             raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("friso.studies.store_folder.FileLock", Denied)
+    monkeypatch.setattr("friso.studies.store_files.FileLock", Denied)
     elsewhere = ("--out", "figures", "--export", "c.csv")
     done = friso_inside(tmp_path, "map", "a.zarr", *elsewhere, "--verify", "1")
     assert done.returncode == 0, done.stderr

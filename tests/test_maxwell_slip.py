@@ -16,9 +16,8 @@ from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.describing.function import describing
-from friso.frequency.describing.waveform import OneStateLaw as Waveform
-from friso.frequency.friction import level, speeds, steady_force
-from friso.frequency.members import member
+from friso.frequency.describing.multi import OneStateLaw as Waveform
+from friso.frequency.members import level, member, speeds, steady_force
 from friso.frequency.parts import plant
 from friso.hunting import CYCLE_RTOL, Cycles, Ensemble, find_cycles
 from friso.hunting.cycle.ensemble import done

@@ -15,8 +15,8 @@ from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, LEAST_PEAK_SEPA
 from friso.hunting.measures import measure_runs, measuring_options, scan_turning_points
 from friso.hunting.settings import CheckSettings
 from friso.stage import Stage
-from friso.studies.request import Request
-from friso.studies.samples import Samples
+from friso.studies.axes import Samples
+from friso.studies.study import Request
 
 
 def peaks(turns: list[tuple[float, float]]) -> list[float]:

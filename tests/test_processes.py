@@ -17,11 +17,10 @@ from systems import posix
 
 from friso.stage import Stage
 from friso.studies import execute
-from friso.studies.processes import processes
-from friso.studies.request import Request
+from friso.studies.execute import processes
 from friso.studies.settings import StudySettings
 from friso.studies.store import Store
-from friso.studies.study import cells_of
+from friso.studies.study import Request, cells_of
 from friso.studies.sweep import run_in_memory, run_in_store, sweep
 
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
@@ -69,7 +68,7 @@ def test_a_process_that_is_killed_costs_nothing_that_is_done(rig: Stage, tmp_pat
 
 PARENT = """
 import time
-from friso.studies.processes import processes
+from friso.studies.execute import processes
 
 with processes(1) as crew:
     crew.executor.submit(time.sleep, 0).result()

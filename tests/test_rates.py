@@ -11,13 +11,12 @@ import pytest
 from variants import cascade, lugre, release, stage
 
 import friso
-from friso.frequency.cascaded import CascadeLoop, CascadeLoops, cascade_loops
-from friso.frequency.drive import DriveTiming, waited, zero_order_hold
-from friso.frequency.loops import poles, response
+from friso.frequency.bode import CascadeLoop, CascadeLoops, cascade_loops
+from friso.frequency.loops import cut_over_period, poles, response, samples_controller
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import Members, limit_cases
 from friso.frequency.parts import FORCE, RATED, STAGE, plant
-from friso.frequency.rates import cut_over_period, samples_controller
+from friso.frequency.system import DriveTiming, waited, zero_order_hold
 from friso.stage import Stage
 
 KV, KP, T_V, FAST, SLOW = 25.0, 50.0, 0.06, 1e-3, 4

@@ -10,7 +10,7 @@ import friso
 from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.progress import silent
 from friso.stage import Stage
-from friso.studies.rig import excitation, many_speeds, sizes
+from friso.studies.rig import many_speeds, outcome
 from friso.studies.rig.experiments import constant_speed, frf, stiction, stiffness
 from friso.studies.rig.outcome import rig_log
 
@@ -24,12 +24,12 @@ def built() -> Stage:
 
 
 def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
-    low, high = sizes.travel(built)
+    low, high = outcome.travel(built)
     assert high - low == pytest.approx(0.09)
-    assert sizes.longest_travel(built) == pytest.approx(0.15)
+    assert outcome.longest_travel(built) == pytest.approx(0.15)
     assert constant_speed.pass_speeds(built) == pytest.approx((2.5e-3, 10e-3))
-    assert sizes.freed(built).flat()["joint.stroke"] == pytest.approx(8e-3)
-    assert np.array(frf.SETTINGS) * sizes.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])
+    assert outcome.freed(built).flat()["joint.stroke"] == pytest.approx(8e-3)
+    assert np.array(frf.SETTINGS) * outcome.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])
 
 
 def test_steps_show_the_joint_on_its_cables(built: Stage) -> None:
@@ -62,7 +62,7 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
     built: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Faster passes with a faster controller show it, and the whole curve, though friction varies along the way."""
-    monkeypatch.setattr(sizes, "WAY", 1 / 6)
+    monkeypatch.setattr(outcome, "WAY", 1 / 6)
     monkeypatch.setattr(constant_speed, "DURATIONS", (48.0, 12.0))
     monkeypatch.setattr(many_speeds, "PLACES", 1)
     result = constant_speed.run_experiment(built, 1, silent).result
@@ -77,7 +77,7 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
 
 @pytest.mark.parametrize(("locked", "mass", "weak_mass"), [(True, 1.7, 2.5), (False, 0.5, 0.75)])
 def test_a_weaker_motor_makes_masses_look_heavier(built: Stage, locked: bool, mass: float, weak_mass: float) -> None:
-    stage = sizes.locked_stage(built) if locked else sizes.freed(built)
+    stage = outcome.locked_stage(built) if locked else outcome.freed(built)
     true, weak, strong = frf.apparent_masses(stage, PLACE, 1)
     assert true == pytest.approx(mass, rel=0.1)
     assert weak == pytest.approx(weak_mass, rel=0.1)
@@ -86,12 +86,12 @@ def test_a_weaker_motor_makes_masses_look_heavier(built: Stage, locked: bool, ma
 
 def test_the_measured_loop_is_the_one_computed_and_crosses_where_tuned(built: Stage) -> None:
     """Controller times plant, both measured in the same run, against the loop read from the sensitivity alone."""
-    stage = sizes.locked_stage(built)
+    stage = outcome.locked_stage(built)
     _, loops = frf.open_loops(stage, PLACE, 1, frf.SETTINGS)
     for item in loops[2:]:
         assert frf.crossing_near_target(item) == pytest.approx(item.tuned, rel=0.15)
-    log = rig_log(excitation.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)
-    plant, loop = excitation.estimate_plant([log]), excitation.loop(log)
+    log = rig_log(outcome.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)
+    plant, loop = outcome.estimate_plant([log]), outcome.loop(log)
     hertz = plant.frequency
     control = _controller(stage, hertz)
     inside = (hertz > 4) & (hertz < 150)
@@ -111,7 +111,7 @@ def _controller(stage: Stage, hertz: np.ndarray) -> np.ndarray:
 
 
 def test_a_free_joint_is_stable_up_to_a_setting_and_not_beyond(built: Stage) -> None:
-    settings, stable = frf.stable_settings(sizes.freed(built), PLACE, 1)
+    settings, stable = frf.stable_settings(outcome.freed(built), PLACE, 1)
     highest = frf.highest_stable(settings, stable)
     assert settings[0] < highest < settings[-1]
     assert stable[settings <= highest].all()
@@ -127,7 +127,7 @@ def test_an_experiment_on_the_joint_needs_one(built: Stage, refused: Refused) ->
 
 def test_a_standing_stage_is_simulated_as_exactly_as_a_moving_one(built: Stage) -> None:
     """A motion of no length gave tolerances without bound: the cart's velocity changed its sign unseen."""
-    log = rig_log(excitation.excite(sizes.locked_stage(built), PLACE, 1), 0, "", None, built, 1)
+    log = rig_log(outcome.excite(outcome.locked_stage(built), PLACE, 1), 0, "", None, built, 1)
     flat = built.flat()
     assert not log.failure
     deflection = log.true["bristle_deflection"] * flat["friction.bristle_stiffness"]

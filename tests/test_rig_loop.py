@@ -17,7 +17,7 @@ from friso.stage import load
 from friso.stage.files import save
 from friso.studies.rig.experiments.stiction import slow_legs
 from friso.studies.rig.experiments.stiffness import steps
-from friso.studies.rig.sizes import freed
+from friso.studies.rig.outcome import freed
 
 STIFFNESS, STATIC = "joint.stiffness", "friction.static"
 

@@ -14,7 +14,7 @@ from inside import friso_inside
 
 import friso
 from friso.axis import LINEAR, ROTARY, speak_of, unit_shown
-from friso.design_method.outline import outline
+from friso.design_method.prepare import outline
 from friso.errors import InputError, StageError
 from friso.intervals import UncertainValue
 from friso.shown.drawing.prefixes import with_unit

@@ -15,7 +15,7 @@ from friso.engine.simulate import sampled_outputs
 from friso.equations.structure import structure
 from friso.frequency.loops import closed_loop
 from friso.frequency.members import Members, member
-from friso.frequency.operating_point import operating_point
+from friso.frequency.parts import operating_point
 from friso.stage import Stage
 
 HELD = {"motion.kind": "hold"}

@@ -30,20 +30,17 @@ from systems import posix
 import friso as friso_api
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
-from friso.studies import ledger, refine
+from friso.studies import refine, store_files
 from friso.studies import store as storing
+from friso.studies.axes import Samples
 from friso.studies.execute import local_crew
-from friso.studies.kept_cells import KeptCells
 from friso.studies.metadata import annotate_metadata, checked_metadata, digest
 from friso.studies.metric import is_text
-from friso.studies.request import Request
-from friso.studies.samples import Samples
 from friso.studies.sealed_store import SealedStore
 from friso.studies.settings import StudySettings
-from friso.studies.store import Store, check_store, read_store
-from friso.studies.store_files import keep_arrays, kept_arrays
-from friso.studies.store_folder import LOCK, make
-from friso.studies.study import study_of
+from friso.studies.store import KeptCells, Store, check_store, read_store
+from friso.studies.store_files import LOCK, keep_arrays, kept_arrays, make
+from friso.studies.study import Request, study_of
 from friso.studies.sweep import run_in_store, sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -318,8 +315,8 @@ HOLD = """
 import sys, time
 from pathlib import Path
 import friso
-from friso.studies.store_folder import LOCK
-from friso.studies.request import Request
+from friso.studies.store_files import LOCK
+from friso.studies.study import Request
 from friso.studies.store import Store
 
 with Store.opened(Path(sys.argv[2]), Request(friso.load(sys.argv[1]), {AXES!r}).study()):
@@ -376,7 +373,7 @@ def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path
 
 
 def test_export(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
-    from friso.studies.export import export
+    from friso.studies.store import export
 
     export(whole, tmp_path / "map.nc")
     with xr.open_dataset(tmp_path / "map.nc") as exported:
@@ -440,14 +437,14 @@ def test_a_chunk_that_may_not_be_read_is_named_beside_those_that_are_damaged(
     stored: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     flip(stored / "period" / "1.0", 0.6)
-    real, closed = ledger.digest_of, stored / "peaks" / "0.0"
+    real, closed = store_files.digest_of, stored / "peaks" / "0.0"
 
     def may_not(file: Path) -> str | None:
         if file == closed:
             raise PermissionError(errno.EACCES, "Permission denied", str(file))
         return real(file)
 
-    monkeypatch.setattr(ledger, "digest_of", may_not)
+    monkeypatch.setattr(store_files, "digest_of", may_not)
     state = check_store(stored)
     assert (state.damaged, state.unreadable) == (["1.0"], [str(closed)])
 
@@ -810,7 +807,7 @@ def test_damaged_cells_are_not_handed_out(stored: Path, damage: str, monkeypatch
         def may_not(*_: object) -> None:
             raise PermissionError(errno.EACCES, "Permission denied")
 
-        monkeypatch.setattr(ledger, "stored", may_not)
+        monkeypatch.setattr(store_files, "stored", may_not)
     with pytest.raises(StoreError, match=rf"peaks\[0:{first.stop}, 0:16\] \(controller.crossover, joint.stroke\)"):
         runs["peaks"][first].load()
     if damage in ("missing", "foreign"):

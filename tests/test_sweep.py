@@ -19,11 +19,10 @@ from friso.hunting.basin import ends_in
 from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.hunting.verdict import judge
 from friso.stage import Stage
+from friso.studies.axes import Samples
 from friso.studies.metric import usual_metrics
-from friso.studies.request import Request
-from friso.studies.samples import Samples
 from friso.studies.settings import StudySettings
-from friso.studies.study import study_of
+from friso.studies.study import Request, study_of
 from friso.studies.sweep import sweep
 from friso.studies.traces import traces
 

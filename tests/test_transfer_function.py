@@ -14,10 +14,10 @@ from variants import VARIANTS
 import friso
 from friso.engine.simulate import simulate
 from friso.equations.bandwidth import faster
-from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, compensator
+from friso.frequency.system import DriveTiming
 from friso.hunting import cannot_hunt, hunting
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import LAGS

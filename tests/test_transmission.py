@@ -15,11 +15,11 @@ from friso.equations.controllers.van_dijk import numbers
 from friso.equations.structure import structure
 from friso.errors import StageError
 from friso.frequency.crossover import limits, settled_members
-from friso.frequency.drive import DriveTiming
 from friso.frequency.family import loops, spectral_abscissa
 from friso.frequency.loops import response
-from friso.frequency.members import concatenate_families, limit_cases, member
+from friso.frequency.members import Members, limit_cases, member
 from friso.frequency.parts import plant
+from friso.frequency.system import DriveTiming
 from friso.hunting import Decline, Ensemble, Feeding, cannot_hunt, hunting, unstable
 from friso.hunting.feeding import dry_friction, feeding
 from friso.hunting.settings import CheckSettings
@@ -375,7 +375,7 @@ def test_bode_across_a_transmission() -> None:
     stage = machine(encoder={"position": "load", "velocity": "motor"}, drive=drive, controller=BY_RATE)
     flat, omega = stage.flat(), np.geomspace(1.0, 300.0, 7)
     every = limit_cases(flat).values()
-    together = loops(flat, concatenate_families([*every]), omega)
+    together = loops(flat, Members.joined([*every]), omega)
     one_by_one = [response(flat, case, DriveTiming.of(flat))(omega) for case in every]
     assert together == pytest.approx(np.array(one_by_one), rel=0.03)  # but for the aliases of the plant
     highest = limits(flat).highest_stable

@@ -17,9 +17,8 @@ from friso.studies.cells import Columns
 from friso.studies.execute import local_crew
 from friso.studies.metric import every_variable, is_text, usual_metrics
 from friso.studies.refine import finer, refine_cells
-from friso.studies.request import Request
 from friso.studies.settings import StudySettings
-from friso.studies.study import Study
+from friso.studies.study import Request, Study
 from friso.studies.sweep import sweep
 from friso.studies.verify import loosest_rtol, random_cells
 

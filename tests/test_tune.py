@@ -20,7 +20,7 @@ from benchmarks.tune import performance_of
 from friso import Stage, load, loads
 from friso.app import questions
 from friso.cli.asking import Shown, show
-from friso.design_method.isolator import isolated
+from friso.design_method.prepare import isolated
 from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS, Results
 from friso.engine.batch import RunOptions, run_chunks
@@ -31,8 +31,7 @@ from friso.equations.motion import size
 from friso.equations.settings import settings_named
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
-from friso.frequency.bandwidth import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth
-from friso.frequency.crossover import settled_margin
+from friso.frequency.crossover import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth, settled_margin
 from friso.frequency.family import controller_response
 from friso.hunting import Ensemble, check_given, find_cycles, find_margin
 from friso.hunting.criteria import settling_of_runs
@@ -64,21 +63,24 @@ from friso.questions.tune.words import (
 from friso.remedies import method
 from friso.remedies import search as search_module
 from friso.remedies import verified as verified_module
-from friso.remedies.catalogue import Remedy, remedies
-from friso.remedies.change import ChangeSize, change_size
-from friso.remedies.confirmed import confirmed
-from friso.remedies.goal import Goal
-from friso.remedies.least import LEAST, candidates, change_costs, least_changes, least_remedy
-from friso.remedies.machines import Fleet, MoveRange, draw_fleet
+from friso.remedies.catalogue import BANDWIDTH, Remedy, of_key, remedies, suggestion
+from friso.remedies.least import LEAST, ChangeSize, candidates, change_costs, change_size, least_changes, least_remedy
+from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import Advice, _not_seen, _Session, pairs, tune
 from friso.remedies.relax import _tolerances, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints, _evolve
 from friso.remedies.sensitivities import Sensitivities, _is_smooth, _of_settling, sensitivity
 from friso.remedies.settings import RemedySettings
-from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
-from friso.remedies.variables import BANDWIDTH, of_key
-from friso.remedies.verified import ONE, Performance, RemedyOutcome, _stiffness, missed_parts, unsettled_parts
+from friso.remedies.verified import (
+    ONE,
+    Performance,
+    RemedyOutcome,
+    _stiffness,
+    confirmed,
+    missed_parts,
+    unsettled_parts,
+)
 from friso.remedies.window import VariableWindow, windows
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.prefixes import NOTHING, with_unit
@@ -1690,7 +1692,7 @@ def test_points_given_up_early_are_those_that_no_search_would_have_kept(
         monkeypatch.setattr(search_module, "moves_of_points", moves)
         search.optimise(changed)
         points = search.points
-        costs = points.cost(goal, None if changed is None else changed(points.shares))
+        costs = points.cost(goal, changed)
         best.append(points.shares[costs.argmin()])
         runs.append(sum(counted))
     assert np.array_equal(*best)

@@ -14,14 +14,14 @@ import pytest
 import friso
 from benchmarks.trust.stages import drawn_stages
 from friso.app.machine import Machine, machine_on_page
-from friso.design_method.isolator import isolated
+from friso.design_method.prepare import isolated
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.interface.answer import Answer
 from friso.stage import Stage
 from friso.stage.plausible import idle_encoder, implausible_values
 from friso.studies.rig.moves_on_rails import with_joint
-from friso.studies.rig.sizes import freed
+from friso.studies.rig.outcome import freed
 from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import SAMPLE_TIME, own_motion
 

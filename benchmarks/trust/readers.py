@@ -28,7 +28,7 @@ from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.read import is_frequency_response, read_frequency_response
 from friso.stage import Stage
 from friso.stage.correlations import read_correlations
-from friso.studies.request import Request
+from friso.studies.study import Request
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))

@@ -24,9 +24,8 @@ from friso.interface.output_folder import MARKER, OutputFolder
 from friso.progress import silent
 from friso.questions.map.study import write_beside
 from friso.studies import metadata
-from friso.studies.request import Request
 from friso.studies.store import Store, check_store, read_store
-from friso.studies.study import Study
+from friso.studies.study import Request, Study
 from friso.studies.sweep import sweep
 
 RIG = Path(__file__).parents[2] / "examples" / "thesis_rig.toml"

@@ -10,7 +10,7 @@ from typing import Any
 
 from benchmarks.truth.by_hand import joint_state
 from friso.stage.controllers import FORCE_LIMIT
-from friso.stage.transmission import BACKLASH, MOTOR_FRICTION, TRANSMISSION
+from friso.stage.tables import BACKLASH, MOTOR_FRICTION, TRANSMISSION
 
 BY_KEY = {
     "controller.error_deadband": "dead band of the error",

@@ -11,13 +11,11 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.optimize import differential_evolution
 
-from friso.design_method.choice import bears, evaluated
-from friso.design_method.front import evaluate_geometries
+from friso.design_method.choice import bears, evaluate_geometries, evaluated
 from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms, moved_along, sheets
-from friso.design_method.outline import outline
-from friso.design_method.requirements import BREAKAWAY, PARASITIC, LeafTask, requirements
+from friso.design_method.prepare import outline
+from friso.design_method.requirements import BREAKAWAY, PARASITIC, LeafTask, evolved, requirements
 from friso.design_method.settings import settings
 from friso.design_method.spec import read_spec
 from friso.equations.breakaway import least_breakaway
@@ -91,17 +89,11 @@ class _Search:
     def best(self) -> np.ndarray:
         """Return logarithms of the best length and spacing [m] and the index of the sheet, (3,)."""
         ends = [*np.log([self.low[[0, 2]], self.high[[0, 2]]]).T, (0.0, len(self.bought) - 1e-9)]
-        bounds = [(low, high + 1e-12 * (high == low)) for low, high in ends]
-        minimum = differential_evolution(
-            lambda x: self.cost(np.exp(x[:2]).T, [self.bought[int(k)] for k in x[2]]),
-            bounds,
-            vectorized=True,
-            updating="deferred",
-            maxiter=settings.leaves_generations,
-            popsize=settings.leaves_points,
-            rng=settings.leaves_seed,
-            polish=False,
-        )
+
+        def cost(x: np.ndarray) -> np.ndarray:
+            return self.cost(np.exp(x[:2]).T, [self.bought[int(k)] for k in x[2]])
+
+        minimum = evolved(cost, ends, settings.leaves_generations, settings.leaves_seed, settings.leaves_points)
         return np.asarray(minimum.x)
 
     def cost(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:

@@ -12,29 +12,34 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.choice import ChosenLeaves, Confirmed, chosen, confirmed
+from friso.design_method.choice import Candidate, ChosenLeaves, Confirmed, chosen, confirmed, front
 from friso.design_method.controller import (
     DesignedController,
+    Modal,
     choose_controller,
     comfortable,
     comfortable_below,
     dampings,
 )
-from friso.design_method.edges import Corners, OtherLaws, edges_over, rigid, under_law, worst_edges
-from friso.design_method.front import Candidate, front
-from friso.design_method.hunting_map import HuntingMap, hunting_map
-from friso.design_method.modal import Modal
-from friso.design_method.population import Population, corners
+from friso.design_method.population import (
+    Corners,
+    OtherLaws,
+    Population,
+    corners,
+    edges_over,
+    rigid,
+    under_law,
+    worst_edges,
+)
 from friso.design_method.prepare import prepared, with_leaves
-from friso.design_method.relax import Relaxation, relaxed_requirements
-from friso.design_method.requirements import LeafTask
+from friso.design_method.requirements import LeafTask, Relaxation, relaxed_requirements
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
-from friso.design_method.verification import Verification, verification
+from friso.design_method.verification import HuntingMap, Verification, hunting_map, verification
 from friso.engine.side_by_side import both
 from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.ranges import Range
+from friso.frequency.crossover import Range
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage

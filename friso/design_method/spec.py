@@ -17,17 +17,7 @@ from pydantic_core import CoreSchema, core_schema
 from friso.errors import InputError, SpecError
 from friso.intervals import Interval, Span
 from friso.materials import materials
-from friso.quantities import (
-    Number,
-    Quantity,
-    Value,
-    at_least_1,
-    exactly,
-    inside_0_1,
-    non_negative,
-    positive,
-    quoted,
-)
+from friso.quantities import Number, Quantity, Value, at_least_1, exactly, inside_0_1, non_negative, positive, quoted
 from friso.stage.files import parsed, text_of
 from friso.stage.flexure import leaf_count, unknown_material
 from friso.stage.section import Section, Table
@@ -280,16 +270,6 @@ class Safety(Section):
     """Relative tolerance of the drive stiffness; the thickness, which enters cubed, may deviate by a third of it."""
 
 
-_MACHINE = Table(lambda _: SpecMachine, '[machine] crossover_limit = "48 Hz"')
-_FRICTION = Table(lambda _: SpecFriction, '[friction] static = "1 N .. 3 N"')
-_MASSES = Table(lambda _: SpecMasses, '[masses] stage = "0.5 kg +/- 5 %"')
-_MOVES = Table(lambda _: SpecMoves, '[moves] travel = "1 mm .. 100 mm", acceleration = "10 m/s^2 .. 100 m/s^2"')
-_POSITION = Table(lambda _: Position, '[position] window = "1 um"')
-_LOAD = Table(lambda _: Load, '[load] force_x = "20 N"')
-_LEAVES = Table(lambda _: SpecLeaves, '[leaves] length = "30 mm .. 70 mm", ...')
-_SAFETY = Table(lambda _: Safety, "[safety] buckling = 3")
-
-
 class Spec(Section):
     """A specification, as its file describes it."""
 
@@ -297,14 +277,14 @@ class Spec(Section):
 
     name: str = ""
     source: str = ""
-    machine: Annotated[SpecMachine, _MACHINE]
-    friction: Annotated[SpecFriction, _FRICTION]
-    masses: Annotated[SpecMasses, _MASSES] = SpecMasses()
-    moves: Annotated[SpecMoves, _MOVES]
-    position: Annotated[Position, _POSITION]
-    load: Annotated[Load, _LOAD] = Load()
-    leaves: Annotated[SpecLeaves, _LEAVES]
-    safety: Annotated[Safety, _SAFETY] = Safety()
+    machine: Annotated[SpecMachine, Table('[machine] crossover_limit = "48 Hz"')]
+    friction: Annotated[SpecFriction, Table('[friction] static = "1 N .. 3 N"')]
+    masses: Annotated[SpecMasses, Table('[masses] stage = "0.5 kg +/- 5 %"')] = SpecMasses()
+    moves: Annotated[SpecMoves, Table('[moves] travel = "1 mm .. 100 mm", acceleration = "10 m/s^2 .. 100 m/s^2"')]
+    position: Annotated[Position, Table('[position] window = "1 um"')]
+    load: Annotated[Load, Table('[load] force_x = "20 N"')] = Load()
+    leaves: Annotated[SpecLeaves, Table('[leaves] length = "30 mm .. 70 mm", ...')]
+    safety: Annotated[Safety, Table("[safety] buckling = 3")] = Safety()
 
     @property
     def limit(self) -> float:

@@ -1,6 +1,8 @@
 """Try the design in simulated moves of machines drawn from the specification.
 
 The joint is free, and locked for comparison.
+
+Map, over crossover and stroke, how many corners of a specification do not come to rest.
 """
 
 from __future__ import annotations
@@ -10,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.population import Population, random_machines
+from friso.design_method.population import Population, random_machines, typical_move
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
+from friso.engine.arrays import ArrayColumns
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.engine.settings import room_settings
-from friso.equations.controllers.van_dijk import TUNED_MASS
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.criteria import CREEPS, FAILED, RESTS, SWINGS, outcomes
@@ -36,7 +39,7 @@ THERE_AND_BACK = {
 
 
 @dataclass(frozen=True)
-class MachineOutcomes:
+class MachineOutcomes(ArrayColumns):
     """Outcomes of machines after their moves, as arrays of shape (count,).
 
     `words` say what the run does until its end (`friso.hunting.criteria.run_outcome`), with the position window as
@@ -49,10 +52,6 @@ class MachineOutcomes:
     words: np.ndarray
     settling: np.ndarray
     swing: np.ndarray
-
-    def first(self, count: int) -> MachineOutcomes:
-        """Return the outcomes of the first machines, `count` of them."""
-        return MachineOutcomes(self.words[:count], self.settling[:count], self.swing[:count])
 
     @property
     def completed(self) -> np.ndarray:
@@ -123,7 +122,7 @@ class Verification:
 
     @property
     def compared(self) -> MachineOutcomes:
-        return self.free.first(len(self.locked.words))
+        return self.free.take(slice(len(self.locked.words)))
 
 
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
@@ -219,3 +218,43 @@ def _worst_stage(stage: Stage, keys: dict[str, float], time: float) -> Stage:
     corner = float(last_corner({**flat, **moved.flat(), **keys}))
     numbers = joint | keys | {"motion.duration": corner + time}
     return moved.with_numbers(numbers, without=["flexure"])
+
+
+@dataclass(frozen=True)
+class HuntingMap:
+    """The fraction of corners in which the stage is not in position, over crossover and stroke.
+
+    Corners are the extremes of friction and masses. Crossovers [Hz] have shape (n,), strokes [m] (m,), and fractions
+    (m, n). A corner counts if the stage is not in position a quarter of a minute after a typical move. The fraction is
+    NaN if a run failed.
+    """
+
+    crossovers: np.ndarray
+    strokes: np.ndarray
+    share: np.ndarray
+
+
+def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
+    """Compute the map of corners not in position, over crossover and stroke, around a design.
+
+    The drive stiffness is the design's own.
+    """
+    flat = stage.flat()
+    crossovers, strokes = (
+        np.geomspace(low * flat[key], high * flat[key], count)
+        for key, (low, high), count in zip(
+            (CROSSOVER, "joint.stroke"),
+            settings.map_reach,
+            (settings.map_crossovers, settings.map_strokes),
+            strict=True,
+        )
+    )
+    shape = (settings.map_strokes, settings.map_crossovers, population.count)
+    stroke, crossover, number = (
+        axis.ravel() for axis in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij")
+    )
+    machines = {key: value[number] for key, value in population.keys.items()}
+    runs = {**flat, **machines, **typical_move(spec), CROSSOVER: crossover, "joint.stroke": stroke}
+    outcome = move_machines(runs, len(number), float(spec.position.window), patient=False)
+    share = np.where(outcome.completed, outcome.restless, np.nan).reshape(shape).mean(axis=2)
+    return HuntingMap(crossovers, strokes, share)

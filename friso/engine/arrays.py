@@ -2,10 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+
+
+class ArrayColumns:
+    """Base of dataclasses whose fields are all arrays over the same runs, stages or states."""
+
+    def mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
+        """Apply a function to every array."""
+        return type(self)(**{name: change(column) for name, column in vars(self).items()})
+
+    def take(self, numbers: Any) -> Self:
+        """Select the rows with these numbers, or those of a boolean array."""
+        return self.mapped(lambda column: column[numbers])
+
+    def shaped(self, *shape: int) -> Self:
+        """Give every array a shape."""
+        return self.mapped(lambda column: column.reshape(shape))
+
+    @classmethod
+    def joined(cls, parts: Iterable[Self]) -> Self:
+        """Put the rows of several parts one after the other."""
+        return cls(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
 
 
 class Tables(NamedTuple):

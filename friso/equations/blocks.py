@@ -17,10 +17,9 @@ import sympy as sp
 from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TIME, Component, Held, key
 from friso.equations.structure import ControllerForm
-from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection
+from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection, FrictionSettings
 from friso.stage.filters import FEEDBACK, FORWARD, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
-from friso.stage.standstill import FrictionSettings
 
 
 @dataclass(frozen=True)

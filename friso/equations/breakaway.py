@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.stage.tables import friction_law
-from friso.stage.transmission import MOTOR_FRICTION, as_friction
+from friso.stage.tables import MOTOR_FRICTION, as_friction, friction_law
 
 if TYPE_CHECKING:
     import sympy as sp

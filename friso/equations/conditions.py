@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.stage.conditions import CONDITIONS
 from friso.stage.flexure import register_derivation
+from friso.stage.tables import CONDITIONS
 
 if TYPE_CHECKING:
     import sympy as sp

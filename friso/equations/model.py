@@ -24,8 +24,7 @@ from friso.equations.reference import declared
 from friso.equations.structure import ControllerForm, Structure
 from friso.equations.transmission import BACKLASH, at_motor, transmission
 from friso.stage.motion import QUADRATIC, ReferenceForm
-from friso.stage.tables import friction_law
-from friso.stage.transmission import MOTOR_MASS
+from friso.stage.tables import MOTOR_MASS, friction_law
 
 REFERENCE = declared().inputs
 """Position, velocity and acceleration of a reference at its last corner."""

@@ -3,7 +3,7 @@
 The force changes at each sample and is held until the next. Filters and integrals are discretised block by block, by
 the rules of the drive (Franklin, Powell, Workman 1998, Digital Control of Dynamic Systems, chapter 6). Without a filter
 a derivative is a difference over samples. Bode plots of a sampled drive use these equations too
-(`friso.frequency.rates`).
+(`friso.frequency.loops`).
 """
 
 from __future__ import annotations

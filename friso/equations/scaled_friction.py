@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.stage import numeric_keys
-from friso.stage.transmission import MOTOR_FRICTION
+from friso.stage.tables import MOTOR_FRICTION
 
 TABLES = ("friction", MOTOR_FRICTION)
 """Tables of a stage file that hold a friction law."""

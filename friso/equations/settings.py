@@ -1,7 +1,7 @@
 """Catalogue of a drive's settings against friction.
 
 The catalogue lists the effect of each setting, its values for a machine, and the ranges in which it is tuned. The keys
-of settings are declared in `friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare
+of settings are declared in `friso.stage.controllers`, their equations in `continuous` and `sampled`. `friso compare
 --also` tries one value of each setting; `friso tune` searches their ranges.
 """
 
@@ -17,7 +17,7 @@ from friso.equations.continuous import slow_gains
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage.controllers import ControllerSection, controller_of
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 
 FlatMachine = Mapping[str, Any]
 Sizes = Callable[[FlatMachine, float], dict[str, float]]

@@ -16,17 +16,18 @@ from friso.stage.controllers import (
     FILTERS_KEY,
     FORCE_LIMIT,
     KIND,
+    NO_SETTINGS,
     AntiWindup,
     ControllerSection,
+    FrictionSettings,
     controller_of,
+    settings_of,
 )
 from friso.stage.filters import FILTER_RULE, FilterForm, FilterRule, filter_forms
 from friso.stage.motion import KIND as MOTION_KIND
 from friso.stage.motion import QUADRATIC, ReferenceForm, motion_of
 from friso.stage.rig import LOOPS, IntegralRule
-from friso.stage.standstill import NO_SETTINGS, FrictionSettings, settings_of
-from friso.stage.tables import friction_law
-from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
+from friso.stage.tables import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction, friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
 

@@ -14,7 +14,7 @@ import sympy as sp
 from friso.equations.component import Component, Kink, Output, State, key
 from friso.equations.friction.common import Friction
 from friso.equations.masses import Body, beyond_stops, stops
-from friso.stage.transmission import MOTOR_FRICTION, STATE_PREFIX
+from friso.stage.tables import MOTOR_FRICTION, STATE_PREFIX
 
 BACKLASH = key("transmission.backlash")
 """Total backlash [m], from flank to flank."""

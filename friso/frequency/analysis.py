@@ -6,11 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from friso.errors import InputError
-from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
-from friso.frequency.members import Members, limit_cases, limiter_states
+from friso.frequency.members import Members, level, limit_cases, limiter_in_series, limiter_states
 from friso.frequency.parts import FORCE, RATED, REFERENCE, STAGE, VELOCITY, compensator, plant, reference_derivatives
-from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
 from friso.quantities import quoted
 from friso.stage import Stage
@@ -87,18 +85,10 @@ def _control(system: System, name: str) -> StateSpace:
     return StateSpace(system.a[0], system.b[0], system.c[0], system.d[0], name=name, **names)
 
 
-def _plant(flat: Mapping[str, Any], member: Members) -> System:
-    return _at_axis(plant(flat, member))
-
-
 def _controller(flat: Mapping[str, Any], member: Members) -> System:
     controller = compensator(flat, len(member))
     measured = (REFERENCE, STAGE, VELOCITY) if controller.sees(VELOCITY) else (REFERENCE, STAGE)
     return controller.take((*measured, *reference_derivatives(controller)), (FORCE,))
-
-
-def _closed(flat: Mapping[str, Any], member: Members) -> System:
-    return _at_axis(closed_loop(flat, member))
 
 
 def _at_axis(system: System) -> System:
@@ -107,10 +97,10 @@ def _at_axis(system: System) -> System:
 
 
 _PARTS: dict[str, Callable[[Mapping[str, Any], Members], System]] = {
-    "plant": _plant,
+    "plant": lambda flat, member: _at_axis(plant(flat, member)),
     "controller": _controller,
     "open": open_loop,
-    "closed": _closed,
+    "closed": lambda flat, member: _at_axis(closed_loop(flat, member)),
 }
 
 

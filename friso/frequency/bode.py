@@ -1,30 +1,112 @@
-"""Analyse a stage linearly: limit cases, states between them, and highest bandwidth."""
+"""Analyse a stage linearly: limit cases, states between them, and highest bandwidth.
+
+Compute the loops of a cascade separately, each opened where a drive's Bode plot opens it.
+
+The plant leads from the commanded force to the velocity at the encoder. The velocity loop is cut where the velocity is
+fed back, with the position loop open. The position loop is cut where the position is fed back, with the velocity loop
+closed (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives, chapters 3 and 4). With loops at several rates both are
+characteristic loci (`friso.frequency.loops`), which do not depend on the place of the cut.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
 from friso.errors import InputError
-from friso.frequency.cascaded import CascadeLoops, cascade_loops, is_cascade
-from friso.frequency.crossover import Limits, limits
-from friso.frequency.drive import DriveTiming
+from friso.frequency.crossover import Limits, Range, limits, ranges_below
 from friso.frequency.family import Scan, closed_loop_poles, loops, plant_poles, scan_stability, spectral_abscissa
-from friso.frequency.friction import steady_force
-from friso.frequency.loops import response
-from friso.frequency.margins import Margins, margins, with_resonances
-from friso.frequency.members import Members, concatenate_families, family, limit_cases, member
-from friso.frequency.parts import FORCE, STAGE, plant
-from friso.frequency.ranges import Range, ranges_below
+from friso.frequency.loops import lifted_loop, locus_of, poles, response
+from friso.frequency.margins import Margins, margins, margins_of, with_resonances
+from friso.frequency.members import (
+    Members,
+    family,
+    limit_cases,
+    limiter_in_series,
+    member,
+    steady_force,
+)
+from friso.frequency.parts import FORCE, STAGE, VELOCITY, plant
 from friso.frequency.settings import settings
-from friso.frequency.stiffness import limiter_in_series
-from friso.frequency.system import Complex
+from friso.frequency.system import Complex, DriveTiming
 from friso.stage import Stage
+from friso.stage.controllers import controller_of
+
+POSITION_TIME = "drive.position_sample_time"
+
+CascadeLoop = Literal["velocity", "position"]
+
+
+@dataclass(frozen=True)
+class CascadeLoops:
+    """Loops of a cascade in one state of the stage, complex, over `Bode.omega`.
+
+    `plant` leads from the commanded force to the velocity [m/(N s)], with hold, delay and current loop. `loops` are the
+    "velocity" and the "position" loop, with their `margins`.
+    """
+
+    plant: np.ndarray
+    loops: Mapping[CascadeLoop, np.ndarray]
+    margins: Mapping[CascadeLoop, Margins]
+
+
+def is_cascade(flat: Mapping[str, Any]) -> bool:
+    """Tell whether the controller of a stage has a velocity loop within its position loop."""
+    return controller_of(flat).feeds_back == "velocity"
+
+
+def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> CascadeLoops:
+    """Return the loops of a cascade in one state of the stage, over angular frequencies [rad/s]."""
+    drive = DriveTiming.of(flat)
+    moved = plant(flat, member).take((FORCE,), (VELOCITY,)).at(1j * omega)[0, :, 0, 0]
+    alone = {key: value for key, value in flat.items() if key != POSITION_TIME}  # open the position loop
+    timing = DriveTiming.of(alone)
+    inner, outer = response(alone, member, timing, cut=STAGE), _position_loop(flat, member, drive)
+    of_inner = poles(alone, member, timing, cut=STAGE)
+    closed, continuous = of_inner.closed[:, _seen(of_inner.in_s)], of_inner.continuous[:, _seen(of_inner.continuous)]
+    of_inner = replace(of_inner, closed=closed, continuous=continuous)
+    return CascadeLoops(
+        plant=moved * drive.transfer(omega),
+        loops={"velocity": inner(omega), "position": outer(omega)},
+        margins={
+            "velocity": margins_of(inner, alone, member, of_inner),
+            "position": margins_of(outer, flat, member, poles(flat, member, drive)),
+        },
+    )
+
+
+def _seen(rates: Complex) -> np.ndarray:
+    """Return which poles of a velocity loop its feedback can move, shape (n,).
+
+    `rates` are the poles [rad/s], shape (1, n).
+    """
+    sizes = np.abs(rates[0])
+    return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)
+
+
+def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
+    """Return the position loop as a function of angular frequencies [rad/s].
+
+    The velocity loop within it is closed.
+    """
+    if not drive.sample_time:
+        outer, inner = (response(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
+        return lambda omega: outer(omega) / (1 + inner(omega))
+    by_position, by_velocity = (lifted_loop(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
+
+    def at(omega: np.ndarray) -> Complex:
+        turn = omega * drive.sample_time
+        inner = by_velocity.over(turn)
+        matrices = np.linalg.solve(np.eye(inner.shape[-1]) + inner, by_position.over(turn))
+        return locus_of(matrices.astype(complex), turn)[0]
+
+    return at
+
 
 PRESCRIBED = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 """Speeds of the cart [m/s] at which the open loop is shown, from stuck to sliding fast (thesis, Fig. 8)."""
@@ -155,8 +237,8 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     margins_of = {name: margins(*state) for name, state in states.items()}
     low, high = band or _mattering(flat, margins_of.values())
     for keys in _by_joint(stage).values():  # refuse a delay that is too long now, before the limits are requested
-        closed_loop_poles(keys, concatenate_families([*limit_cases(keys).values()]))
-    together = concatenate_families([*limit_cases(flat).values()])
+        closed_loop_poles(keys, Members.joined(limit_cases(keys).values()))
+    together = Members.joined(limit_cases(flat).values())
     resonant = [closed_loop_poles(flat, together), plant_poles(flat, together)]
     omega = with_resonances(np.geomspace(low, high, settings.curve_points) * 2 * np.pi, resonant)
     return Bode(
@@ -165,7 +247,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
         cases={
             name: BodeCase(
                 member,
-                _plant(keys, member, omega),
+                plant(keys, member).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0],
                 response(keys, member, DriveTiming.of(keys))(omega),
                 margins_of[name],
             )
@@ -179,11 +261,6 @@ def _by_joint(stage: Stage) -> dict[str, Mapping[str, Any]]:
     """Return the stage's keys with its joint "locked" and "free", or as "given" without a joint."""
     variants = stage.variants()
     return {name: member.flat() for name, member in variants.items() if name != "given" or len(variants) == 1}
-
-
-def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Complex:
-    """Return stage position over force [m/N] of a stage in one state, exactly."""
-    return plant(flat, member).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0]
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
@@ -201,7 +278,7 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
 
     The crossovers are those of `all_margins`.
     """
-    poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
+    poles = plant_poles(flat, Members.joined(limit_cases(flat).values()))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
     places = np.array(
         [*(f for case_margins in all_margins for f in case_margins.crossovers), *resonances[resonances > 1e-3]]
@@ -217,7 +294,7 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
     if flat["friction.model"] == "none":
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
-    states = concatenate_families([member(speed, touched=touched) for speed in PRESCRIBED])
+    states = Members.joined([member(speed, touched=touched) for speed in PRESCRIBED])
     stable = spectral_abscissa(flat, states) < 0
     return tuple(
         Prescribed(speed, response(flat, states[k], DriveTiming.of(flat))(omega), bool(stable[k]))

@@ -9,7 +9,7 @@ and frequency takes a few operations.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -17,16 +17,22 @@ import numpy as np
 
 from friso.engine.side_by_side import side_by_side
 from friso.equations.structure import shared_structure
-from friso.frequency.drive import DriveTiming
-from friso.frequency.friction import law_of
-from friso.frequency.loops import Poles, poles
+from friso.frequency.loops import Poles, controller_over_period, poles, samples_controller
 from friso.frequency.margins import frequencies, margins
-from friso.frequency.members import Members, concatenate_families, limit_cases
-from friso.frequency.operating_point import operating_point
-from friso.frequency.parts import FORCE, RATED, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
-from friso.frequency.rates import controller_over_period, samples_controller
+from friso.frequency.members import Members, law_of, limit_cases
+from friso.frequency.parts import (
+    FORCE,
+    RATED,
+    STAGE,
+    VELOCITY,
+    cart_states,
+    compensator,
+    mechanics,
+    operating_point,
+    plant,
+)
 from friso.frequency.settings import settings
-from friso.frequency.system import Complex, System
+from friso.frequency.system import Complex, DriveTiming, System
 
 _T = TypeVar("_T")
 
@@ -175,7 +181,7 @@ def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
 
     There are `density` per decade, and more about the resonances of plant and closed loop.
     """
-    cases = concatenate_families([*limit_cases(flat).values()])
+    cases = Members.joined(limit_cases(flat).values())
     return frequencies(
         flat, cases, DriveTiming.of(flat), density, [plant_poles(flat, cases), closed_loop_poles(flat, cases)]
     )
@@ -217,9 +223,7 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
         return np.zeros((len(masses.a), len(s)), complex)
     cart = cart_states(flat)
     held = [i for i, name in enumerate(masses.states) if name not in cart]
-    a, b, c = masses.a[:, held][:, :, held], masses.b[:, held], masses.c[:, :, held]
-    names = tuple(masses.states[i] for i in held)
-    return replace(masses, a=a, b=b, c=c, states=names).at(s)[..., 0, 0]
+    return masses.keep(held).at(s)[..., 0, 0]
 
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:

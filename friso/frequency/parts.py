@@ -1,8 +1,11 @@
-"""Represent plant and controller of a stage as linear systems, for many states at once."""
+"""Represent plant and controller of a stage as linear systems, for many states at once.
+
+Find the friction law's steady state: stuck under a bias force, or sliding at a speed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -11,7 +14,7 @@ import numpy as np
 import sympy as sp
 
 from friso.equations.blocks import Controller, Loop
-from friso.equations.component import Component
+from friso.equations.component import Component, Kink
 from friso.equations.continuous import continuous_controller
 from friso.equations.joint import touching
 from friso.equations.model import REFERENCE as REFERENCE_COURSE
@@ -20,12 +23,43 @@ from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
 from friso.equations.transmission import flanks
 from friso.errors import InputError
-from friso.frequency.declared import Declared
-from friso.frequency.friction import law_of, motor_law_of
-from friso.frequency.members import Members
-from friso.frequency.operating_point import operating_point, operating_point_of_motor
-from friso.frequency.system import System
-from friso.stage.transmission import MOTOR_STATES
+from friso.frequency.members import FORWARD, Members, law_of, motor_law_of
+from friso.frequency.system import Declared, System
+from friso.stage.tables import MOTOR_STATES, STATE_PREFIX, of_motor
+
+
+def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """Return the steady values of a stage's friction law in each state of `members`, by name.
+
+    Each has the shape (members,). They are the values of its internal states, of its modes with memory, of the sides of
+    its kinks (where derivatives jump), and of its direction. The result is empty without friction.
+    """
+    law, forward = law_of(flat), members.forward.astype(float)
+    if law is None:
+        return {}
+    sign = 2 * forward - 1
+    at = {**flat, "velocity": sign * np.maximum(members.speed, np.finfo(float).tiny), FORWARD: forward}
+    sliding, stuck = law.sliding(at), law.stuck({**at, "bias": sign * members.bias})
+    internal = {
+        name: np.where(members.stuck, rest, moving)
+        for name, rest, moving in zip((*law.states, *law.modes), stuck, sliding, strict=True)
+    }
+    return {FORWARD: forward, **internal}
+
+
+def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """Return the steady values of the friction law at the motor in each state, by name.
+
+    The motor moves with the load and bears no bias force.
+    """
+    unbiased = replace(members, bias=np.zeros(len(members)))
+    point = operating_point(of_motor(flat), unbiased)
+    beyond = "beyond_"
+    return {
+        f"{beyond}{STATE_PREFIX}{name.removeprefix(beyond)}" if name.startswith(beyond) else f"{STATE_PREFIX}{name}": at
+        for name, at in point.items()
+    }
+
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
 FEEDFORWARD = "reference velocity", "reference acceleration", "reference jerk"
@@ -55,7 +89,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
-    values |= {**_limiter(members.touched), **_on_flank()}
+    values |= {**_ahead(touching, members.touched.astype(float)), **_ahead(flanks, 1.0)}
     values |= {str(symbol): 0.0 for symbol in REFERENCE_COURSE}  # the reference rests
     bodies = {form.cart: law_of(flat)}
     if form.motor:
@@ -80,25 +114,18 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
         actual = "a backlash" if drive.backlash else "friction at the motor"
         raise InputError("transmission", actual, "the friction of the guide alone", "friso check, which simulates")
     declared = _plant(replace(shared_structure(flat).standing, friction="none", friction_variant=None)).declared
-    return declared.at({**flat, **_limiter(touched)}, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
+    masses = declared.at({**flat, **_ahead(touching, touched.astype(float))}, len(touched))
+    return masses.take((FORCE, DISTURBANCE), (STAGE, CART))
 
 
-def _limiter(touched: np.ndarray) -> dict[str, Any]:
-    """Return the symbols that say whether the limiter is touched, by name, with their values.
+def _ahead(kinks: Callable[[sp.Expr], tuple[Kink, Kink]], values: Any) -> dict[str, Any]:
+    """Return the symbols of the stops ahead and behind, by name: `values` say where the one ahead is touched.
 
-    Where `touched` is true, the limiter is touched ahead, else it is free.
+    With the limiter, members that touch it do so ahead. With a backlash, the motor stands on the flank ahead, on which
+    it pushes the load forward.
     """
-    ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
-    return {ahead: touched.astype(float), behind: 0.0}
-
-
-def _on_flank() -> dict[str, Any]:
-    """Return the symbols that say where the backlash is, by name, with their values.
-
-    The motor stands on the flank ahead, on which it pushes the load forward.
-    """
-    ahead, behind = (str(kink.beyond) for kink in flanks(sp.S.Zero))
-    return {ahead: 1.0, behind: 0.0}
+    ahead, behind = (str(kink.beyond) for kink in kinks(sp.S.Zero))
+    return {ahead: values, behind: 0.0}
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
@@ -190,11 +217,7 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
         share = system.a[:, z, velocity]
         for matrix in (a, c):
             matrix[:, :, position] += share[:, None] * matrix[:, :, z]
-    external = [i for i, name in enumerate(system.states) if name not in internal]
-    states = tuple(system.states[i] for i in external)
-    return replace(
-        system, a=a[:, external][:, :, external], b=system.b[:, external], c=c[:, :, external], states=states
-    )
+    return replace(system, a=a, c=c).keep([i for i, name in enumerate(system.states) if name not in internal])
 
 
 def _without_constants(system: System, internal: tuple[str, ...]) -> System:
@@ -203,7 +226,4 @@ def _without_constants(system: System, internal: tuple[str, ...]) -> System:
     An example is the force of an element that slips. Such a state would be a pole at 0.
     """
     unmoved = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
-    moving = [i for i in range(len(system.states)) if i not in unmoved]
-    states = tuple(system.states[i] for i in moving)
-    a, b, c = system.a[:, moving][:, :, moving], system.b[:, moving], system.c[:, :, moving]
-    return replace(system, a=a, b=b, c=c, states=states)
+    return system.keep([i for i in range(len(system.states)) if i not in unmoved])

@@ -37,7 +37,7 @@ from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-from friso.stage.transmission import leading_friction
+from friso.stage.tables import leading_friction
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,7 +18,7 @@ from friso.hunting.many_stages import find_attractors
 from friso.hunting.settings import check_settings
 from friso.stage import Stage
 from friso.stage.stage import declared_keys
-from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
+from friso.stage.tables import BACKLASH, MOTOR_FRICTION
 
 
 @dataclass(frozen=True)

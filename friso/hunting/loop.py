@@ -14,9 +14,8 @@ from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.settings import check_settings
 from friso.stage import Stage
-from friso.stage.controllers import controller_of
-from friso.stage.standstill import NO_SETTINGS
-from friso.stage.transmission import BACKLASH, MOTOR_MASS, MOTOR_STATES
+from friso.stage.controllers import NO_SETTINGS, controller_of
+from friso.stage.tables import BACKLASH, MOTOR_MASS, MOTOR_STATES
 
 LoopState = Literal["sticks", "slides"]
 LowerGains = Literal["stable", "unstable", "unknown"]

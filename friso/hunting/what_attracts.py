@@ -26,7 +26,7 @@ from friso.hunting.return_map.mapped import Mapped, map_stages
 from friso.hunting.return_map.settings import settings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
-from friso.stage.standstill import dead_band
+from friso.stage.controllers import dead_band
 
 SKETCH_RTOL = ToleranceSettings().sketch_rtol
 """Relative tolerance of the runs of a sketch."""

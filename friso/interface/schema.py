@@ -76,7 +76,7 @@ def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping
     """
     for item in metadata:
         if isinstance(item, Table):
-            return _one_of(item.pick, path, described)
+            return _one_of(item.picked_by(annotation), path, described)
         if isinstance(item, TableArray):
             return {"type": "array", "maxItems": item.most, "items": _one_of(item.variants.pick, path, described)}
         if isinstance(item, Coefficients):

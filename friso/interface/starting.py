@@ -141,7 +141,7 @@ def _start(
     if spec is not None and source is not None:
         raise InputError("spec", "together with --from", "one of the two", "friso init --from machine.ini")
     if spec is not None:
-        from friso.design_method.outline import outline
+        from friso.design_method.prepare import outline
 
         return outline(load(spec))
     if source is None:

@@ -1,29 +1,108 @@
-"""List the remedies with the keys that they change, the smallest change first."""
+"""List the remedies with the keys that they change, the smallest change first.
+
+Define the variables of an optimiser, on logarithmic scales: gains, bandwidth, and joint.
+
+Suggest an isolator for a rigid stage that hunts, from a survey of a few joints.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from friso.design_method.isolator import isolated
-from friso.equations.bandwidth import bandwidth
+from friso.design_method.prepare import isolated
+from friso.equations.bandwidth import bandwidth, faster, sped_up
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.equations.motion import pieces
+from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
-from friso.frequency.bandwidth import bandwidths_at
-from friso.frequency.crossover import WANTED, limits
+from friso.frequency.crossover import WANTED, bandwidths_at, limits, settled_margin
+from friso.hunting import find_attractors
 from friso.quantities import exactly
-from friso.remedies import variables
-from friso.remedies.goal import Goal
-from friso.remedies.variables import BANDWIDTH, Variable, bandwidth_factor, of_key
+from friso.remedies.machines import Goal
+from friso.remedies.settings import settings
 from friso.stage import Stage, numeric_keys
-from friso.stage.controllers import FILTERS_KEY, controller_of
-from friso.stage.standstill import settings_of
+from friso.stage.controllers import FILTERS_KEY, controller_of, settings_of
 from friso.studies.compare.options import linear_flat
+
+KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
+"""Function that takes the keys so far, in SI, and values of a variable, and returns the keys that change."""
+
+BANDWIDTH = "bandwidth"
+"""Name of the variable that makes the whole controller faster."""
+
+
+DAMPING_RATIOS = (0.01, 0.3)
+"""Range of damping ratios of the stage on its joint."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number between `low` and `high` (SI) on a logarithmic scale.
+
+    Close to the `present` value, the number takes exactly that value; NaN means that there is none.
+    """
+
+    name: str
+    low: float
+    high: float
+    change: KeyChanges
+    present: float = float("nan")
+
+    def at(self, share: np.ndarray) -> np.ndarray:
+        """Return the values at coordinates from 0 to 1 over the range."""
+        value = np.asarray(self.low * (self.high / self.low) ** share)
+        return np.where(np.abs(share - self.share(self.present)) < settings.snap_share, self.present, value)
+
+    def share(self, value: float) -> float:
+        """Return the coordinate, from 0 to 1 over the range, of a value."""
+        return float(np.log(value / self.low) / np.log(self.high / self.low))
+
+
+def of_key(key: str, low: float, high: float, present: float = float("nan")) -> Variable:
+    """Return a key of the stage file as a variable between `low` and `high`.
+
+    Close to the `present` value, the variable takes exactly that value; NaN means that there is none.
+    """
+    return Variable(key, low, high, lambda flat, value: {key: value}, present)
+
+
+def bandwidth_factor(present: float = float("nan")) -> Variable:
+    """Return the bandwidth of the whole controller as a variable: a factor on the present one."""
+    return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up, present)
+
+
+def gains(stage: Stage) -> tuple[Variable, ...]:
+    """Return as variables the numbers that shape the controller, then its bandwidth."""
+    flat, controller = stage.flat(), controller_of(stage.flat())
+    shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
+    keys = [controller.key(name) for name in controller.speeds_up if flat.get(controller.key(name))]
+    against = [of_key(key, flat[key] / settings.gain_factor, flat[key] * settings.gain_factor) for key in keys[1:]]
+    return (*shape, *against, bandwidth_factor())
+
+
+def joint_variables(friction: float) -> tuple[Variable, ...]:
+    """Return stroke, stiffness and damping of an isolator as variables.
+
+    The ranges of the variables follow from the least static `friction` [N].
+    """
+
+    def stiffness(flat: Mapping[str, Any], share: np.ndarray) -> dict[str, Any]:
+        return {"joint.stiffness": share * friction / flat["joint.stroke"]}
+
+    def damping(flat: Mapping[str, Any], ratio: np.ndarray) -> dict[str, Any]:
+        return {"joint.damping": 2 * ratio * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])}
+
+    return (
+        of_key("joint.stroke", *settings.joint_strokes),
+        Variable("force of the joint at its stroke", *settings.joint_force_share, stiffness),
+        Variable("damping ratio of the joint", *DAMPING_RATIOS, damping),
+    )
+
 
 WIDTHS, DEPTH = (0.1, 1.5), 0.9
 """Range of the width of a notch over its frequency, and the depth of the notch."""
@@ -116,7 +195,7 @@ def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint
 
     The list is empty if the bandwidth would be the only variable. `buys_joint` is true if the remedy needs a new joint.
     """
-    several = (*first, *variables.gains(stage))
+    several = (*first, *gains(stage))
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
@@ -211,7 +290,76 @@ def _isolators(stage: Stage, goal: Goal) -> Iterator[Remedy]:
     if free.flexure:
         kept = {key: flat[key] for key in flat if key.startswith(("joint.stiffness", "parasitic."))}
         free = free.with_numbers(kept, without=("flexure",))
-    joint = variables.joint_variables(float(least_breakaway(flat)))
+    joint = joint_variables(float(least_breakaway(flat)))
     yield Remedy("isolator", free, joint, True)
     if goal.controller:
         yield from _gains("isolator and gains", free, joint, True)
+
+
+DAMPING = (0.05, DAMPING_RATIOS[1])
+"""Damping ratios that are tried for a suggested joint."""
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A joint tried in a rigid stage, and the `stage` with that joint.
+
+    `settles` is true if the stage does not hunt, neither as it is, nor with its bandwidth divided by `Goal.distance`,
+    nor with static friction multiplied or divided by it, down to Coulomb friction. `margin` is the least modulus margin
+    of the limit cases, and of all states stuck under a bias force. If no joint settles, this is the last one tried.
+    """
+
+    stage: Stage
+    settles: bool
+    margin: float
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities behind
+def suggestion(stage: Stage) -> Suggestion | None:
+    """Return the isolator with the shortest of a few strokes that settles a stage.
+
+    At full stroke, an isolator pushes with a fixed fraction of static friction, so that the cart does not move. If none
+    settles the stage, the last one tried is returned. Returns None for a stage that has a joint or cannot have one.
+    """
+    if stage.joint:
+        return None
+    friction = float(least_breakaway(stage.flat()))
+    if friction <= 0:
+        return None
+    try:
+        free = isolated(stage)
+    except InputError:
+        return None
+    remedy, tried = (
+        Remedy("", free, joint_variables(friction), True),
+        [(stroke, d) for stroke in settings.suggested_strokes for d in DAMPING],
+    )
+    shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
+    numbers = remedy.changes(shares)
+    flat = {**free.flat(), **numbers, "motion.kind": "release"}  # only attractors matter, not the motion
+    attracts = np.zeros(len(tried), bool)
+    machines = [flat, faster(flat, 1 / Goal.distance)]
+    if static_frictions(flat):
+        factors = max(1 / Goal.distance, least_static_factor(flat)), Goal.distance
+        machines += [with_static_friction(flat, factor) for factor in factors]
+    for machine in machines:
+        attracted = find_attractors(machine, len(tried), close_orbits=False)
+        attracts |= attracted.attracts | ~attracted.certain
+    for number in np.flatnonzero(~attracts):
+        settled = remedy.tuned(shares[number])
+        margin = settled_margin(settled.flat())
+        if margin > 0:
+            return Suggestion(settled, True, margin)
+    return Suggestion(remedy.tuned(shares[-1]), False, 0.0)
+
+
+def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
+    """Return coordinates, from 0 to 1, of a joint's stroke [m], force and damping ratio.
+
+    The scale is logarithmic. The force is `RemedySettings.suggested_force`.
+    """
+    wanted = (stroke, settings.suggested_force, damping)
+    return [
+        float(np.log(value / variable.low) / np.log(variable.high / variable.low))
+        for value, variable in zip(wanted, remedy.variables, strict=True)
+    ]

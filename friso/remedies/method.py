@@ -21,22 +21,19 @@ from friso.frequency.crossover import Limits, limits
 from friso.hunting import Case
 from friso.platform.extras import missing
 from friso.progress import Progress, silent
-from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
-from friso.remedies.change import ChangeSize, change_size
-from friso.remedies.confirmed import confirmed
-from friso.remedies.goal import Goal
-from friso.remedies.least import least_changes, least_remedy, of_one_key, size_cost
-from friso.remedies.machines import Fleet, MoveRange, draw_fleet
+from friso.remedies.catalogue import BANDWIDTH, Remedy, remedies, with_bandwidth
+from friso.remedies.least import ChangeSize, change_size, least_changes, least_remedy, of_one_key, size_cost
+from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
 from friso.remedies.settings import settings
 from friso.remedies.trials import modulus_margins
-from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import (
     Performance,
     RemedyOutcome,
     checked,
+    confirmed,
     missed_parts,
     moving,
     unsettled_parts,
@@ -184,9 +181,7 @@ def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOu
     if not working:
         return ()
     fastest = min(working, key=lambda outcome: slowest(outcome, goal))
-    if fastest is working[0]:
-        return tuple(working[:2])
-    return working[0], fastest
+    return tuple(working[:2]) if fastest is working[0] else (working[0], fastest)
 
 
 def tune(
@@ -607,13 +602,10 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
     """Return the outcome of an interrupted search: its best settings so far, not verified."""
-    if not search.tried:
-        return outcome
     points = search.points
     if not points.meets(search.goal).any():
         return outcome
-    best = int(points.cost(search.goal).argmin())
-    shares = points.shares[best]
+    shares = points.shares[points.cost(search.goal).argmin()]
     return replace(outcome, stage=search.remedy.tuned(shares), points=points, shares=shares)
 
 

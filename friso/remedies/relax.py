@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.design_method.relax import Relaxation
+from friso.design_method.requirements import Relaxation
 from friso.engine.allowance import Exhausted
 from friso.quantities import outwards
 from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet
+from friso.remedies.machines import Fleet, Goal
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
 from friso.remedies.trials import attraction, moves_of_points

@@ -16,13 +16,16 @@ from scipy.optimize import brentq, differential_evolution
 from scipy.stats import qmc
 
 from friso.engine.allowance import Allowance, Exhausted, allowance
-from friso.frequency.bandwidth import loop_bandwidths
+from friso.engine.arrays import ArrayColumns
+from friso.frequency.crossover import loop_bandwidths
 from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet
+from friso.remedies.machines import Fleet, Goal
 from friso.remedies.settings import settings
 from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.stage import Stage
+
+Wanted = Callable[[np.ndarray], np.ndarray]
+"""Quantity of points (points, variables), shape (points,), that a search minimises."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class TriedPoints:
+class TriedPoints(ArrayColumns):
     """The settings that were tried, one point in each row, and how the machines performed.
 
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Three
@@ -76,10 +79,6 @@ class TriedPoints:
         none = np.zeros(0)
         return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool), none)
 
-    def take(self, numbers: np.ndarray) -> TriedPoints:
-        """Return the points with these indices."""
-        return TriedPoints(*(column[numbers] for column in vars(self).values()))
-
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
         """Return for each part of the goal, by name, which points break it, shape (n,)."""
         return {
@@ -106,7 +105,7 @@ class TriedPoints:
         some &= ~np.any([broken[name] for name in ("bandwidth", "margin", "force")], axis=0) & ~self.meets(goal)
         return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
-    def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
+    def cost(self, goal: Goal, wanted: Wanted | None = None) -> np.ndarray:
         """Return the cost of points, (n,): the settling time, or the quantity `wanted` if given.
 
         Points that break constraints cost more than all others, the more they break them.
@@ -117,7 +116,7 @@ class TriedPoints:
         excess += 4.0 * (1 - self.nearness)
         time = np.where(np.isfinite(self.settling), self.settling, 100.0)
         excess += _excess(time, goal.settle)
-        minimised = time if wanted is None else wanted
+        minimised = time if wanted is None else wanted(self.shares)
         return np.asarray(np.where(self.meets(goal), minimised, settings.worst_time * (1 + excess) + time))
 
 
@@ -159,12 +158,9 @@ class Search:
     @property
     def begun(self) -> TriedPoints:
         """Return all settings tried, if any, including those that were stopped early."""
-        tried = self.tried or [TriedPoints.none(len(self.remedy.variables))]
-        return TriedPoints(*(np.concatenate(column) for column in zip(*(vars(s).values() for s in tried), strict=True)))
+        return TriedPoints.joined(self.tried or [TriedPoints.none(len(self.remedy.variables))])
 
-    def optimise(
-        self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
-    ) -> None:
+    def optimise(self, wanted: Wanted | None = None, start: np.ndarray | None = None) -> None:
         """Try settings until they no longer improve, or until that takes too much work (`cut`).
 
         The search minimises the settling time, or the quantity `wanted`: a function from points (points, variables) to
@@ -212,7 +208,7 @@ class Search:
             except Exhausted:
                 self.cut = True
 
-    def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
+    def _optimise(self, wanted: Wanted | None, start: np.ndarray | None) -> None:
         """Minimise the settling time, or the quantity `wanted` if given, over a remedy's variables.
 
         One variable is searched on a grid, which is then refined. Several variables are searched by differential
@@ -226,17 +222,15 @@ class Search:
         def cost(shares: np.ndarray, most: np.ndarray | float = np.inf) -> np.ndarray:
             self.report(f"{self.remedy.name}: trying settings")
             points = np.clip(shares.T, 0, 1)
-            small = None if wanted is None else wanted(points)
-            self.tried.append(self.measured(points, most, small))
-            return self.tried[-1].cost(self.goal, small)
+            self.tried.append(self.measured(points, most, wanted))
+            return self.tried[-1].cost(self.goal, wanted)
 
         if variables == 1:
             count = self.budget.points * 6
             grid = np.linspace(0, 1, count)
             cost(np.union1d(grid, self._at_the_limit(grid))[None])
             points = self.points
-            best = points.cost(self.goal, None if wanted is None else wanted(points.shares)).argmin()
-            at = points.shares[int(best), 0]
+            at = points.shares[points.cost(self.goal, wanted).argmin(), 0]
             cost(np.clip(np.linspace(at - 1 / count, at + 1 / count, self.budget.points * 2), 0, 1)[None])
             return
         size = max(5, min(self.budget.points * variables, settings.generation_points))
@@ -249,8 +243,7 @@ class Search:
             points = self.points
             if not points.meets(self.goal).any() and points.nearness.max() < settings.hopeful_nearness:
                 return
-            costs = points.cost(self.goal, None if wanted is None else wanted(points.shares))
-            best = points.shares[int(costs.argmin())]
+            best = points.shares[points.cost(self.goal, wanted).argmin()]
             ends = [(max(0.0, at - away), min(1.0, at + away)) for at in best]
             low, high = np.array(ends).T
             near = low + (high - low) * drawn
@@ -284,7 +277,7 @@ class Search:
         return loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), len(shares))
 
     def measured(
-        self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: np.ndarray | None = None
+        self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: Wanted | None = None
     ) -> TriedPoints:
         """Simulate moves of the machines with each of several settings, and return how they perform.
 
@@ -321,9 +314,9 @@ class Search:
 
         if self.slowest.size != machines:
             self.slowest = np.zeros(machines)
-        order = np.argsort(-self.slowest, kind="stable")
+        parts = np.split(np.argsort(-self.slowest, kind="stable"), [settings.first_machines])
         left = worth_it(stable)
-        for part in (order[: settings.first_machines], order[settings.first_machines :]):
+        for part in parts:
             if left.size and part.size:
                 moves: Moves = moves_of_points(self.remedy, shares[left], self.machines.take(part), goal)
                 at = np.ix_(left, part)
@@ -332,7 +325,7 @@ class Search:
         rests = np.isfinite(looser[left]).any(axis=1)
         slower[left[~rests]] = np.inf  # machines that settle nowhere are not run at a lower bandwidth
         left = left[rests]
-        for part in (order[: settings.first_machines], order[settings.first_machines :]):
+        for part in parts:
             if left.size and part.size:
                 some = self.machines.take(part)
                 moves = moves_of_points(self.remedy, shares[left], some, goal, slower=goal.distance)
@@ -342,7 +335,7 @@ class Search:
         self.slowest += np.bincount(settling[settle].argmax(axis=1), minlength=machines)
         return so_far()
 
-    def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
+    def _whole(self, batch: np.ndarray, wanted: Wanted | None) -> np.ndarray:
         """Return the settings of a batch that meet the goal once all machines were run.
 
         Both batch and result are points (points, variables). The best come first: they settle soonest, or have the
@@ -384,7 +377,7 @@ class Search:
             meets[robust] &= in_time & (moves.force <= _most(goal.force_limit))
         return np.asarray(meets.mean(axis=1))
 
-    def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
+    def surveyed(self, wanted: Wanted | None = None) -> Iterator[np.ndarray]:
         """Yield the best settings with which enough surveyed machines do not hunt (see `clear`).
 
         Settings are points of shape (variables,). Points that settle soonest, or have the least of the quantity
@@ -433,7 +426,7 @@ class Search:
         if not any_clear and len(best) and most < enough:
             yield from best[self.clear(best)]
 
-    def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
+    def _closer(self, point: np.ndarray, wanted: Wanted | None) -> list[np.ndarray]:
         """Return better settings near a point (variables,), the best first.
 
         The best settle soonest, or have the least `wanted` if given. The `point` was taken because better ones failed:
@@ -441,15 +434,14 @@ class Search:
         works, further points are drawn around that one.
         """
         goal, closer = self.goal, list[np.ndarray]()
-        cost = self.measured(point[None]).cost(goal, None if wanted is None else wanted(point[None]))[0]
+        cost = self.measured(point[None]).cost(goal, wanted)[0]
         for number in range(settings.most_closer):
             low, high = np.clip(point - settings.around_share, 0, 1), np.clip(point + settings.around_share, 0, 1)
             drawn = low + (high - low) * qmc.Sobol(point.size, rng=settings.optimiser_seed + number).random(
                 settings.points_around
             )
-            small = None if wanted is None else wanted(drawn)
-            self.tried.append(tried := self.measured(drawn, cost, small))
-            costs = np.where(tried.whole, tried.cost(goal, small), np.inf)
+            self.tried.append(tried := self.measured(drawn, cost, wanted))
+            costs = np.where(tried.whole, tried.cost(goal, wanted), np.inf)
             better = _apart(
                 drawn[np.argsort(costs, kind="stable")[: np.count_nonzero(costs < cost)]],
                 settings.points_looked_at,
@@ -475,7 +467,7 @@ def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     return np.where(count > 0, sizes[order][count - 1], np.inf)
 
 
-def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
+def _order(points: TriedPoints, wanted: Wanted | None) -> np.ndarray:
     """Return the quantity that sorts points, (n,): the settling time, or `wanted` if given."""
     return points.settling if wanted is None else wanted(points.shares)
 

@@ -15,11 +15,11 @@ from friso.equations.motion import initial_displacement, rests, size, stands
 from friso.equations.structure import decisive_keys
 from friso.errors import InputError
 from friso.frequency.crossover import settled_members
-from friso.frequency.drive import DriveTiming
 from friso.frequency.family import scan_stability
 from friso.frequency.loops import response
 from friso.frequency.margins import margins
 from friso.frequency.members import Members
+from friso.frequency.system import DriveTiming
 from friso.hunting import (
     CycleDerivatives,
     Ensemble,

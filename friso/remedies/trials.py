@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.engine.arrays import Status
+from friso.engine.arrays import ArrayColumns, Status
 from friso.engine.batch import RunOptions, part_of, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.bandwidth import faster
@@ -15,8 +15,7 @@ from friso.equations.structure import shared_structure
 from friso.hunting import find_attractors
 from friso.hunting.criteria import settling_of_runs
 from friso.remedies.catalogue import Remedy
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet
+from friso.remedies.machines import Fleet, Goal
 from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
@@ -29,7 +28,7 @@ by at most a thousandth, usually by a tenth of that."""
 
 
 @dataclass(frozen=True)
-class Moves:
+class Moves(ArrayColumns):
     """Moves of points on machines, all arrays of shape (points, machines).
 
     `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`), and
@@ -99,7 +98,7 @@ def modulus_margins(
 
 
 @dataclass(frozen=True)
-class Attraction:
+class Attraction(ArrayColumns):
     """Which machines hunt at which points, as arrays of shape (points, machines).
 
     `attracts` is true if a machine hunts at its bandwidth, or at one lower by up to the goal's distance. `decided` is
@@ -136,12 +135,7 @@ class Attraction:
 
 @np.errstate(all="ignore")
 def attraction(
-    remedy: Remedy,
-    shares: np.ndarray,
-    machines: Fleet,
-    goal: Goal,
-    enough: float | None = None,
-    at_once: bool = False,
+    remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, enough: float | None = None, at_once: bool = False
 ) -> Attraction:
     """Survey whether machines hunt at points of a search, given by coordinates `shares`.
 

@@ -1,4 +1,7 @@
-"""Verify remedies by limit cycles, and on machines that the optimiser did not see."""
+"""Verify remedies by limit cycles, and on machines that the optimiser did not see.
+
+Confirm that a tuned stage does not hunt at its own bandwidth, nor at nearby ones.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +12,105 @@ from typing import Any, Literal
 import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
+from friso.engine.kernel import kernels
+from friso.equations.bandwidth import faster
 from friso.equations.continuous import slow_gains
 from friso.equations.settings import gain_states
-from friso.frequency.bandwidth import loop_bandwidth
-from friso.frequency.crossover import settled_margin
-from friso.frequency.stiffness import in_series
-from friso.hunting import Case, check_given
+from friso.equations.structure import structure
+from friso.frequency.crossover import loop_bandwidth, settled_margin
+from friso.frequency.members import in_series
+from friso.hunting import (
+    Case,
+    Hunting,
+    LoopState,
+    check_given,
+    find_attractors,
+    hunting,
+    judge_many,
+    kernels_to_judge,
+    unstable,
+)
 from friso.remedies.catalogue import Remedy
-from friso.remedies.confirmed import Confirmation
-from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet, MoveRange
+from friso.remedies.machines import Fleet, Goal, MoveRange
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
 from friso.remedies.window import VariableWindow
 from friso.shares import DOUBT, Share, share
 from friso.stage import Stage
+from friso.studies.compare.measures import quantile_interval
 from friso.studies.compare.options import linear_flat
-from friso.studies.compare.statistics import quantile_interval
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """Result of searching for hunting at a stage's own bandwidth and at nearby ones.
+
+    `hunting` are the limit cycles of the `stage` itself, searched as thoroughly as `friso check` does. `word` is the
+    verdict on the stage's own motion from fewer starts; None if that takes too much work. `factors` are the other
+    bandwidths, as multiples of the stage's own; `quiet` is true at those at which the stage certainly does not hunt.
+    `unstable` are the states in which the loop of the stage is unstable.
+    """
+
+    stage: Stage
+    hunting: Hunting
+    word: str | None
+    factors: np.ndarray
+    quiet: np.ndarray
+    unstable: tuple[LoopState, ...]
+
+    @property
+    def certain(self) -> bool:
+        """Tell whether the verdict on hunting at the stage's own bandwidth is certain."""
+        return self.hunting.certain
+
+    @property
+    def verdict(self) -> str:
+        """Return the verdict at the stage's own bandwidth; "failed" if it was not computed."""
+        own = self.word or "failed"
+        return own if self.hunting.target is None or own != "settles" else "bistable"
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Return why the stage may still hunt, as names of `DOUBTS`; empty if it surely does not.
+
+        `DOUBTS` are in `friso.questions.tune.present_words`. The reasons are the verdict, its certainty, and hunting at
+        lower or higher bandwidths, or that the work was given up.
+        """
+        if self.word is None:
+            return ("given up",)
+        parts = {
+            "verdict": self.verdict != "settles",
+            "certain": not self.certain,
+            "distance": not self.quiet[self.factors < 1].all(),
+            "window": not self.quiet[self.factors > 1].all(),
+        }
+        return tuple(name for name, holds in parts.items() if holds)
+
+
+@np.errstate(all="ignore")
+def confirmed(stage: Stage, goal: Goal) -> Confirmation:
+    """Judge a stage at its own bandwidth, and at others within the goal's distance.
+
+    The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and each is
+    searched from more starts.
+    """
+    kernels(kernels_to_judge(structure(stage.flat())))
+    steps = settings.bandwidths_beside
+    factors = np.delete(goal.distance ** (np.arange(-steps, steps + 1) / steps), steps)
+    flat, count = stage.flat(), len(factors)
+    word, quiet = None, np.zeros(count, bool)
+    attracting = hunting(stage, work=settings.confirming_work)
+    with allowance(settings.confirming_work) as allowed:
+        try:
+            near = find_attractors(faster(flat, factors), count)
+            quiet = near.certain & ~near.attracts
+            word = str(judge_many(flat, 1, settings.move_rtol)[0])
+        except Exhausted:
+            if allowed.around is not None and allowed.around.left <= 0:
+                raise
+    return Confirmation(stage, attracting, word, factors, quiet, unstable(stage))
+
 
 ONE = np.zeros((1, 0))
 """Coordinates of the only point of a remedy without variables."""
@@ -178,10 +262,9 @@ class Performance:
 
     def _first(self, count: int) -> Performance:
         """Return the performance of the first `count` machines only."""
-        moves = Moves(*(column[:, :count] for column in vars(self.moves).values()))
-        attracted = Attraction(*(column[:, :count] for column in vars(self.attraction).values()))
-        margin, sizes = self.margin[:, :count], self.sizes[:count]
-        return replace(self, moves=moves, margin=margin, attraction=attracted, sizes=sizes)
+        some = np.s_[:, :count]
+        moves, attracted = self.moves.take(some), self.attraction.take(some)
+        return replace(self, moves=moves, margin=self.margin[some], attraction=attracted, sizes=self.sizes[:count])
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
         """Return the performance with `further` machines added.

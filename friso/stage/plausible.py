@@ -12,7 +12,7 @@ from friso.axis import ROTARY
 from friso.quantities import Quantity, any_sign
 from friso.stage.lists import element_keys
 from friso.stage.stage import Stage
-from friso.stage.transmission import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, TRANSMISSION, moving_mass
+from friso.stage.tables import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, TRANSMISSION, moving_mass
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""

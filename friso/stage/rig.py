@@ -10,16 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from friso.errors import InputError, StageError
-from friso.quantities import (
-    Bound,
-    Number,
-    Quantity,
-    Value,
-    at_least_1,
-    non_negative,
-    positive,
-    quoted,
-)
+from friso.quantities import Bound, Number, Quantity, Value, at_least_1, non_negative, positive, quoted
 from friso.stage.controllers import FILTERS_KEY
 from friso.stage.filters import FILTER_RULE, FILTERS, FilterRule
 from friso.stage.lists import Several, Values, row_keys

@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from types import NoneType
 from typing import Any, ClassVar, Self, TypeVar, get_args
 
@@ -161,26 +161,40 @@ def _perhaps_uncertain(value: Any, field: Quantity | Number) -> Any:
 SectionClass = TypeVar("SectionClass", bound=type[Section])
 
 
+PickClass = Callable[[dict[str, Any]], type[Section]]
+"""Chooses the class that reads a table."""
+
+
+def read_table(pick: PickClass, example: str, entry: Any, info: ValidationInfo) -> Any:
+    """Make the section from a table; a section is left as it is.
+
+    Raises InputError for anything but a table, and for a table with wrong keys or values.
+    """
+    if isinstance(entry, Section):
+        return entry
+    if not isinstance(entry, dict):
+        raise InputError("", quoted(entry), "a table of keys", example)
+    return pick(entry).on(info.context or LINEAR, entry)
+
+
 @dataclass(frozen=True)
 class Table:
-    """A key that takes a table: `pick` chooses the class that reads it, `example` shows one."""
+    """A key that takes a table, which `example` shows.
 
-    pick: Callable[[dict[str, Any]], type[Section]]
+    Its class is that of the annotation, or the one that `variants` choose.
+    """
+
     example: str
+    variants: "Variants | None" = None
 
-    def read(self, entry: Any, info: ValidationInfo) -> Any:
-        """Make the section from a table; a section is left as it is.
-
-        Raises InputError for anything but a table, and for a table with wrong keys or values.
-        """
-        if isinstance(entry, Section):
-            return entry
-        if not isinstance(entry, dict):
-            raise InputError("", quoted(entry), "a table of keys", self.example)
-        return self.pick(entry).on(info.context or LINEAR, entry)
+    def picked_by(self, annotation: Any) -> PickClass:
+        """Return the function that chooses the class by a table's keys, for a key with this annotation."""
+        section = next(part for part in get_args(annotation) or (annotation,) if part is not NoneType)
+        return (self.variants or OneTable(section)).pick
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_before_validator_function(self.read, handler(source))
+        read = partial(read_table, self.picked_by(source), self.example)
+        return core_schema.with_info_before_validator_function(read, handler(source))
 
 
 class Variants:
@@ -275,7 +289,7 @@ class TableArray:
         rows = []
         for number, entry in enumerate(entries, start=1):
             try:
-                rows.append(Table(self.variants.pick, self.example).read(entry, info))
+                rows.append(read_table(self.variants.pick, self.example, entry, info))
             except InputError as error:
                 raise error.under(str(number)) from None
         return Rows(rows)

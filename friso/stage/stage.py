@@ -15,7 +15,6 @@ from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, as_toml, exactly, in_unit_of, quoted
-from friso.stage.conditions import Conditions
 from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLER,
@@ -43,38 +42,33 @@ from friso.stage.section import (
 from friso.stage.tables import (
     FRICTION,
     MOTOR_CONSTANT,
+    MOTOR_FRICTION,
+    MOTOR_MASS,
     Actuator,
     AxisTable,
     Bias,
+    Conditions,
+    Encoder,
     FrictionSection,
     Joint,
     Masses,
     Parasitic,
     StatedMoves,
+    Transmission,
     friction_law,
+    motor_mass,
+    of_motor,
 )
-from friso.stage.transmission import MOTOR_FRICTION, MOTOR_MASS, Encoder, Transmission, motor_mass, of_motor
 
 LOGGER = logging.getLogger("friso")
 
-_FRICTION = Table(FRICTION.pick, '[friction] model = "lugre" ...')
-_TRANSMISSION = Table(lambda _: Transmission, '[transmission] inertia = "1.2e-4 kg*m^2", lead = "10 mm" ...')
-_MOTOR_FRICTION = Table(FRICTION.pick, '[motor_friction] model = "stribeck" ...')
-_ENCODER = Table(lambda _: Encoder, '[encoder] position = "load", velocity = "motor"')
-_JOINT = Table(lambda _: Joint, '[joint] stiffness = "2.4 N/mm" ...')
+_TRANSMISSION = Table('[transmission] inertia = "1.2e-4 kg*m^2", lead = "10 mm" ...')
+_ENCODER = Table('[encoder] position = "load", velocity = "motor"')
+_JOINT = Table('[joint] stiffness = "2.4 N/mm" ...')
 _LOCKED = '[joint] locked = true, limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
-_FLEXURE = Table(lambda _: Flexure, '[flexure] leaves = 2, length = "70 mm", width = "45 mm" ...')
-_PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
-_BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
-_ACTUATOR = Table(lambda _: Actuator, '[actuator] motor_constant = "50 N/A"')
-_CONTROLLER = Table(CONTROLLERS.pick, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
-_DRIVE = Table(lambda _: Drive, '[drive] sample_time = "50 us"')
-_RAIL = Table(lambda _: Rail, '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm" ...')
-_CONDITIONS = Table(lambda _: Conditions, "[conditions] load = 1.3, load_share = 0.8")
-_CABLE = Table(lambda _: Cable, '[cable] stiffness = "50 N/m"')
-_FLOOR = Table(lambda _: Floor, '[floor] frequency = ["1 Hz", "100 Hz"] ...')
-_MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = "20 s"')
-_MOVES = Table(lambda _: StatedMoves, '[moves] smallest = "10 um", largest = "32 mm"')
+_FLEXURE = Table('[flexure] leaves = 2, length = "70 mm", width = "45 mm" ...')
+_RAIL = Table('[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm" ...')
+_CONTROLLER = Table('[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2', CONTROLLERS)
 
 
 class Stage(Section):
@@ -95,25 +89,25 @@ class Stage(Section):
     name: str = ""
     source: str = ""
     note: str = ""
-    axis: Annotated[AxisTable | None, Table(lambda _: AxisTable, '[axis] kind = "rotary"')] = None
-    masses: Annotated[Masses, Table(lambda _: Masses, '[masses] cart = "1.2 kg"')]
-    friction: Annotated[FrictionSection | None, _FRICTION] = None
+    axis: Annotated[AxisTable | None, Table('[axis] kind = "rotary"')] = None
+    masses: Annotated[Masses, Table('[masses] cart = "1.2 kg"')]
+    friction: Annotated[FrictionSection | None, Table('[friction] model = "lugre" ...', FRICTION)] = None
     transmission: Annotated[Transmission | None, _TRANSMISSION] = None
-    motor_friction: Annotated[FrictionSection | None, _MOTOR_FRICTION] = None
+    motor_friction: Annotated[FrictionSection | None, Table('[motor_friction] model = "stribeck" ...', FRICTION)] = None
     encoder: Annotated[Encoder | None, _ENCODER] = None
     joint: Annotated[Joint | None, _JOINT] = None
     flexure: Annotated[Flexure | None, _FLEXURE] = None  # type: ignore[valid-type]
-    parasitic: Annotated[Parasitic | None, _PARASITIC] = None
-    bias: Annotated[Bias | None, _BIAS] = None
-    actuator: Annotated[Actuator | None, _ACTUATOR] = None
+    parasitic: Annotated[Parasitic | None, Table('[parasitic] frequency = "300 Hz" ...')] = None
+    bias: Annotated[Bias | None, Table('[bias] cart = "0.2 N"')] = None
+    actuator: Annotated[Actuator | None, Table('[actuator] motor_constant = "50 N/A"')] = None
     controller: Annotated[ControllerSection, _CONTROLLER]
-    drive: Annotated[Drive | None, _DRIVE] = None
+    drive: Annotated[Drive | None, Table('[drive] sample_time = "50 us"')] = None
     rail: Annotated[Rail | None, _RAIL] = None
-    conditions: Annotated[Conditions | None, _CONDITIONS] = None
-    cable: Annotated[Cable | None, _CABLE] = None
-    floor: Annotated[Floor | None, _FLOOR] = None
-    motion: Annotated[Motion, _MOTION]
-    moves: Annotated[StatedMoves | None, _MOVES] = None
+    conditions: Annotated[Conditions | None, Table("[conditions] load = 1.3, load_share = 0.8")] = None
+    cable: Annotated[Cable | None, Table('[cable] stiffness = "50 N/m"')] = None
+    floor: Annotated[Floor | None, Table('[floor] frequency = ["1 Hz", "100 Hz"] ...')] = None
+    motion: Annotated[Motion, Table('[motion] kind = "step", size = "1 mm", duration = "20 s"', MOTION)]
+    moves: Annotated[StatedMoves | None, Table('[moves] smallest = "10 um", largest = "32 mm"')] = None
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(

@@ -1,23 +1,23 @@
-"""The tables of a stage file: masses, friction, joint, parasitic mode, motion."""
+"""The tables of a stage file: masses, friction, joint, parasitic mode, motion.
+
+The table [conditions]: how the guide runs, against when its [friction] was measured.
+
+The tables [transmission], [motor_friction] and [encoder] between motor and load.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from math import pi
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import model_validator
 
 from friso.axis import axis_of
 from friso.errors import StageError
-from friso.quantities import (
-    Number,
-    Quantity,
-    Value,
-    any_sign,
-    non_negative,
-    positive,
-    quoted,
-)
-from friso.stage.section import Section, UncertainSection, Variants
+from friso.quantities import Bound, Number, Quantity, Value, any_sign, non_negative, positive, quoted
+from friso.stage.section import Rule, Section, UncertainSection, Variants
 
 
 class AxisTable(UncertainSection):
@@ -229,3 +229,159 @@ class StatedMoves(Section):
                 actual = f"{quoted(getattr(self, high).text)} with {low} = {quoted(getattr(self, low).text)}"
                 raise StageError(high, actual, f"at least the {low}", f"{low} = {first}, {high} = {last}")
         return self
+
+
+CONDITIONS = "conditions"
+
+from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
+
+
+def _falls(flat: Mapping[str, Any]) -> Any:
+    """Tell whether static friction is at least Coulomb friction under the operating conditions.
+
+    The result is true for laws that lack one of these levels. It is also true if static friction is smaller without the
+    conditions, because the friction law reports that.
+    """
+    if not {"friction.static", "friction.coulomb"} <= {*flat}:
+        return True
+    static, coulomb = (flat[f"friction.{x}"] * flat.get(f"{CONDITIONS}.{x}_factor", 1.0) for x in ("static", "coulomb"))
+    # the law itself reports the second case
+    return (static >= coulomb) | (flat["friction.static"] < flat["friction.coulomb"])
+
+
+class Conditions(UncertainSection):
+    """Place on the rail, load and temperature of the guide.
+
+    They give factors on static and Coulomb friction.
+    """
+
+    place: Annotated[Value | None, Quantity("m", any_sign, "120 mm")] = None
+    """Place on the rail whose friction factors apply ([rail]). A drive as built moves along the rail instead."""
+    load: Annotated[float, Number(positive, "1.3")] = 1.0
+    """Normal force on the guide, relative to that at which [friction] was measured."""
+    load_per_acceleration: Annotated[Value, Quantity("s^2/m", non_negative, "0.02 s^2/m")] = Value(0, "0 s^2/m")
+    """Growth of the load per acceleration of the reference, due for example to a centre of mass beside the drive."""
+    load_share: Annotated[float, Number(from_0_to_1, "0.8")] = 1.0
+    """Fraction of friction that is proportional to the normal force; the rest is due to seals and preload."""
+    cold: Annotated[float, Number(positive, "1.6")] = 1.0
+    """Friction of the cold machine relative to that of the warm machine, which [friction] describes."""
+    running_time: Annotated[Value, Quantity("s", non_negative, "5 min")] = Value(0, "0 s")
+    """Time since the machine was cold; a motion is short compared with the warm-up."""
+    warm_up_time: Annotated[Value | None, Quantity("s", positive, "20 min")] = None
+    """Time constant of the warm-up."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            ("friction.model",),
+            lambda flat: friction_law(flat["friction.model"]).under_conditions,
+            "a law of the guide whose levels [conditions] multiply",
+            'model = "lugre"',
+        ),
+        Rule(
+            ("conditions.place",),
+            lambda flat: "conditions.place" not in flat or "rail.seed" in flat,
+            "a [rail] on which that place lies",
+            '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm"',
+        ),
+        Rule(
+            ("conditions.place",),
+            _falls,
+            "a place at which the rail leaves static friction no smaller than Coulomb friction",
+            "static_deviation = 0.2, coulomb_deviation = 0.2 in [rail]",
+        ),
+        Rule(
+            ("conditions.cold", "conditions.warm_up_time"),
+            lambda flat: (flat.get("conditions.cold", 1.0) == 1) | ("conditions.warm_up_time" in flat),
+            "the time constant of the warm-up, for a machine colder than [friction] describes",
+            'warm_up_time = "20 min"',
+        ),
+    )
+
+
+TRANSMISSION, MOTOR_FRICTION, ENCODER = "transmission", "motor_friction", "encoder"
+MOTOR_MASS, INERTIA, LEAD, RATIO, BACKLASH = (
+    f"{TRANSMISSION}.{name}" for name in ("mass", "inertia", "lead", "ratio", "backlash")
+)
+STATE_PREFIX = "motor_"
+"""Prefix of the names of states that belong to the motor."""
+
+MOTOR_STATES = ("motor_position", "motor_velocity")
+"""Names of the motor's position and velocity, converted to the load."""
+
+Side = Literal["motor", "load"]
+"""A side of the transmission."""
+
+
+class Transmission(UncertainSection):
+    """A screw, belt or gear: the motor's mass at the load, and the connecting spring."""
+
+    mass: Annotated[Value | None, Quantity("kg", positive, "2 kg")] = None
+    """Mass of everything that moves with the motor, reflected to the load; alternatively its `inertia` with `lead` or
+    `ratio`."""
+    inertia: Annotated[Value | None, Quantity("kg*m^2", positive, "1.2e-4 kg*m^2")] = None
+    """Moment of inertia of motor, coupling and screw, about the motor's axis, on linear and rotary axes alike."""
+    lead: Annotated[Value | None, Quantity("m", positive, "10 mm")] = None
+    """Travel of the load per turn of the motor."""
+    ratio: Annotated[float | None, Number(positive, "5")] = None
+    """Turns of the motor per turn of the load, on a rotary axis."""
+    stiffness: Annotated[Value, Quantity("N/m", positive, "120 N/um")]
+    damping: Annotated[Value, Quantity("N*s/m", non_negative, "2e3 N*s/m")]
+    backlash: Annotated[Value | None, Quantity("m", non_negative, "5 um")] = None
+    """Total backlash, from flank to flank."""
+
+    @model_validator(mode="after")
+    def _motor_has_one_mass(self) -> Self:
+        geared = [name for name in ("lead", "ratio") if getattr(self, name) is not None]
+        either = 'mass = "2 kg", or inertia = "1.2e-4 kg*m^2" with lead = "10 mm"'
+        if self.mass is not None and (self.inertia is not None or geared):
+            actual = f"mass together with {'inertia' if self.inertia is not None else geared[0]}"
+            raise StageError("mass", actual, "the mass of the motor at the load, or what it follows from", either)
+        if self.mass is None and self.inertia is None:
+            raise StageError("mass", "neither mass nor inertia of the motor", "one of the two", either)
+        if self.inertia is not None and len(geared) != 1:
+            actual = "an inertia with both lead and ratio" if geared else "an inertia without lead or ratio"
+            expected = "the lead of a linear axis, or the ratio of a rotary one"
+            raise StageError("inertia", actual, expected, 'inertia = "1.2e-4 kg*m^2", lead = "10 mm"')
+        return self
+
+
+class Encoder(UncertainSection):
+    """Sides of the transmission on which the controller's position and velocity are measured."""
+
+    position: Side
+    velocity: Side
+
+
+def motor_mass(flat: Mapping[str, Any]) -> Any:
+    """Return the motor's mass at the load [kg], from its inertia and its travel per turn.
+
+    The result is None if either is missing. `flat` has the stage's keys in SI.
+    """
+    lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
+    return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
+
+
+def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a stage's keys with the motor's friction as [friction], if the guide has none."""
+    alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
+    return of_motor(flat) if alone else flat
+
+
+def moving_mass(flat: Mapping[str, Any]) -> Any:
+    """Return the whole mass that the controller moves [kg], reflected to the load."""
+    return sum(flat.get(key, 0.0) for key in ("masses.cart", "masses.stage", MOTOR_MASS))
+
+
+def of_motor(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a stage's keys with the motor's friction under [friction], without [conditions].
+
+    The conditions belong to the guide, whose friction is left out.
+    """
+    kept = {key: value for key, value in flat.items() if not key.startswith(("friction.", f"{CONDITIONS}."))}
+    return {**kept, "friction.model": "none", **as_friction(flat)}
+
+
+def as_friction(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of [motor_friction] under the names that a friction law uses."""
+    before = f"{MOTOR_FRICTION}."
+    return {f"friction.{key.removeprefix(before)}": value for key, value in flat.items() if key.startswith(before)}

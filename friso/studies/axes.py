@@ -1,20 +1,203 @@
-"""Read the axes of a study (texts, ranges, arrays with a unit) into SI values."""
+"""Read the axes of a study (texts, ranges, arrays with a unit) into SI values.
+
+Define map axes that multiply several keys: controller speed and friction level.
+
+Draw samples of several keys at once as Sobol points or Latin hypercubes.
+
+They come from `scipy.stats.qmc`.
+
+Evaluate links: expressions such as "0.7 * mass" for keys that follow a study's axes.
+
+Numbers without a unit are in SI.
+"""
 
 from __future__ import annotations
 
+import ast
+import operator
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from numbers import Integral
 from typing import Any, Literal, cast
 
 import numpy as np
 
 from friso.axis import AxisKind
+from friso.equations.bandwidth import faster
+from friso.equations.scaled_friction import with_friction
 from friso.errors import InputError
-from friso.quantities import Number, Quantity, any_sign, quoted
+from friso.quantities import Number, Quantity, any_sign, quoted, si_value
 from friso.stage import Stage, parse_set
-from friso.studies.scalings import SCALINGS
+from friso.stage.controllers import KIND
 from friso.studies.settings import settings
+
+EXAMPLE = 'masses.stage = "0.3 * mass" or friction.static = "max(friction.static, friction.coulomb)"'
+
+_OPERATORS: dict[type, Any] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+_FUNCTIONS: dict[str, Any] = {"min": np.minimum, "max": np.maximum, "sqrt": np.sqrt, "abs": np.abs}
+_KEY, _ELEMENT = re.compile(r"\b[A-Za-z_]\w*(?:\.\w+)+"), re.compile(r"\.([0-9]+)\b")
+"""Patterns of a key, and of the number of an array element in a key, as in controller.filters.2.frequency. Python
+itself would write [2]."""
+
+_QUANTITY = re.compile(r"(?<![\w.])[0-9.]+(?:[eE][+-]?[0-9]+)?\s+[^\W\d_][\w/*^²³]*(?:/\([\w*^]+\))?")
+"""Pattern of a number with a unit, which has no blanks: "2 um", "0.5 N*s/m", "3 N/(m*s)"."""
+
+_ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
+
+
+def linked_names(links: Mapping[str, str]) -> frozenset[str]:
+    """Return every name of a key or an axis in the expressions of links.
+
+    Raises InputError for an expression that is not allowed.
+    """
+    trees = [_parsed(key, text) for key, text in links.items()]
+    called = {id(node.func) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    keys = set()
+    for tree in trees:
+        inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute | ast.Subscript)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and id(node) not in called | inner:
+                keys.add(_name(node))
+    return frozenset(keys)
+
+
+def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) -> None:
+    """Check that links lead to keys, and that their expressions use only keys or `axes`.
+
+    Raises InputError otherwise.
+    """
+    numeric = stage.numeric_keys()
+    for key in links:
+        if key not in numeric:
+            stage.flat({key: 0.0})  # raises an error that names the nearest key
+        if key in axes and key not in linked_names({key: links[key]}):
+            text = f"{key} = {links[key]}, which does not follow the axis {key}"
+            raise InputError("link", text, "an axis or a link, or a link in which the axis occurs", EXAMPLE)
+    for name in sorted(linked_names(links) - axes):
+        if name not in numeric or name not in stage.flat():
+            raise InputError("link", f"the name {name}", "axes and numeric keys that the stage has", EXAMPLE)
+
+
+def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the SI values of linked keys, from `values` of keys and axes (numbers or arrays).
+
+    A link can use the links before it.
+    """
+    numbers = dict(values)
+    for key, text in links.items():
+        with np.errstate(all="ignore"):  # a result that is no number makes the cell invalid
+            numbers[key] = _value(_parsed(key, text), numbers)
+    return {key: numbers[key] for key in links}
+
+
+def _parsed(key: str, text: str) -> ast.expr:
+    try:
+        plain = _QUANTITY.sub(lambda quantity: repr(si_value(quantity[0])), text.strip())
+        tree = ast.parse(_KEY.sub(lambda key: _ELEMENT.sub(r"[\1]", key[0]), plain), mode="eval").body
+        _check(tree)
+    except InputError as error:
+        raise error.under(key) from None
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise InputError(
+            key, quoted(text), "numbers, with units or in SI, names, + - * / **, min, max, sqrt, abs", EXAMPLE
+        ) from error
+    return tree
+
+
+def _check(node: ast.expr) -> None:
+    """Raise ValueError for anything but arithmetic in an expression."""
+    match node:
+        case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
+            _check(left)
+            _check(right)
+        case ast.UnaryOp(op, operand) if type(op) in _OPERATORS:
+            _check(operand)
+        case ast.Call(ast.Name(name), arguments, []) if _ARGUMENTS.get(name) == len(arguments):
+            for argument in arguments:
+                _check(argument)
+        case ast.Name():
+            pass
+        case ast.Attribute(ast.Name() | ast.Attribute() | ast.Subscript() as owner, _):
+            _check(owner)
+        case ast.Subscript(ast.Attribute() as owner, ast.Constant()):
+            _check(owner)
+        case ast.Constant(value) if type(value) in (int, float):
+            pass
+        case _:
+            raise ValueError(ast.unparse(node))
+
+
+def _value(node: ast.expr, numbers: Mapping[str, Any]) -> Any:
+    match node:
+        case ast.BinOp(left, op, right):
+            return _OPERATORS[type(op)](_value(left, numbers), _value(right, numbers))
+        case ast.UnaryOp(op, operand):
+            return _OPERATORS[type(op)](_value(operand, numbers))
+        case ast.Call(ast.Name(name), arguments):
+            return _FUNCTIONS[name](*(_value(argument, numbers) for argument in arguments))
+        case ast.Constant(value):
+            return np.float64(str(value))
+        case _:
+            return np.asarray(numbers[_name(node)], dtype=float)[()]
+
+
+def _name(node: ast.expr) -> str:
+    """Return the name of a key or an axis as in a stage file."""
+    match node:
+        case ast.Subscript(owner, part):
+            return f"{_name(owner)}.{ast.unparse(part)}"
+        case ast.Attribute(owner, part):
+            return f"{_name(owner)}.{part}"
+        case _:
+            return ast.unparse(node)
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Axis of factors on several keys, such as the speed of the controller.
+
+    Fields are `words` for figures and the function that multiplies the keys. `needs` is a key that a stage must have
+    for this axis.
+    """
+
+    words: str
+    scaled: Callable[[Mapping[str, Any], Any], dict[str, Any]]
+    needs: str
+
+
+SCALINGS = {
+    "speed": Scaling("Controller speed (times yours)", faster, KIND),
+    "friction": Scaling("Friction (times yours)", with_friction, "friction.model"),
+}
+"""All axes of factors, by name.
+
+Factors apply to all poles and zeros of the controller, or to every friction force.
+"""
+
+
+def scaled(flat: Mapping[str, Any], columns: Mapping[str, np.ndarray], links: Mapping[str, str]) -> dict[str, Any]:
+    """Return keys of stages, multiplied by the scaling factors among the columns.
+
+    `flat` has SI numbers or arrays (cells,) by key. A name that links use is a free variable, not a scaling. Raises
+    InputError if a stage has nothing to scale.
+    """
+    for name, scaling in SCALINGS.items():
+        if name in columns and name not in linked_names(links):
+            if flat.get(scaling.needs, "none") == "none":
+                table = scaling.needs.partition(".")[0]
+                raise InputError(name, f"a stage without [{table}]", "one that has it, or a key of the stage", "--help")
+            flat = scaling.scaled(flat, columns[name])
+    return dict(flat)
+
 
 AxisValues = str | Sequence[Any] | np.ndarray | tuple[Any, str]
 Scale = Literal["linear", "log"]
@@ -239,3 +422,91 @@ def read_axes(
     are logarithmic unless they state their spacing. Raises InputError for a name or values that the stage cannot have.
     """
     return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())
+
+
+SAMPLE = "sample"
+"""Name of the dimension along which samples lie."""
+
+METHODS = ("sobol", "latin")
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of ranges: `count` points by a method of `METHODS`, the same for the same `seed`.
+
+    `ranges` are name to "1 Hz..40 Hz", with ":log" behind it if the points shall be even in the logarithm. Lists or
+    arrays of equal length are the points themselves.
+
+    Examples
+    --------
+    >>> import friso
+    >>> points = friso.Samples({"joint.stroke": "0.2 mm..1 mm", "controller.crossover": "4 Hz..12 Hz"}, count=8)
+    >>> friso.sweep(friso.example("thesis_rig"), samples=points).sizes["sample"]
+    8
+    """
+
+    ranges: Mapping[str, AxisValues]
+    count: int | None = None
+    method: str = "sobol"
+    seed: int = field(default=0)
+
+    def __post_init__(self) -> None:
+        """Check the fields. Raises InputError for other types."""
+        if not isinstance(self.ranges, Mapping):
+            raise InputError(
+                "ranges", quoted(self.ranges), "a dictionary of keys to ranges", 'ranges={"joint.stroke": "0 m..1 mm"}'
+            )
+        for name, number, least in (("samples", self.count, 2), ("seed", self.seed, 0)):
+            whole = (
+                isinstance(number, Integral)
+                and not isinstance(number, bool)
+                and least <= number <= settings.most_axis_points
+            )
+            if not (whole or (number is None and name == "samples")):
+                expected = f"a whole number from {least} to {settings.most_axis_points:,}"
+                raise InputError(name, quoted(number), expected, f"{name}=1024")
+        if self.method not in METHODS:
+            raise InputError("method", quoted(self.method), f"one of {', '.join(METHODS)}", 'method="sobol"')
+
+
+def sample_axes(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
+    """Return the axes of samples, all of one length, from ranges or from lists.
+
+    `free` are names that links use, and `log` makes ranges logarithmic. Raises InputError for ranges with a number of
+    points, for lists of unequal length, and for ranges together with lists.
+    """
+    read = read_axes(stage, samples.ranges, free, log)
+    ranges = [axis for axis in read if isinstance(axis, SweptRange)]
+    if not ranges:
+        return _values(read)
+    if len(ranges) < len(read):
+        raise InputError("samples", "ranges together with lists", "one or the other", '{"joint.stroke": "0 m..1 mm"}')
+    for axis in ranges:
+        if axis.count is not None:
+            raise InputError(axis.name, f"a range with {axis.count} points", "for samples, FIRST..LAST alone")
+    points = _points(len(ranges), samples)
+    return tuple(SweptAxis(axis.name, axis.at(points[:, i]), axis.unit, axis.scale) for i, axis in enumerate(ranges))
+
+
+def _values(read: tuple[SweptAxis | SweptRange, ...]) -> tuple[SweptAxis, ...]:
+    axes = tuple(axis for axis in read if isinstance(axis, SweptAxis))
+    if len({len(axis.values) for axis in axes}) != 1:
+        lengths = ", ".join(f"{axis.name} {len(axis.values)}" for axis in axes) or "none"
+        raise InputError("samples", f"lengths: {lengths}", "keys with equally many values each")
+    return axes
+
+
+def _points(dimensions: int, samples: Samples) -> np.ndarray:
+    """Return points in the unit cube, shape (count, dimensions).
+
+    Raises InputError if the samples have no count.
+    """
+    from scipy.stats import qmc
+
+    if samples.count is None:
+        raise InputError("samples", "no number of points", "2 points or more", "samples=1024")
+    if samples.method == "sobol":
+        sampler = qmc.Sobol(dimensions, rng=samples.seed)
+        points = sampler.random_base2(int(np.ceil(np.log2(samples.count))))
+        return points[: samples.count]
+    return qmc.LatinHypercube(dimensions, rng=samples.seed).random(samples.count)

@@ -1,19 +1,45 @@
-"""Compute the boundary of hunting over ranges given by a user."""
+"""Convert boundaries of hunting to numbers for tables, files and figures.
+
+The numbers are the points of branches and curves, and the verdicts at stages between them.
+
+Compute the boundary of hunting over ranges given by a user.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.tolerance import checked_rtol
 from friso.equations.bandwidth import range_example
 from friso.errors import InputError
-from friso.hunting import CYCLE_RTOL, DITHERS, Diagram, KeyRange, Plane, Space, cannot_hunt, diagram, plane
+from friso.hunting import (
+    CLOSED,
+    CYCLE_RTOL,
+    DITHERS,
+    END_OF_RANGE,
+    Branch,
+    Curve,
+    Cycles,
+    Diagram,
+    KeyRange,
+    LocatedPoint,
+    Meeting,
+    Plane,
+    Space,
+    cannot_hunt,
+    diagram,
+    plane,
+)
 from friso.progress import Progress, silent
 from friso.stage import Stage, violations
-from friso.studies.axes import SweptAxis, read_axis
+from friso.studies.axes import SweptAxis, check_links, linked_names, read_axis
 from friso.studies.cells import flat_cells
-from friso.studies.links import check_links, names
 from friso.studies.settings import settings
 
 
@@ -38,7 +64,7 @@ def boundary(
     """
     checked_rtol(rtol)
     followers, example = dict(links or {}), range_example(stage.flat())
-    ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
+    ranges = tuple(_range(stage, name, text, linked_names(followers), log) for name, text in axes.items())
     if len(ranges) not in (1, 2):
         raise InputError("axes", f"{len(ranges)} keys", "one key or two", example)
     check_links(stage, followers, frozenset(swept.key for swept in ranges))
@@ -77,10 +103,350 @@ def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) 
     """
     read, example = read_axis(stage, name, text, name in free, log), range_example(stage.flat())
     if isinstance(read, SweptAxis) or read.count is not None:
-        raise InputError(
-            name, repr(text), "a range FIRST..LAST, without a number of points", range_example(stage.flat())
-        )
+        raise InputError(name, repr(text), "a range FIRST..LAST, without a number of points", example)
     field = stage.numeric_keys().get(name)
     if field is not None and not (field.bound.holds(read.first) and field.bound.holds(read.last)):
         raise InputError(name, repr(text), f"values {field.bound.text}", example)
     return KeyRange(name, read.first, read.last, read.scale == "log", read.unit)
+
+
+CycleShape = Literal["symmetric", "asymmetric", "whole"]
+"""Kind of a cycle: symmetric (its own mirror image), asymmetric (of a symmetric stage), or whole (of a stage that is
+not symmetric)."""
+
+ATTRACTS, REPELS, UNKNOWN, INVALID = "attracting cycle", "no attracting cycle", "unknown", "invalid"
+"""Verdicts on the stages of a boundary, from simulations and followed branches.
+
+UNKNOWN marks stages whose simulations failed or did not settle; INVALID marks stages that break a rule.
+"""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A branch of cycles over one key, or a curve in two keys: its n points in order.
+
+    `at` [SI], shape (n, keys), has the values of the keys. `error`, of this shape, is their error [SI], NaN except at
+    special points (flips, folds and tori). `kinds` has the kind of each special point, "" for an ordinary one.
+    `amplitude` [m], `period` [s] and `multiplier` of the cycles have the shape (n,). `ends` are texts on how the line
+    ends on either side.
+    """
+
+    shape: CycleShape
+    at: np.ndarray
+    error: np.ndarray
+    kinds: tuple[str, ...]
+    amplitude: np.ndarray
+    period: np.ndarray
+    multiplier: np.ndarray
+    ends: tuple[str, str]
+
+    @property
+    def special(self) -> np.ndarray:
+        """Return the indices of the special points (flips, folds and tori)."""
+        return np.flatnonzero([bool(kind) for kind in self.kinds])
+
+    @property
+    def ordinary(self) -> np.ndarray:
+        """Return the indices of the points that are not special."""
+        return np.flatnonzero([not kind for kind in self.kinds])
+
+    @property
+    def attracts(self) -> np.ndarray:
+        """Tell whether the cycle is stable between each point and the next, shape (n - 1,)."""
+        return np.abs(self.multiplier[1:] + self.multiplier[:-1]) < 2
+
+
+class _Row(NamedTuple):
+    """Point of a line: its keys and their error as fractions of the ranges, its cycle and kind."""
+
+    at: np.ndarray
+    error: np.ndarray
+    cycle: Cycles
+    kind: str
+
+
+def lines(result: Diagram | Plane) -> tuple[Line, ...]:
+    """Return all branches of a diagram with their special points, or all curves of a plane."""
+    if isinstance(result, Diagram):
+        pairs = zip(result.branches, result.special, strict=True)
+        return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
+    rows = [
+        [_Row(spot.at, spot.error, spot.special.point.cycle, spot.special.kind) for spot in curve.spots]
+        for curve in result.curves
+    ]
+    return tuple(_line(result, *pair) for pair in zip(result.curves, rows, strict=True))
+
+
+def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
+    """Return the points of a branch and its `special` points inside the range, in order.
+
+    Ordinary points within the error of a special point are left out, because it is unknown whether they are stable.
+    """
+    path = np.array([point.vector for point in branch.points])
+    ordinary = [
+        (k, point) for k, point in enumerate(branch.points) if not any(spot.in_doubt(point) for spot in special)
+    ]
+    placed = [(float(k), point, np.nan, "") for k, point in ordinary]
+    placed += [
+        (_path_coordinate(path, spot.point.vector), spot.point, spot.error, spot.kind)
+        for spot in special
+        if 0 <= spot.point.place <= 1
+    ]
+    return [
+        _Row(np.array([point.place]), np.array([error]), point.cycle, kind)
+        for _, point, error, kind in sorted(placed, key=lambda row: row[0])
+    ]
+
+
+def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
+    """Return how many legs from the start of a path a point lies; part of a leg counts in part.
+
+    `path` (n, d) has the points of the path, and `vector` (d,) is the point.
+    """
+    before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
+    leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))
+    return leg + before[leg] / (before[leg] + after[leg])
+
+
+def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
+    """Make a line from its rows: keys [SI], their errors, and the numbers of the cycles.
+
+    `traced` is the branch or curve from which the rows come.
+    """
+    at = np.array([row.at for row in rows])
+    values = _values(result.space, at)
+    return Line(
+        "symmetric" if traced.sign < 0 else "asymmetric" if result.cycles.sign < 0 else "whole",
+        values,
+        np.abs(_values(result.space, at + np.array([row.error for row in rows])) - values),
+        tuple(row.kind for row in rows),
+        np.array([row.cycle.amplitude[0] for row in rows]),
+        np.array([row.cycle.period[0] for row in rows]),
+        np.array([row.cycle.multiplier[0] for row in rows]),
+        traced.ends,
+    )
+
+
+def _values(space: Space, at: np.ndarray) -> np.ndarray:
+    return np.stack(list(space.values(at).values()), axis=1)
+
+
+def place_verdicts(result: Diagram) -> list[str]:
+    """Return the verdicts at stages spaced evenly over the range of a diagram.
+
+    Verdicts come from simulations, and from all branches of cycles that reach these stages.
+    """
+    verdicts = _verdicts(result)
+    return [
+        ATTRACTS if _attracts_at(result, place) else verdict
+        for place, verdict in zip(result.places.tolist(), verdicts, strict=True)
+    ]
+
+
+def end_verdicts(result: Diagram) -> tuple[str, str]:
+    """Return the verdicts at the lower and the upper end of the range of a diagram.
+
+    An end at which no stage was simulated counts as invalid.
+    """
+    verdict_at = dict(zip(result.places.tolist(), place_verdicts(result), strict=True))
+    return verdict_at.get(0.0, INVALID), verdict_at.get(1.0, INVALID)
+
+
+class StabilityChange(NamedTuple):
+    """Change between stages that hunt and stages that do not, along a key.
+
+    `begins` is true if hunting begins there as the key rises. The change lies between the values `low` and `high` [SI],
+    which are equal if a followed cycle gains or loses stability there.
+    """
+
+    begins: bool
+    low: float
+    high: float
+
+
+def stability_changes(result: Diagram) -> list[StabilityChange]:
+    """Return the changes at which hunting begins and ends over the range, in order.
+
+    Verdicts within the error of a special point (flip, fold or torus) do not locate a change: cycles are so weakly
+    unstable there that runs may stay on them. Between stages that do not hunt, however, even such a verdict shows that
+    hunting begins and ends.
+    """
+    special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
+    doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
+    values = _values(result.space, result.places[:, None])[:, 0].tolist()
+    verdicts = zip(values, place_verdicts(result), np.broadcast_to(doubtful, len(values)), strict=True)
+    decisive = [(value, word == ATTRACTS, unclear) for value, word, unclear in verdicts if word in (ATTRACTS, REPELS)]
+    decided = [(value, attracts) for value, attracts, unclear in decisive if not unclear]
+    quiet = [(-np.inf, False), *decided, (np.inf, False)]
+    apart = [(low, high) for (low, before), (high, after) in pairwise(quiet) if not before and not after]
+    hunting = [value for value, attracts, unclear in decisive if attracts and unclear]
+    decided = sorted(decided + [(value, True) for value in hunting if any(a < value < b for a, b in apart)])
+    turns = followed_changes(result)
+    changes = []
+    for (low, before), (high, after) in pairwise(decided):
+        if before != after:
+            inside = [value for value, begins in turns if begins == after and low <= value <= high]
+            at = (min(inside) if after else max(inside)) if inside else None
+            changes.append(StabilityChange(after, low if at is None else at, high if at is None else at))
+    return changes
+
+
+def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
+    """Return the values [SI] at which a followed cycle changes its stability.
+
+    With each value comes True if the cycle gains stability as the key rises, or False if it loses stability.
+    """
+    return sorted(
+        (float(line.at[k, 0]), begins)
+        for line in lines(result)
+        for k in line.special
+        if (begins := begins_at(line, k)) is not None
+    )
+
+
+def begins_at(line: Line, k: int) -> bool | None:
+    """Tell whether a cycle gains stability at point `k` of a line as the key rises.
+
+    The point is a special one (flip, fold or torus). None if the cycle is stable on both sides of it, or on neither.
+    """
+    beside = [bool(0 <= j < len(line.attracts) and line.attracts[j]) for j in (k - 1, k)]
+    if beside[0] == beside[1]:
+        return None
+    other = k - 1 if beside[0] else k + 1
+    return bool(line.at[other, 0] > line.at[k, 0]) if 0 <= other < len(line.at) else None
+
+
+def _attracts_at(result: Diagram, place: float) -> bool:
+    """Tell whether a branch of stable cycles passes a stage in the range of a diagram.
+
+    `place` is the stage's fraction of the range. The cycles at the neighbouring points on both sides must be stable.
+    False if the stability of a branch is unknown there.
+    """
+    if result.in_doubt(np.array([place]))[0]:
+        return False
+    pairs = [pair for branch in result.branches for pair in pairwise(branch.points)]
+    across = [(a, b) for a, b in pairs if (a.place - place) * (b.place - place) <= 0]
+    return any(max(abs(a.multiplier), abs(b.multiplier)) < 1 for a, b in across)
+
+
+def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
+    """Return the values [SI] of both keys at every node of a plane's grid, and the verdict.
+
+    The first key varies slowest.
+    """
+    verdicts = np.full(result.nodes**2, INVALID, object)
+    verdicts[result.allowed] = _verdicts(result)
+    values = _values(result.space, result.space.grid(result.nodes)).tolist()
+    return [(x, y, verdict) for (x, y), verdict in zip(values, verdicts.tolist(), strict=True)]
+
+
+def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
+    """Return the values [SI] of both keys at the four corners of a plane, and the verdict.
+
+    The order is both low, second high, first high, both high.
+    """
+    nodes, last = node_verdicts(result), result.nodes - 1
+    return [nodes[k] for k in (0, last, result.nodes * last, -1)]
+
+
+class PlaneEdge(NamedTuple):
+    """Edge of hunting along one key of a plane, for n values of the other key.
+
+    `along`, 0 or 1, is the key along which the edge is sought, and `across` (n,) are the ascending values [SI] of the
+    other key. `below` is true if hunting is possible below the edge. The edge lies between `low` and `high` [SI] (n,),
+    which are equal if a curve passes.
+    """
+
+    along: int
+    below: bool
+    across: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def plane_edge(result: Plane) -> PlaneEdge | None:
+    """Return the edge of hunting along one of the keys of a plane, the first if possible.
+
+    Along this key, hunting must end exactly once, on the same side for every value of the other key. Returns None
+    otherwise, and if the verdict at a node is unknown.
+    """
+    nodes = node_verdicts(result)
+    if any(verdict not in (ATTRACTS, REPELS) for _, _, verdict in nodes):
+        return None
+    shape = result.nodes, result.nodes
+    attracts = np.reshape([verdict == ATTRACTS for _, _, verdict in nodes], shape)
+    values = [np.reshape([node[k] for node in nodes], shape) for k in (0, 1)]
+    for along in (0, 1):
+        rows = np.moveaxis(attracts, along, 1)  # one row per value of the other key
+        changes = np.diff(rows.astype(int), axis=1)
+        below = bool(rows[0, 0])
+        if np.all(np.abs(changes).sum(axis=1) == 1) and np.all(rows[:, 0] == below):
+            first = np.abs(changes).argmax(axis=1)
+            places, across = (np.moveaxis(values[k], along, 1) for k in (along, 1 - along))
+            numbers = np.arange(result.nodes)
+            low, high = places[numbers, first].copy(), places[numbers, first + 1].copy()
+            for row, at in enumerate(across[:, 0].tolist()):
+                crossed = [place for place in _crossings(result, along, at) if low[row] <= place <= high[row]]
+                if crossed:
+                    low[row] = high[row] = max(crossed) if below else min(crossed)
+            return PlaneEdge(along, below, across[:, 0], low, high)
+    return None
+
+
+def _crossings(result: Plane, along: int, value: float) -> list[float]:
+    """Return the values [SI] of key `along` at which curves pass a `value` of the other key."""
+    crossings = []
+    for line in lines(result):
+        at, other = line.at[:, along], line.at[:, 1 - along] - value
+        for k in np.flatnonzero(other[1:] * other[:-1] <= 0).tolist():
+            share = other[k] / (other[k] - other[k + 1]) if other[k] != other[k + 1] else 0.0
+            crossings.append(float(at[k] + share * (at[k + 1] - at[k])))
+    return crossings
+
+
+EndKind = Literal["range", "closed", "meets", "lost"]
+"""How a curve ends: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
+
+
+class CurveEnd(NamedTuple):
+    """An end of the curve with the index `line`: both keys `at` it [SI], and the kind of end."""
+
+    line: int
+    at: np.ndarray
+    kind: EndKind
+
+
+def curve_ends(result: Plane) -> list[CurveEnd]:
+    """List both ends of every curve of a plane, in the order of the curves."""
+    on_another = [(meeting.curves[0], meeting.places[0]) for meeting in result.meetings if meeting.kind == "end"]
+    ends = []
+    for number, curve in enumerate(result.curves):
+        for spot, how in zip((curve.spots[0], curve.spots[-1]), curve.ends, strict=True):
+            on = any(number == other and np.array_equal(spot.at, place) for other, place in on_another)
+            kinds: dict[str, EndKind] = {END_OF_RANGE: "range", CLOSED: "closed"}
+            kind = kinds.get(how, "meets" if on else "lost")
+            ends.append(CurveEnd(number, _values(result.space, spot.at[None])[0], kind))
+    return ends
+
+
+def curve_meetings(result: Plane) -> list[Meeting]:
+    """Return where curves of a plane meet, with positions and errors as key values [SI]."""
+    meetings = []
+    for meeting in result.meetings:
+        places = _values(result.space, meeting.places)
+        error = np.abs(_values(result.space, meeting.places[:1] + meeting.error) - places[:1])[0]
+        meetings.append(replace(meeting, places=places, error=error))
+    return meetings
+
+
+def lost_places(result: Plane) -> np.ndarray:
+    """Return keys [SI] where the verdict changes but no curve could be begun, (count, 2)."""
+    return _values(result.space, np.reshape(result.gaps, (-1, 2)))
+
+
+def _verdicts(result: Diagram | Plane) -> list[str]:
+    """Return whether each simulated stage of a diagram or a plane has an attractor, as words.
+
+    The words are ATTRACTS, REPELS and UNKNOWN. Their order is that of `result.attracts`.
+    """
+    return np.select([result.attracts, ~result.decided], [ATTRACTS, UNKNOWN], REPELS).tolist()

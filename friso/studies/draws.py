@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from friso.engine.allowance import allowance
+from friso.engine.arrays import ArrayColumns
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import at_bandwidth, bandwidth
 from friso.equations.structure import shared_structure
 from friso.hunting import Margin, find_attractors, judge_many, kernels_to_judge, loops_unstable, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.progress import Progress, Tally, silent
-from friso.shares import Share, share
+from friso.shares import Share, separation, share
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, Sample, draw, laid_over
 from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
-class Fates:
+class Fates(ArrayColumns):
     """Verdicts on drawn stages, and which of their linear loops are unstable, both (count,).
 
     Verdicts are words of `friso.hunting.criteria.VERDICTS`. A loop counts as `unstable` if it is so while the stage
@@ -50,18 +51,12 @@ class Fates:
         the larger values, -1 if they have the smaller ones, 0 if the key separates nothing. Stages without a certain
         verdict are left out. The result is empty if all of the others hunt, or none of them.
         """
-        from scipy.stats import mannwhitneyu  # 0.7 s to import
-
-        attracted = np.isin(self.verdicts, ATTRACTED)
-        others = ~np.isin(self.verdicts, ATTRACTED + UNDECIDED)
-        if not (attracted.any() and others.any()):
+        decided = ~np.isin(self.verdicts, UNDECIDED)
+        attracted = np.isin(self.verdicts[decided], ATTRACTED)
+        if attracted.all() or not attracted.any():
             return {}
-        pairs = int(attracted.sum()) * int(others.sum())
-        separation = {
-            key: 2 * float(mannwhitneyu(values[attracted], values[others]).statistic) / pairs - 1
-            for key, values in keys.items()
-        }
-        return dict(sorted(separation.items(), key=lambda item: -abs(item[1])))
+        by_key = {key: separation(values[decided], attracted)[0] for key, values in keys.items()}
+        return dict(sorted(by_key.items(), key=lambda item: -abs(item[1])))
 
 
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
@@ -84,7 +79,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     except KeyboardInterrupt:
         if not all(parts.values()):
             raise
-    by_variant = {name: _joined(some) for name, some in parts.items()}
+    by_variant = {name: Fates.joined(some) for name, some in parts.items()}
     return {
         name: by_variant[next(other for other, same in variants.items() if same == variant)]
         for name, variant in stage.variants().items()
@@ -210,8 +205,3 @@ def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally
     swings = (np.where(sure, values, np.nan) for values in (attracted.amplitude, attracted.period))
     tally.add(count, "machines drawn")
     return Fates(verdicts, loops_unstable(flat, count), *swings)
-
-
-def _joined(parts: Sequence[Fates]) -> Fates:
-    """Join the verdicts on several groups of stages into one `Fates`."""
-    return Fates(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Fates)))

@@ -1,21 +1,50 @@
-"""Compute the blocks of a study in the threads of this process, or in an executor."""
+"""Compute the blocks of a study in the threads of this process, or in an executor.
+
+Compute a study on a Dask cluster, one task for each block.
+
+Compute studies in separate processes on this machine.
+
+They talk over private pipes, so no port is opened.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
+import asyncio
+import logging
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import copy_context
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import connection, get_context, parent_process
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import numpy as np
 
+from friso.engine.cache import FOLDER_VARIABLE, cache_folder, remove_if_passing
 from friso.engine.overtaken import go_on
+from friso.errors import InputError
+from friso.platform.system import interrupts_held
+from friso.stage import Stage
 from friso.studies.cells import Columns, run_cells
 from friso.studies.settings import settings
-from friso.studies.study import CellBlock, Study
+from friso.studies.study import CellBlock, Study, equations_version
 
 _T = TypeVar("_T")
 
@@ -125,3 +154,153 @@ def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:
     for _, block, columns in crew.compute(crew.jobs([picked])):
         parts[block[0].start] = columns
     return {name: np.concatenate([parts[start][name] for start in sorted(parts)]) for name in study.metrics}
+
+
+logger = logging.getLogger("friso")
+
+
+@contextmanager
+def connected(scheduler: str) -> Iterator[Crew]:
+    """Yield a crew of workers: the worker threads of a Dask scheduler.
+
+    `scheduler` is an address such as "tls://10.0.0.1:8786". Every thread computes one block at a time, in that thread
+    alone. Certificates come from Dask's configuration (distributed.comm.tls). Without TLS, anyone who can reach the
+    address can run code; this is logged. Raises InputError if the scheduler does not answer, has no workers, or one
+    with another version of friso.
+    """
+    from distributed import Client, KilledWorker
+    from distributed.comm.core import CommClosedError
+
+    try:
+        asyncio.run(_answers(scheduler))
+        client: Any = Client(scheduler, timeout=settings.scheduler_timeout, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:  # TypeError: TLS without a certificate
+        expected = f"the address of a Dask scheduler that answers ({error})"
+        raise InputError("--scheduler", scheduler, expected, "--scheduler tls://10.0.0.1:8786") from None
+    if not scheduler.startswith("tls://"):
+        logger.warning("anyone who reaches %s can run code on its workers and here; tls:// keeps others out", scheduler)
+    with client:
+        _refuse_strangers(client)
+        threads = sum(client.nthreads().values())
+        arguments = {"expected": equations_version(), "pure": False}
+        failures = (CancelledError, KilledWorker, CommClosedError, TimeoutError)
+        yield Crew(client.get_executor(), threads, 4 * threads, run_checked, arguments, failures=failures)
+
+
+async def _answers(scheduler: str) -> None:
+    """Raise OSError or ValueError if nothing answers at the scheduler's address.
+
+    The address is tried first because Dask's client, if it fails, lingers for long.
+    """
+    from distributed.comm.core import connect
+    from distributed.security import Security
+
+    comm = await connect(scheduler, timeout=settings.scheduler_timeout, **Security().get_connection_args("client"))
+    await comm.close()
+
+
+def run_checked(
+    stage: Stage,
+    links: Mapping[str, str],
+    columns: Mapping[str, np.ndarray],
+    rtol: float,
+    metrics: Sequence[str],
+    expected: str,
+) -> Columns:
+    """Run cells on a worker, after checking that its friso has the `expected` equations.
+
+    This is checked again for each block, because workers may join after the study began. Raises InputError for another
+    version.
+    """
+    if equations_version() != expected:
+        raise _stranger("a worker", equations_version())
+    return run_cells(stage, links, columns, rtol, metrics)
+
+
+def _refuse_strangers(client: Any) -> None:
+    """Raise InputError unless every worker has the same friso as this process."""
+    if not client.nthreads():
+        raise InputError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")
+
+    def version() -> str:  # sent as code, not by name: an older friso, or none, has no such function
+        try:
+            from friso.studies.study import equations_version
+        except ImportError as error:
+            return f"that runs no studies ({error})"
+        return equations_version()
+
+    for address, version_there in client.run(version).items():
+        if version_there != equations_version():
+            raise _stranger(f"the worker {address}", version_there)
+
+
+def _stranger(place: str, version: str) -> InputError:
+    text = f"{place} has friso {version}"
+    return InputError("--scheduler", text, f"friso {equations_version()}, as here, on every worker")
+
+
+_cancel = np.zeros(1, np.int64)
+"""Flag, (1,), that ends this process' block early; a worker shares it with its parent."""
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Crew]:
+    """Yield a crew of `workers`: separate processes on this machine.
+
+    A worker computes one block at a time, in one thread. The workers end with this process, however it ends.
+    """
+    context = get_context("spawn")
+    with interrupts_held(), _modules_of_this_folder_ignored():
+        shared: Any = context.RawArray("q", 1)
+        pool = ProcessPoolExecutor(workers, context, _prepare, (shared, cache_folder()))
+        for _ in range(workers):  # each task starts one worker
+            pool.submit(os.getpid)
+    cancel = np.frombuffer(shared, np.int64)
+    with Crew(pool, workers, 4 * workers, run_block, cancel=cancel, failures=(BrokenProcessPool,)) as crew:
+        yield crew
+
+
+@contextmanager
+def _modules_of_this_folder_ignored() -> Iterator[None]:
+    """Start Python processes within the block that import nothing from the current folder.
+
+    The folder may belong to someone else, and contain a file with the name of a module.
+    """
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[_SAFE_PATH]
+        if before is not None:
+            os.environ[_SAFE_PATH] = before
+
+
+_SAFE_PATH = "PYTHONSAFEPATH"
+
+
+def run_block(*arguments: Any) -> Columns:
+    """Compute a block's metrics with `run_cells` in a worker, until done or cancelled."""
+    return run_cells(*arguments, cancel=_cancel)
+
+
+def _prepare(shared: Any, cache: Path) -> None:
+    """Make this process a worker of its parent.
+
+    Ctrl-C is left to the parent process, and the worker ends with its parent. The worker uses the parent's cache of
+    kernels, even a temporary one.
+    """
+    global _cancel
+    _cancel = np.frombuffer(shared, np.int64)
+    os.environ[FOLDER_VARIABLE] = str(cache.parent)
+    sys.stdout = sys.stderr  # output of plug-ins must not mix with answers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, args=(cache,), daemon=True).start()
+
+
+def _end_with_parent(cache: Path) -> None:
+    parent = parent_process()
+    assert parent is not None
+    connection.wait([parent.sentinel])
+    remove_if_passing(cache)  # the parent was killed before it could remove it
+    os._exit(1)

@@ -17,10 +17,9 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.hunting.criteria import SWINGS
-from friso.studies.axes import SweptAxis
+from friso.studies.axes import SAMPLE, SweptAxis
 from friso.studies.cells import INFERRED, Columns, unfilled
 from friso.studies.metric import in_order, usual_metrics, worded
-from friso.studies.samples import SAMPLE
 from friso.studies.settings import settings
 from friso.studies.study import Dimension, Study
 

@@ -15,9 +15,9 @@ from zarr.storage import LocalStore, WrapperStore
 
 from friso.errors import StoreError
 from friso.platform.system import cause_of, shell_word
-from friso.studies.ledger import Ledger
 from friso.studies.metadata import Metadata
 from friso.studies.metric import every_variable
+from friso.studies.store_files import Ledger
 
 if TYPE_CHECKING:
     from zarr.abc.buffer import Buffer

@@ -1,8 +1,12 @@
 """Store a study on disk, in a Zarr store that is written block by block and can be resumed.
 
 The store is made complete, without results, elsewhere and then moved into place. A block is done once its digests are
-recorded (`friso.studies.ledger`), after its chunks were written, each moved into place by Zarr. A block whose chunks
-differ from the record is run again.
+recorded (`Ledger`), after its chunks were written, each moved into place by Zarr. A block whose chunks differ from the
+record is run again.
+
+Store results of cells until a refined study is done, so that none is run twice.
+
+Write studies for other programs, as NetCDF and CSV.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,19 +29,23 @@ import numpy as np
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
-from friso.escapes import one_line
-from friso.platform.system import cause_of, once_free, path_of
+from friso.escapes import one_line, table_cell
+from friso.platform.system import cause_of, once_free, path_of, remove_folder
 from friso.stage.arguments import check_arguments
-from friso.studies.kept_cells import KeptCells
-from friso.studies.ledger import Ledger
+from friso.studies.cells import Columns
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
+from friso.studies.refine import Ask, asked_for
 from friso.studies.settings import settings
-from friso.studies.store_files import ANSWERS, refuse_foreign
-from friso.studies.store_folder import (
+from friso.studies.store_files import (
+    ANSWERS,
+    Ledger,
     exchange,
+    keep_arrays,
+    kept_arrays,
     lock_store,
     make,
+    refuse_foreign,
     refuse_others_files,
     remove_leftovers,
     remove_partial_files,
@@ -47,6 +56,94 @@ from friso.studies.verify import check_verified
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def export(runs: xr.Dataset, path: Path) -> None:
+    """Write a study as NetCDF (".nc") or as CSV with one row per cell (".csv").
+
+    Columns of a CSV file are named with their units. Raises ValueError for another suffix.
+    """
+    if path.suffix == ".nc":
+        texts = [name for name in every_variable() if name in runs and is_text(name)]
+        converted = {name: runs[name].copy(data=_bytes(runs[name].values)) for name in texts}
+        runs.assign(converted).to_netcdf(path, engine="scipy")
+    elif path.suffix == ".csv":
+        _write_csv(runs, path)
+    else:
+        raise ValueError(f"export: given {path.suffix}, expected .nc or .csv")
+
+
+def _bytes(texts: np.ndarray) -> np.ndarray:
+    """Return texts as UTF-8 bytes, in an array wide enough for the longest of them."""
+    import pandas as pd
+
+    codes, words = pd.factorize(texts.ravel())
+    return np.array([str(word).encode() for word in words])[codes].reshape(texts.shape)
+
+
+def _write_csv(runs: xr.Dataset, path: Path) -> None:
+    """Write a study as a table of comma-separated values, one row per cell."""
+    import pandas as pd
+
+    dims = [str(dim) for dim in runs["outcome"].dims]
+    shape = runs["outcome"].shape
+    rows = max(1, settings.rows_together // max(1, int(np.prod(shape[1:]))))
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for first in range(0, shape[0], rows):
+            part = runs.isel({dims[0]: slice(first, first + rows)})
+            frame: pd.DataFrame = part.to_dataframe(dim_order=dims).reset_index()
+            named = {name: table_cell(_with_unit(runs, str(name))) for name in frame.columns}
+            for name in frame.columns[[kind.kind not in "biuf" for kind in frame.dtypes]]:
+                frame[name] = frame[name].astype(str).map(table_cell)
+            frame.rename(columns=named).to_csv(file, index=False, header=first == 0)
+
+
+def _with_unit(runs: xr.Dataset, name: str) -> str:
+    unit = runs[name].attrs.get("units", "")
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
+class KeptCells:
+    """Stored results of cells, in a folder, with the digest of their study.
+
+    Damaged results, and those of another study, are computed again.
+    """
+
+    def __init__(self, folder: Path, study: Study, digest: str) -> None:
+        self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest
+
+    def keeping(self, ask: Ask) -> Ask:
+        """Return the function `ask`, changed to store its answers or to take stored ones.
+
+        `ask` computes the metrics of cells from the cells' indices.
+        """
+        self.folder.mkdir(exist_ok=True)
+        number = count()
+
+        def kept_or_asked(cells: np.ndarray) -> Columns:
+            file = self.folder / f"{next(number)}.npz"
+            if (kept := self._kept(file, cells)) is not None:
+                return kept
+            columns = ask(cells)
+            arrays = {name: columns[name].astype(form_of(name)) for name in self.metrics}
+            keep_arrays(file, {"cells": cells, **arrays}, self.digest)
+            return columns
+
+        return kept_or_asked
+
+    def forget(self) -> None:
+        """Remove the stored results once the blocks of the study contain them."""
+        remove_folder(self.folder)
+
+    def _kept(self, file: Path, cells: np.ndarray) -> Columns | None:
+        """Return the results stored for exactly these cells, or None."""
+        forms = {name: np.dtype(form_of(name)) for name in self.metrics}
+        most = cells.nbytes + cells.size * sum(form.itemsize for form in forms.values()) + 1024 * (2 + len(forms))
+        columns = kept_arrays(file, self.digest, most)
+        if columns is None or not np.array_equal(columns.pop("cells", ()), cells):
+            return None
+        same = {name: column.dtype for name, column in columns.items()} == forms
+        return columns if same and all(column.shape == cells.shape for column in columns.values()) else None
 
 
 logger = logging.getLogger("friso")

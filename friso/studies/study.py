@@ -1,4 +1,7 @@
-"""Define a study as data: its stage, variations, tolerance, cells, and blocks of cells."""
+"""Define a study as data: its stage, variations, tolerance, cells, and blocks of cells.
+
+Make a study from a user's variations, estimate its size, and run a trial.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +17,22 @@ import numpy as np
 
 from friso.engine.cache import code_digest, machine
 from friso.engine.tolerance import checked_rtol
+from friso.errors import InputError
 from friso.stage import Stage, loads
-from friso.studies.axes import SweptAxis
+from friso.studies.axes import (
+    SAMPLE,
+    SCALINGS,
+    AxisValues,
+    Samples,
+    SweptAxis,
+    SweptRange,
+    check_links,
+    linked_names,
+    read_axes,
+    sample_axes,
+)
 from friso.studies.cells import flat_cells
-from friso.studies.links import names as linked_names
-from friso.studies.metric import every_variable, metrics
-from friso.studies.samples import SAMPLE
-from friso.studies.scalings import SCALINGS
+from friso.studies.metric import every_variable, in_order, metrics, usual_metrics
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -209,7 +221,7 @@ def cells_of(block: CellBlock) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
-_STUDIES = ("axes", "cells", "links", "metric", "refine", "request", "samples", "scalings", "settings")
+_STUDIES = ("axes", "cells", "metric", "refine", "settings", "study")
 _DECISIVE = (
     *("quantities.py", "stage", "equations", "engine", "hunting", "studies/metrics"),
     *(f"studies/{name}.py" for name in _STUDIES),
@@ -259,3 +271,96 @@ def _stage_differences(mine: Stage, its: Stage) -> list[str]:
     a, b = mine.flat(), its.flat()
     keys = sorted(key for key in a.keys() | b.keys() if a.get(key) != b.get(key))
     return [f"{key}: {b.get(key, 'absent')} there, {a.get(key, 'absent')} here" for key in keys]
+
+
+TRIED = 512
+"""Cells of a trial run."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A stage, its varied keys, and links, as the user's texts and arrays (see `friso.sweep`).
+
+    With `log`, ranges that do not state their spacing are logarithmic.
+    """
+
+    stage: Stage
+    axes: Mapping[str, AxisValues]
+    samples: Samples | None = None
+    links: Mapping[str, str] = field(default_factory=dict)
+    log: bool = False
+
+    def _read(self, axes: Mapping[str, AxisValues]) -> tuple[SweptAxis | SweptRange, ...]:
+        return read_axes(self.stage, axes, linked_names(self.links), self.log)
+
+    def size(self) -> int:
+        """Return the number of cells of the study, without making any array.
+
+        Raises InputError for an axis that the study could not have.
+        """
+        samples = 1 if self.samples is None or self.samples.count is None else self.samples.count
+        return math.prod(_points(axis) for axis in self._read(self.axes)) * samples
+
+    def trial(self) -> Study:
+        """Return a study of a few cells drawn at random from one that may be too large to be made.
+
+        The same request always gives the same cells. Raises InputError for an axis that the stage cannot have.
+        """
+        rng = np.random.default_rng(0)
+        axes = []
+        for axis in self._read({**self.axes, **(self.samples.ranges if self.samples else {})}):
+            if isinstance(axis, SweptRange):
+                axes.append(SweptAxis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
+            else:
+                axes.append(replace(axis, values=rng.choice(axis.values, TRIED)))
+        return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), usual_metrics(), 1e-6)
+
+    def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
+        """Return the study of these axes with some metrics, by default the usual ones.
+
+        Raises InputError for wrong axes, links, metrics or tolerance.
+        """
+        checked_rtol(rtol)
+        read = self._read(self.axes)
+        if not read and self.samples is None:
+            example = '{"joint.stroke": ["0.1 mm", "1 mm"]}'
+            raise InputError("axes", "none", "at least one key with its values", example)
+        dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
+        if self.samples is not None:
+            free = linked_names(self.links)
+            dimensions.append(Dimension(SAMPLE, sample_axes(self.stage, self.samples, free, self.log)))
+        names = [axis.name for dimension in dimensions for axis in dimension.axes]
+        for name in names:
+            if names.count(name) > 1 or name in (*every_variable(), SAMPLE):
+                raise InputError(name, "a name that is taken", "each axis once, each under a different name")
+        check_links(self.stage, self.links, frozenset(names))
+        return Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
+
+
+def _points(axis: SweptAxis | SweptRange) -> int:
+    if isinstance(axis, SweptAxis):
+        return len(axis.values)
+    if axis.count is None:
+        text = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
+        raise InputError(axis.name, text, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
+    return axis.count
+
+
+def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
+    if isinstance(axis, SweptAxis):
+        if len(np.unique(axis.values)) < len(axis.values):
+            raise InputError(axis.name, "values that occur twice", "every value once", '["4 Hz", "8 Hz"]')
+        return axis
+    _points(axis)
+    return axis.axis()
+
+
+def _checked_metrics(names: Sequence[str] | None) -> tuple[str, ...]:
+    """Return a study's requested variables, by default the usual ones, in their usual order.
+
+    Raises InputError for an unknown name.
+    """
+    for name in names or ():
+        if name not in every_variable():
+            raise InputError("metrics", name, f"some of {', '.join(every_variable())}", '["peaks", "period"]')
+    return in_order(names or usual_metrics())

@@ -11,15 +11,13 @@ import numpy as np
 
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
-from friso.studies.axes import AxisValues
+from friso.studies.axes import AxisValues, Samples
 from friso.studies.cells import Columns, unfilled
 from friso.studies.execute import Crew, local_crew, run_scattered
 from friso.studies.metric import attributes_of
 from friso.studies.refine import Ask, asked_for, finer, refine_cells
-from friso.studies.request import Request
-from friso.studies.samples import Samples
 from friso.studies.store import Store
-from friso.studies.study import Study, cells_of
+from friso.studies.study import Request, Study, cells_of
 from friso.studies.verify import checked_share, verify_cells
 
 if TYPE_CHECKING:

@@ -47,10 +47,7 @@ class KeptWork:
             remove_folder(self.folder)
 
     def arrays(
-        self,
-        about: tuple[Any, ...],
-        make: Callable[[], Mapping[str, np.ndarray]],
-        names: Collection[str] | None = None,
+        self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]], names: Collection[str] | None = None
     ) -> Mapping[str, np.ndarray]:
         """Return arrays by name, as saved under `about`; otherwise `make` and save them.
 

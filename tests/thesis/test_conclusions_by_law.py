@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from friso.design_method.edges import Corners, under_law, worst_edges
-from friso.design_method.population import Population
-from friso_thesis.questions.reproduce.laws import laws_document, laws_rows
+from friso.design_method.population import Corners, Population, under_law, worst_edges
+from friso_thesis.questions.reproduce.words import laws_document, laws_rows
 from friso_thesis.studies.thesis.claims import Finding, Part, claims
 from friso_thesis.studies.thesis.laws import CONCLUSIONS, ConclusionByLaw, ConclusionsByLaw
 

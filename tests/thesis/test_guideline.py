@@ -25,9 +25,19 @@ from friso.interface.output_folder import UNFINISHED, write
 from friso.progress import Tally, silent
 from friso.stage import Stage
 from friso_thesis.questions.guideline.words import parasitic_sentences, sentences
-from friso_thesis.studies.guideline import checks, compute, parasitic, persistence, sweeps, worked
+from friso_thesis.studies.guideline import compute, edges, sweeps, worked
 from friso_thesis.studies.guideline.claims import judged_claims, least_gap
-from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
+from friso_thesis.studies.guideline.edges import (
+    ABOVE,
+    BELOW,
+    FLIP,
+    JUMP,
+    LOST,
+    UNKNOWN,
+    Edges,
+    find_edges,
+    swings_from_any_distance,
+)
 from friso_thesis.studies.guideline.groups import (
     GROUPS,
     PARAMETERS,
@@ -39,9 +49,7 @@ from friso_thesis.studies.guideline.groups import (
     values_of,
 )
 from friso_thesis.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fit_law, rates_in_series
-from friso_thesis.studies.guideline.parasitic import ParasiticLimits, holding
-from friso_thesis.studies.guideline.persistence import swings_from_any_distance
-from friso_thesis.studies.guideline.thesis_rig import plain_rig
+from friso_thesis.studies.guideline.worked import ParasiticLimits, holding, plain_rig
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 RIGID = pytest.mark.xdist_group("rigid")
@@ -221,7 +229,7 @@ def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPat
     def failing(stages: Ensemble, begin: Any, periods: float) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(stages.count, bool), np.arange(stages.count) > 0
 
-    monkeypatch.setattr(persistence, "still_swings", failing)
+    monkeypatch.setattr(edges, "still_swings", failing)
     assert [item.tolist() for item in swings_from_any_distance(at(JUMPS, 0.1))] == [[False], [False]]
     runs = swept(FAR_FLIP)
     assert runs.kind[0] == UNKNOWN
@@ -386,11 +394,11 @@ def quick() -> compute.Guideline:
 def shortened(patch: pytest.MonkeyPatch) -> None:
     """Leave out all that takes long after the sweeps."""
     patch.setattr(
-        compute, "simulate_samples", lambda sweep, most: checks.SimulationCheck(most, most, 0, most, 0, 100, 0)
+        compute, "simulate_samples", lambda sweep, most: compute.SimulationCheck(most, most, 0, most, 0, 100, 0)
     )
     patch.setattr(compute, "worked", shown)
     patch.setattr(compute, "_compile", lambda: None)
-    patch.setattr(parasitic, "FREQUENCIES", (300.0,))
+    patch.setattr(worked, "FREQUENCIES", (300.0,))
 
 
 def invented(stages: Any, grid: np.ndarray) -> Edges:
@@ -551,7 +559,7 @@ def test_an_interrupted_guideline_says_what_is_kept_and_leaves_nothing_else(
             (out / UNFINISHED / f"{part}.npz").write_bytes(b"")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("friso_thesis.studies.guideline.guideline", interrupted)
+    monkeypatch.setattr("friso_thesis.studies.guideline.compute.guideline", interrupted)
     monkeypatch.setattr(sys, "argv", ["friso", "guideline", "--samples", "64", "--out", str(out)])
     with pytest.raises(SystemExit) as left:
         main()

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from friso.studies.rig.sizes import locked_stage
+from friso.studies.rig.outcome import locked_stage
 from friso_thesis.studies.thesis.as_built import rig_with_drive
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.experiments import (
@@ -17,8 +17,7 @@ from friso_thesis.studies.thesis.experiments import (
     joint_steps,
     slow_motion,
 )
-from friso_thesis.studies.thesis.judges.identified_in_time import judged_slips, judged_speeds, judged_steps
-from friso_thesis.studies.thesis.judges.identified_responses import judged_line
+from friso_thesis.studies.thesis.judges.identified_in_time import judged_line, judged_slips, judged_speeds, judged_steps
 from friso_thesis.studies.thesis.linear import analysed
 from friso_thesis.studies.thesis.linear.plants import limit_cases_of
 from friso_thesis.studies.thesis.studies import thesis_rig

@@ -11,18 +11,18 @@ import sympy as sp
 
 from friso.frequency.bode import bode
 from friso.frequency.family import spectral_abscissa
-from friso.frequency.members import Members, concatenate_families, limit_cases
-from friso_thesis.studies.thesis import Evidence, Finding, thesis_rig
-from friso_thesis.studies.thesis.claims import registered
-from friso_thesis.studies.thesis.judges.series_stiffness import (
+from friso.frequency.members import Members, limit_cases
+from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
+from friso_thesis.studies.thesis.judges.control_law import (
     PRINTED_SENSITIVITY,
     PRINTED_STIFFNESS,
     in_the_plant,
     judged_formulas,
 )
-from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, Springs, analysed
-from friso_thesis.studies.thesis.linear.speeds import abscissa_with_bristles
+from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, analysed
+from friso_thesis.studies.thesis.linear.plants import Springs, abscissa_with_bristles
 from friso_thesis.studies.thesis.space import OPEN
+from friso_thesis.studies.thesis.studies import thesis_rig
 
 pytestmark = pytest.mark.xdist_group("linear-claims")
 
@@ -175,7 +175,7 @@ def test_the_edges_of_stability(linear: Linear, joint: str) -> None:
     def rightmost(crossover: float, delay: float) -> float:
         changes = {"drive.sample_time": "50 us", "drive.delay": f"{delay!r} s", "joint.locked": joint == "locked"}
         flat = thesis_rig().replace({**changes, "controller.crossover": f"{crossover!r} Hz"}).flat()
-        return float(spectral_abscissa(flat, concatenate_families([*limit_cases(flat).values()])).max())
+        return float(spectral_abscissa(flat, Members.joined(limit_cases(flat).values())).max())
 
     for crossover, delay in loops.delay_at.items():
         assert rightmost(crossover, 0.99 * delay) < 0 < rightmost(crossover, 1.01 * delay)

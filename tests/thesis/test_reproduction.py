@@ -40,20 +40,22 @@ from friso_thesis.questions.reproduce.page import COLOURS, reproduce_files, repr
 from friso_thesis.questions.reproduce.questions import QUESTIONS
 from friso_thesis.questions.reproduce.summary import summary_sheet
 from friso_thesis.questions.reproduce.words import SHORT, details, in_order, reasons, short
-from friso_thesis.studies.thesis import (
-    STUDIES,
+from friso_thesis.studies.thesis import experiments
+from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
+from friso_thesis.studies.thesis.claims import (
+    _JUDGES,
+    BESIDE,
     Evidence,
     Finding,
     Part,
-    Reproduction,
     Response,
+    beside,
+    by_attraction,
+    by_peak_count,
     claims,
-    experiments,
-    reproduce,
-    thesis_rig,
+    judges,
+    registered,
 )
-from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
-from friso_thesis.studies.thesis.claims import _JUDGES, BESIDE, beside, judges, registered
 from friso_thesis.studies.thesis.cycles import Edge, Surveyed, map_cycles, survey
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.experiments import (
@@ -71,18 +73,16 @@ from friso_thesis.studies.thesis.judges import design_rules
 from friso_thesis.studies.thesis.judges.identified_in_time import force_swings
 from friso_thesis.studies.thesis.judges.rig_hunting import judged_move
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
-from friso_thesis.studies.thesis.kept import SOURCES, Kept, kept_findings
+from friso_thesis.studies.thesis.kept import SOURCES, Kept, kept_findings, put_together, taken_apart
 from friso_thesis.studies.thesis.laws import conclusions_by_law
 from friso_thesis.studies.thesis.linear import NEEDS
 from friso_thesis.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
 from friso_thesis.studies.thesis.plausible import PARTS, _in_space, plausible
 from friso_thesis.studies.thesis.reading import OTHERWISE, OWN, others_of, read_as, reading, words_read
-from friso_thesis.studies.thesis.reproduce import _changed
+from friso_thesis.studies.thesis.reproduce import Reproduction, _changed, reproduce
 from friso_thesis.studies.thesis.space import OPEN, OpenValue, baseline, draw, enters
-from friso_thesis.studies.thesis.studies import rig_gains
-from friso_thesis.studies.thesis.taken_apart import put_together, taken_apart
+from friso_thesis.studies.thesis.studies import STUDIES, rig_gains, thesis_rig
 from friso_thesis.studies.thesis.verdicts import not_covered, verdict
-from friso_thesis.studies.thesis.ways import by_attraction, by_peak_count
 
 ROOT = Path(__file__).parents[2]
 POINTS = 21
@@ -944,7 +944,7 @@ def test_experiments_are_kept_whole(tmp_path: Path) -> None:
     """Every kind of result is read back as it was written, and a damaged one is computed again."""
     kept, experiment = Kept(tmp_path), Experiments(thesis_rig())
     for name in (*EXPERIMENTS, TRACES):
-        kind, result = get_type_hints(vars(Experiments)[name].fget)["return"], getattr(experiment, name)
+        kind, result = get_type_hints(Experiments)[name], getattr(experiment, name)
         kept.result((name,), kind, lambda made=result: made)
         assert_same(kept.result((name,), kind, lambda: pytest.fail("it was kept")), result)
         if name == GRID:

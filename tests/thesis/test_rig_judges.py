@@ -9,10 +9,9 @@ import pytest
 from rig_evidence import FAILED, HUNTS, cycles, grid, loops, moves, standstill
 
 from friso.studies.rig.experiments.frf import measured_loop
-from friso_thesis.studies.thesis import Evidence, Finding
-from friso_thesis.studies.thesis.claims import registered
+from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.experiments import BUILT, GRID, MOVES, ON_RAILS, STANDSTILL, Experiments
-from friso_thesis.studies.thesis.judges.identified_responses import MEASURED, WEIGHED
+from friso_thesis.studies.thesis.judges.identified_in_time import MEASURED, WEIGHED
 from friso_thesis.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig, weaker_motor
 from friso_thesis.studies.thesis.reading import OWN, read_as
 

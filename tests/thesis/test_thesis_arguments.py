@@ -7,19 +7,22 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from friso_thesis.studies.thesis import STUDIES, Evidence, Finding, Response, thesis_rig
-from friso_thesis.studies.thesis.claims import registered
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Response, by_attraction, by_peak_count, registered
 from friso_thesis.studies.thesis.evidence import RESPONSES
-from friso_thesis.studies.thesis.judges import arguments, control_law, step_by_step
-from friso_thesis.studies.thesis.judges.arguments import HEAVY, LIGHT
+from friso_thesis.studies.thesis.judges import arguments, control_law
+from friso_thesis.studies.thesis.judges.arguments import HEAVIEST, HEAVY, HIGH_ALPHA, LIGHT, LOW_ALPHA, ArguedCycle
 from friso_thesis.studies.thesis.judges.control_law import K_P, TAU_I, TAU_Z, judged_crossovers, judged_forms, rewritten
 from friso_thesis.studies.thesis.judges.influence import judged_ranks
-from friso_thesis.studies.thesis.judges.joint_shape import evaluated, judged_dimensions, judged_place, judged_shortening
+from friso_thesis.studies.thesis.judges.leaf_springs import (
+    evaluated,
+    judged_dimensions,
+    judged_place,
+    judged_shortening,
+)
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE, Sticking
 from friso_thesis.studies.thesis.judges.solver import judged_runs, judged_solvers
-from friso_thesis.studies.thesis.judges.step_by_step import HEAVIEST, HIGH_ALPHA, LOW_ALPHA, ArguedCycle
 from friso_thesis.studies.thesis.space import draw
-from friso_thesis.studies.thesis.ways import by_attraction, by_peak_count
+from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 
 Y, N = True, False
 Cells = Callable[[np.ndarray, np.ndarray], Any]
@@ -231,7 +234,7 @@ def cycle(
     ],
 )
 def test_the_steps_of_the_arguments(claim: str, cycles: Any, pattern: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(step_by_step, "cycle_of", lambda response: cycles[response.trace])
+    monkeypatch.setattr(arguments, "cycle_of", lambda response: cycles[response.trace])
     still = xr.Dataset({"count": 0.0})
     responses = {name: Response(still, name) for name in cycles}  # type: ignore[arg-type]
     assert registered()[claim].judge(Evidence({}, responses)).pattern == pattern

@@ -11,12 +11,10 @@ from scipy.optimize import brentq
 
 from benchmarks.ode23s import ATOL, LARGEST, RTOL, ode23s, parameters
 from friso.engine.simulate import simulate
-from friso_thesis.studies.thesis import Evidence, Finding, thesis_rig
-from friso_thesis.studies.thesis.claims import registered
+from friso_thesis.studies.thesis.claims import Evidence, Finding, by_peak_count, registered
 from friso_thesis.studies.thesis.evidence import run_response
 from friso_thesis.studies.thesis.linear import Linear, analysed
-from friso_thesis.studies.thesis.studies import LOCKED
-from friso_thesis.studies.thesis.ways import by_peak_count
+from friso_thesis.studies.thesis.studies import LOCKED, thesis_rig
 
 pytestmark = pytest.mark.xdist_group("linear-claims")
 

@@ -25,8 +25,7 @@ from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.quantities import Number, Quantity, Value, at_least_1, positive
 from friso.stage import ControllerSection, Rule, register_controller
 from friso.stage.controllers import Gain
-from friso.stage.tables import ROUNDING
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import ROUNDING, moving_mass
 
 if TYPE_CHECKING:
     import sympy as sp

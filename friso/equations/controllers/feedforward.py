@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from friso.stage import ControllerSection
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 
 SYMBOLS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {

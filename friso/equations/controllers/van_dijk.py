@@ -10,8 +10,7 @@ from friso.equations.controllers.pid import Pid
 from friso.quantities import Number, Quantity, Value, at_least_1, inside_0_1, positive
 from friso.stage import Rule, register_controller
 from friso.stage.controllers import KIND, Gain
-from friso.stage.tables import ROUNDING
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import ROUNDING, moving_mass
 
 if TYPE_CHECKING:
     import sympy as sp

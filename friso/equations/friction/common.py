@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, cast
 from friso.equations.conditions import LEVELS, friction_level, has_conditions
 from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
 from friso.stage import FrictionSection, Rule
-from friso.stage.transmission import STATE_PREFIX
+from friso.stage.tables import STATE_PREFIX
 
 if TYPE_CHECKING:
     import sympy as sp

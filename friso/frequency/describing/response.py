@@ -3,20 +3,31 @@
 The response depends on the amplitude of the force. The analyser divides the first harmonic of the position by the force
 (Gelb, Vander Velde 1968, quasi-linear response). One force may have several responses. Those at which the force falls
 with the amplitude are unstable; which of the others appears depends on the history of the analyser.
+
+Solve for the motions of a plant with friction under a sinusoidal force.
+
+Masses, joint and parasitic mode are linear; friction acts on the cart through its describing function N(A, omega). A
+force of amplitude Phi on the stage moves the cart by x_c = H_cs Phi - H_cc N x_c. So its amplitude A is a root of A
+abs(1 + H_cc N(A)) / abs(H_cs) = Phi, where H are the compliances of the masses without friction. A force may have
+several roots.
+
+Compute the mass line of a plant with friction at several places (thesis, Fig. 17).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 from friso.engine.tolerance import checked_rtol
-from friso.frequency.describing.driven import DrivenPlant, Roots, driven_amplitudes
-from friso.frequency.describing.function import checked_positive
-from friso.frequency.describing.loop import TOUCHES, beyond_stroke
-from friso.frequency.describing.steady import RTOL
+from friso.frequency.describing.balance import TOUCHES, beyond_stroke
+from friso.frequency.describing.function import RTOL, Imposition, checked_positive, dynamic_stiffness
+from friso.frequency.parts import mechanics
 from friso.frequency.settings import settings
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
@@ -24,16 +35,148 @@ from friso.stage.arguments import check_arguments
 if TYPE_CHECKING:
     import xarray as xr
 
+LIMITS = (1e-18, 1e18)
+"""Smallest and largest amplitude [m] of the search."""
+
+
+@dataclass(frozen=True)
+class DrivenPlant:
+    """A plant at some frequencies [Hz], shape (frequencies,), without its friction.
+
+    `compliances` [m/N], complex, shape (frequencies, 2, 2), are positions of stage and cart for forces on stage and
+    cart. `flat` has the stage's keys in SI, among them the friction.
+    """
+
+    flat: Mapping[str, Any]
+    frequencies: np.ndarray
+    compliances: np.ndarray
+    rtol: float
+
+    @classmethod
+    def of(cls, flat: Mapping[str, Any], frequencies: np.ndarray, rtol: float = RTOL) -> DrivenPlant:
+        """Return the plant of a stage whose limiter is not touched, at frequencies [Hz]."""
+        (compliances,) = mechanics(flat, np.zeros(1, bool)).at(2j * np.pi * frequencies)
+        return cls(flat, frequencies, compliances, rtol)
+
+    def answer(self, amplitudes: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the forces [N] that move the cart by amplitudes [m], shape (count,).
+
+        `which` numbers the frequencies. Also returns the positions of stage and cart over the forces [m/N], complex,
+        (count, 2), and the dynamic stiffness of friction [N/m]. Results are NaN or infinite where friction was not
+        found.
+        """
+        stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
+        compliances = self.compliances[which]
+        with np.errstate(all="ignore"):  # failures give NaN or infinity, which is no root
+            cart = compliances[:, 1, 0] / (1 + compliances[:, 1, 1] * stiffness)
+            stage = compliances[:, 0, 0] - compliances[:, 0, 1] * stiffness * cart
+            return amplitudes / np.abs(cart), np.stack([stage, cart], axis=1), stiffness
+
+    @cached_property
+    def stuck(self) -> float:
+        """Return an amplitude [m] so small that bristles do not slip."""
+        friction = Imposition.of(self.flat, np.ones(1), np.ones(1), self.rtol)
+        return float(
+            np.min(
+                settings.stuck_amplitude * friction.scales[0, friction.inner],
+                initial=settings.stateless_amplitude if not friction.inner else 1,
+            )
+        )
+
+    def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return amplitudes [m] that need less force, and more, than some forces [N].
+
+        Both have the shape (forces, frequencies). They lie well beyond the amplitudes of a stuck and of a free cart,
+        and do not depend on other forces.
+        """
+        rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
+        with np.errstate(over="ignore"):
+            bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *LIMITS)
+        stuck = np.abs(self.answer(np.full(shape[1], self.stuck), rows)[1][:, 1])
+        slid = np.abs(self.answer((settings.free_amplitude * bare).ravel(), np.tile(rows, shape[0]))[1][:, 1]).reshape(
+            shape
+        )
+        with np.errstate(over="ignore"):
+            states = np.stack([bare, stuck * forces[:, None], slid * forces[:, None]])
+        low, high = (
+            np.fmin.reduce(states) / settings.amplitudes_beyond,
+            np.fmax.reduce(states) * settings.amplitudes_beyond,
+        )
+        return self._extended(low, forces, -1), self._extended(high, forces, 1)
+
+    def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
+        """Return amplitudes moved until they need less force (`side` -1) or more (1) than `forces`."""
+        amplitudes = np.clip(amplitudes, *LIMITS)
+        force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
+        for _ in range(settings.most_decades):
+            reached = self.answer(amplitudes[force, frequency], frequency)[0]
+            missed = ~(side * (reached - forces[force]) > 0)
+            force, frequency = force[missed], frequency[missed]
+            if not force.size:
+                break
+            amplitudes[force, frequency] = np.clip(amplitudes[force, frequency] * 10.0**side, *LIMITS)
+        return amplitudes
+
+    def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return amplitudes [m] and the forces [N] that they need, both (frequencies, points).
+
+        The third result, shape (forces, frequencies, points - 1), marks the cells of the grid in which an amplitude for
+        a force is searched.
+        """
+        low, high = self.ends(forces)
+        first = np.floor(settings.amplitudes_per_decade * np.log10(low)).astype(int)
+        last = np.ceil(settings.amplitudes_per_decade * np.log10(high)).astype(int)
+        points = int(np.max(last.max(axis=0) - first.min(axis=0))) + 1
+        numbers = first.min(axis=0)[:, None] + np.arange(points)
+        amplitudes = 10.0 ** (numbers / settings.amplitudes_per_decade)
+        pending = numbers <= last.max(axis=0)[:, None]
+        reached = np.full(amplitudes.shape, np.nan)
+        reached[pending], _, _ = self.answer(amplitudes[pending], np.nonzero(pending)[0])
+        cells = numbers[None, :, :-1]
+        return amplitudes, reached, (cells >= first[:, :, None]) & (cells < last[:, :, None])
+
+
+@dataclass(frozen=True)
+class Roots:
+    """Amplitudes [m] of the cart in equilibrium with a force at a frequency, shape (count,).
+
+    `force` and `frequency` are indices. `rising` is true if the force rises with the amplitude, and `error` is the
+    remaining relative error. `unknown`, of shape (forces, frequencies), marks where friction was not found at an
+    amplitude that may be a root.
+    """
+
+    force: np.ndarray
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    rising: np.ndarray
+    error: np.ndarray
+    unknown: np.ndarray
+
+
+def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
+    """Find all amplitudes at which forces [N] move the cart, as far as the grid resolves."""
+    amplitudes, reached, inside = driven.grid(forces)
+    above = reached >= forces[:, None, None]
+    computed = np.isfinite(reached[:, :-1] + reached[:, 1:])
+    force, frequency, cell = np.nonzero((above[:, :, :-1] != above[:, :, 1:]) & inside & computed)
+    root = find_root(
+        lambda x, at, size: np.log(driven.answer(np.exp(x), at)[0] / size),
+        tuple(np.log(amplitudes[frequency, cell + side]) for side in (0, 1)),
+        args=(frequency, forces[force]),
+        tolerances={"fatol": settings.force_error},
+        maxiter=settings.most_root_steps,
+    )
+    rising = reached[frequency, cell + 1] > reached[frequency, cell]
+    return Roots(force, frequency, np.exp(root.x), rising, np.abs(root.f_x), np.any(inside & ~computed, axis=2))
+
+
 NOT_FOUND = "no amplitude was found at which this force moves the cart"
 MISSING = "answers are missing: friction was not found at some amplitude, or the least or greatest answer does not last"
 
 
 @check_arguments
 def plant_response(
-    stage: Stage,
-    forces: Sequence[float] | np.ndarray,
-    frequencies: Sequence[float] | np.ndarray,
-    rtol: float = RTOL,
+    stage: Stage, forces: Sequence[float] | np.ndarray, frequencies: Sequence[float] | np.ndarray, rtol: float = RTOL
 ) -> xr.Dataset:
     """First-harmonic response of the plant to sinusoidal actuator forces `forces` [N].
 
@@ -174,3 +317,52 @@ def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, u
     status[np.any(beyond_stroke(stage.flat(), deflection), axis=2)] = TOUCHES
     status[unfound] = NOT_FOUND
     return status.astype(str)
+
+
+@check_arguments
+def mass_line(
+    stage: Stage,
+    places: Sequence[Mapping[str, Any]],
+    forces: Sequence[float] | np.ndarray,
+    frequencies: Sequence[float] | np.ndarray,
+    rtol: float = RTOL,
+) -> xr.Dataset:
+    """Return how far the measured plant lies off the line 1/(m omega^2), place by place.
+
+    The mass m is the whole mass of the plant. `places` lists what differs there, as keys of the stage file with their
+    values, such as {"friction.static": "2 N"}. `forces` [N] and `frequencies` [Hz] are those of the measurement, and
+    `rtol` is the tolerance of its friction. Variables over ("place", "force", "frequency"):
+
+    - `ratio`: the response that an analyser shows, stepping up in frequency (see `plant_response`), over the line. It
+      is complex, and 1 on the line.
+    - `magnitude`: absolute value of the ratio.
+    - `phase` [rad]: phase of the response over -180 degrees.
+
+    The variables `spread_magnitude` and `spread_phase` over ("force", "frequency") are standard deviations over the
+    places. Raises InputError for places that no stage may have, for a stage without friction, and for forces,
+    frequencies or an `rtol` that are not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> places = [{"friction.static": "2 N"}, {"friction.static": "3 N"}]
+    >>> friso.mass_line(friso.load("rig.toml"), places, [2.0], [5.0, 10.0])  # doctest: +SKIP
+    """
+    import xarray as xr
+
+    flat = stage.flat()
+    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
+    rows = [plant_response(stage.replace(place), forces, frequencies, rtol)["up"] for place in places]
+    response = xr.concat(rows, "place")
+    ratio = -response * mass * (2 * np.pi * response["frequency"]) ** 2
+    magnitude = np.abs(ratio)
+    phase = ratio.copy(data=np.angle(ratio.values))
+    named = {
+        "ratio": (ratio, "1", "response over mass line"),
+        "magnitude": (magnitude, "1", "magnitude over mass line"),
+        "phase": (phase, "rad", "phase over mass line"),
+        "spread_magnitude": (magnitude.std("place", ddof=1), "1", "scatter of the magnitude"),
+        "spread_phase": (phase.std("place", ddof=1), "rad", "scatter of the phase"),
+    }
+    variables = {name: array.assign_attrs(units=unit, long_name=text) for name, (array, unit, text) in named.items()}
+    return xr.Dataset(variables, attrs={"stage": stage.to_toml(), "rtol": rtol})

@@ -17,7 +17,7 @@ from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, carrying_force, shared_structure
 from friso.hunting.cycle.settings import settings
 from friso.hunting.settings import tolerance_settings
-from friso.stage.transmission import BACKLASH
+from friso.stage.tables import BACKLASH
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
 """Cached properties of an ensemble that have one row per stage."""

@@ -24,7 +24,7 @@ from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import settings
 from friso.hunting.loop import LowerGains, far_beyond_a_limit, lags, surely_calm
 from friso.stage import Stage
-from friso.stage.standstill import dead_band
+from friso.stage.controllers import dead_band
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,7 +7,7 @@ import numpy as np
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.settings import settings
-from friso.stage.standstill import integral_leak
+from friso.stage.controllers import integral_leak
 
 
 def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:

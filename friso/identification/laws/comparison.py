@@ -23,8 +23,7 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import believed_between
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.stage.tables import FRICTION, FrictionSection, friction_law
-from friso.stage.transmission import MOTOR_FRICTION, moving_mass
+from friso.stage.tables import FRICTION, MOTOR_FRICTION, FrictionSection, friction_law, moving_mass
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
 from friso.identification.readings.settings import settings
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 
 HELD = "The joint is assumed held, with the limiter's stiffness: no bending shows."
 

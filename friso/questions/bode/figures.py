@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.frequency.bode import Bode, BodeCase
-from friso.frequency.cascaded import CascadeLoop
+from friso.frequency.bode import Bode, BodeCase, CascadeLoop
 from friso.frequency.crossover import WANTED
 from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
 from friso.questions.bode.table import decibels
@@ -30,7 +29,7 @@ from friso.shown.drawing.figure import (
     Series,
 )
 from friso.shown.drawing.prefixes import pretty, with_unit
-from friso.stage.transmission import moving_mass
+from friso.stage.tables import moving_mass
 
 QUARTER = 90.0
 """Distance of ticks on phase axes [deg]: a quarter of a turn."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from friso.frequency.bode import Bode
-from friso.frequency.cascaded import CascadeLoop
+from friso.frequency.bode import Bode, CascadeLoop
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash

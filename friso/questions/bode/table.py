@@ -11,7 +11,7 @@ from typing import get_args
 
 import numpy as np
 
-from friso.frequency.cascaded import CascadeLoop
+from friso.frequency.bode import CascadeLoop
 from friso.frequency.margins import Margins
 from friso.questions.bode.states import ShownState
 from friso.shown.drawing.prefixes import NOTHING, with_unit

@@ -9,10 +9,9 @@ import numpy as np
 from friso.equations.bandwidth import bandwidth
 from friso.equations.structure import structure
 from friso.frequency.bode import Bode, Unstable
-from friso.frequency.crossover import WANTED, Limits
+from friso.frequency.crossover import WANTED, Limits, Range
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
-from friso.frequency.ranges import Range
 from friso.interface.answer import AnswerTable
 from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, shown_states
 from friso.questions.bode.table import growth, rows

@@ -9,7 +9,7 @@ import numpy as np
 from friso.hunting import Diagram, Meeting, Plane
 from friso.questions.boundary.words import ShownKey, conclusion
 from friso.shown.documents import plain_json
-from friso.studies.boundary_lines import (
+from friso.studies.boundary import (
     Line,
     corner_verdicts,
     curve_ends,

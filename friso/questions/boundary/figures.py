@@ -28,7 +28,7 @@ from friso.shown.drawing.figure import (
     Series,
     Symbol,
 )
-from friso.studies.boundary_lines import (
+from friso.studies.boundary import (
     ATTRACTS,
     INVALID,
     REPELS,

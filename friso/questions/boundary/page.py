@@ -15,7 +15,7 @@ from friso.shown.drawing.figure import Figure
 from friso.shown.files import Content, image_files
 from friso.shown.pages import Report
 from friso.stage import Stage
-from friso.studies.boundary_lines import lines
+from friso.studies.boundary import lines
 
 
 def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, stem: str) -> dict[str, Content]:

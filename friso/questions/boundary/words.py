@@ -12,7 +12,7 @@ import numpy as np
 from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Meeting, Plane, Space
 from friso.shown.drawing.figure import Array
 from friso.shown.drawing.prefixes import listed, plus_minus, pretty, with_unit
-from friso.studies.boundary_lines import (
+from friso.studies.boundary import (
     ATTRACTS,
     INVALID,
     REPELS,

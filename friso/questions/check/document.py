@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         ParameterMargin,
         Swing,
     )
-    from friso.remedies.suggestion import Suggestion
+    from friso.remedies.catalogue import Suggestion
     from friso.shares import Share
     from friso.stage import Stage
     from friso.studies.draws import Draws

@@ -9,7 +9,7 @@ from friso.questions.check.margin_words import other_static_friction
 from friso.shown.drawing.prefixes import with_unit
 
 if TYPE_CHECKING:
-    from friso.remedies.suggestion import Suggestion
+    from friso.remedies.catalogue import Suggestion
 
 LITTLE = 0.5
 """Modulus margin below which the controller has to be tuned as well."""

@@ -24,7 +24,7 @@ from friso.studies.draws import Draws
 
 if TYPE_CHECKING:
     from friso.hunting import Case
-    from friso.remedies.suggestion import Suggestion
+    from friso.remedies.catalogue import Suggestion
     from friso.studies.laws.verdicts import VerdictsByLaw
 
 

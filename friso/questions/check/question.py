@@ -35,7 +35,7 @@ from friso.studies.settings import settings
 if TYPE_CHECKING:
     from friso.hunting import LoopState, ParameterMargin
     from friso.hunting.criteria import Verdict
-    from friso.remedies.suggestion import Suggestion
+    from friso.remedies.catalogue import Suggestion
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
     from friso.studies.laws.verdicts import VerdictsByLaw
@@ -71,7 +71,7 @@ class CheckAnswer(Answer):
         case = self.result["given"]
         if case.stage.joint or case.verdict not in ATTRACTED:
             return None
-        from friso.remedies.suggestion import suggestion
+        from friso.remedies.catalogue import suggestion
 
         return suggestion(case.stage)
 

@@ -25,10 +25,9 @@ from friso.shown.drawing.prefixes import (
 )
 from friso.shown.loop_words import unstable_where
 from friso.shown.motion_words import dwell_sentences, following_sentence
-from friso.stage.controllers import FORCE_LIMIT
+from friso.stage.controllers import FORCE_LIMIT, integral_leak
 from friso.stage.motion import motion_of
 from friso.stage.section import numeric_fields
-from friso.stage.standstill import integral_leak
 
 if TYPE_CHECKING:
     from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin, MoveShare

@@ -22,13 +22,11 @@ from friso.shown.drawing.prefixes import (
 )
 from friso.shown.machine_words import spread_sentences
 from friso.stage import ControllerSection
+from friso.stage.controllers import AgainstFriction
 from friso.stage.section import numeric_fields
-from friso.stage.standstill import AgainstFriction
-from friso.studies.compare.disturbance_rejection import rejection
-from friso.studies.compare.needed_bandwidth import NeededBandwidth
-from friso.studies.compare.options import MODEL_ERROR, Option
-from friso.studies.compare.statistics import EstimatedValue
-from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
+from friso.studies.compare.measures import EstimatedValue
+from friso.studies.compare.options import MODEL_ERROR, Option, rejection
+from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, NeededBandwidth, OptionResult
 
 COLUMNS = (
     "Swings at the end",

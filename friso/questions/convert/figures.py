@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.frequency.friction import steady_force
+from friso.frequency.members import steady_force
 from friso.shown.drawing.figure import BLUE, GREY, VERMILLION, Axis, Figure, Markers, Panel, Series
 
 if TYPE_CHECKING:

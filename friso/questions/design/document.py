@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.choice import Confirmed
-from friso.design_method.edges import Corners
-from friso.design_method.front import Candidate
+from friso.design_method.choice import Candidate, Confirmed
 from friso.design_method.geometry import Geometry
 from friso.design_method.method import Design, NoDesign, UnfinishedDesign
-from friso.design_method.relax import Relaxation
+from friso.design_method.population import Corners
+from friso.design_method.requirements import Relaxation
 from friso.design_method.settings import settings
 from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER

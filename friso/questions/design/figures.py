@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.design_method.choice import Confirmed
-from friso.design_method.front import Candidate
+from friso.design_method.choice import Candidate, Confirmed
 from friso.design_method.method import Design, UnfinishedDesign
 from friso.design_method.verification import MachineOutcomes
 from friso.frequency.crossover import WANTED

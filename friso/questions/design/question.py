@@ -9,8 +9,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from friso.design_method.outline import outline
-from friso.design_method.prepare import assumed, by_rules, check_designable, offset_points
+from friso.design_method.prepare import assumed, by_rules, check_designable, offset_points, outline
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from friso.design_method.edges import Corners
 from friso.design_method.method import Design
+from friso.design_method.population import Corners
 from friso.quantities import percent
 from friso.questions.design.control import controller_step, moves_step
 from friso.questions.design.leaves import leaves_step

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.design_method.method import Design
-from friso.frequency.crossover import WANTED, searched_crossovers
-from friso.frequency.ranges import Range
+from friso.frequency.crossover import WANTED, Range, searched_crossovers
 
 
 @dataclass(frozen=True)

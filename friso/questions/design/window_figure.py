@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.design_method.edges import Corners
 from friso.design_method.method import Design
-from friso.frequency.crossover import WANTED
-from friso.frequency.ranges import Range
+from friso.design_method.population import Corners
+from friso.frequency.crossover import WANTED, Range
 from friso.questions.design.window import stiffest, view
 from friso.questions.design.words import hertz
 from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series

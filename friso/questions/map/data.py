@@ -25,8 +25,8 @@ from friso.shown.drawing.drawable import colour_prefix
 from friso.shown.drawing.figure import Array, Cloud
 from friso.shown.drawing.prefixes import choose
 from friso.stage import Stage, loads
+from friso.studies.axes import SCALINGS
 from friso.studies.metric import worded
-from friso.studies.scalings import SCALINGS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -25,8 +25,8 @@ from friso.questions.map.words import (
 from friso.shares import share_interval
 from friso.shown.drawing.prefixes import listed, percentage
 from friso.shown.loop_words import unstable_loop
+from friso.studies.axes import SCALINGS
 from friso.studies.metric import MapFinding, metrics, worded
-from friso.studies.scalings import SCALINGS
 
 if TYPE_CHECKING:
     import xarray as xr

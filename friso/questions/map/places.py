@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel
-from friso.studies.scalings import SCALINGS
+from friso.studies.axes import SCALINGS
 
 if TYPE_CHECKING:
     from friso.stage import Stage

@@ -53,13 +53,12 @@ from friso.questions.map.study import (
 )
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
-from friso.studies.axes import AxisValues
-from friso.studies.built_runs import of_runs_alone, runs_as_built
+from friso.studies.axes import AxisValues, Samples
+from friso.studies.cells import of_runs_alone, runs_as_built
 from friso.studies.execute import Crew, local_crew
-from friso.studies.samples import Samples
 from friso.studies.settings import settings
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
-from friso.studies.store_folder import ReadOnlyStoreError
+from friso.studies.store_files import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
 from friso.studies.verify import checked_share, loosest_rtol, verify_cells
@@ -393,12 +392,12 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
         expected = f"1 worker or more, up to the {most} cores that may be used"
         raise wrong("workers", str(workers), expected, "1")
     if scheduler is not None:
-        from friso.studies.distribute import connected
+        from friso.studies.execute import connected
 
         with connected(scheduler) as crew:
             yield crew
     elif workers is not None:
-        from friso.studies.processes import processes
+        from friso.studies.execute import processes
 
         with processes(workers) as crew:
             yield crew

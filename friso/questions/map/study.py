@@ -23,15 +23,13 @@ from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.quantities import quoted
 from friso.stage import Stage
-from friso.studies.axes import AxisValues
+from friso.studies.axes import AxisValues, Samples
 from friso.studies.cells import INFERRED
 from friso.studies.execute import Crew
 from friso.studies.metric import METRICS, metrics, with_usual
 from friso.studies.refine import finer
-from friso.studies.request import Request
-from friso.studies.samples import Samples
 from friso.studies.settings import settings
-from friso.studies.study import Study, study_of
+from friso.studies.study import Request, Study, study_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -136,7 +134,7 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     `overwrite` is set.
     """
     from friso.studies.store import read_store
-    from friso.studies.store_folder import remove_leftovers
+    from friso.studies.store_files import remove_leftovers
 
     remove_leftovers(store)  # a store that was being replaced is put back
     try:
@@ -205,7 +203,7 @@ def place_of_store(folder: str | os.PathLike[str]) -> Path:
 
 def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
     """Return the study as NetCDF or CSV, by the suffix of each path."""
-    from friso.studies.export import export
+    from friso.studies.store import export
 
     return dict.fromkeys(paths, partial(export, runs))
 
@@ -243,7 +241,7 @@ def write_beside(
     cannot be written.
     """
     from friso.studies.metadata import annotate_metadata
-    from friso.studies.store_folder import lock_store
+    from friso.studies.store_files import lock_store
 
     with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE) if can_note else nullcontext():
         own = _own_files(store, files)

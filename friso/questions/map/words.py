@@ -12,8 +12,8 @@ from friso.axis import axis_shown
 from friso.shown.drawing.figure import GREY, INK, MAUVE, ORANGE, PINK, VERMILLION, Category
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.stage.tables import friction_laws
+from friso.studies.axes import SCALINGS
 from friso.studies.metric import metrics, worded
-from friso.studies.scalings import SCALINGS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -183,7 +183,7 @@ def simulate(
         left_out = AS_BUILT if continuous else ()
         chosen, name, usual = read_stage(source, set, leaves_out=left_out), stem_of(source), None
     else:
-        from friso.studies.built_runs import runs_as_built
+        from friso.studies.cells import runs_as_built
 
         if not isinstance(stage, list | tuple | None):
             raise InputError(

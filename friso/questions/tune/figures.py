@@ -9,9 +9,9 @@ import numpy as np
 
 from friso.engine.simulate import simulate
 from friso.equations.motion import last_corner
-from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import response
 from friso.frequency.members import limit_cases
+from friso.frequency.system import DriveTiming
 from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome
 from friso.shown.drawing.figure import (

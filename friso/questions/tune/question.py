@@ -35,8 +35,7 @@ from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.quantities import Bound, Quantity, positive, quoted
 from friso.remedies import Changeable
-from friso.remedies.goal import Goal
-from friso.remedies.machines import MoveRange
+from friso.remedies.machines import Goal, MoveRange
 from friso.stage import Stage
 
 if TYPE_CHECKING:

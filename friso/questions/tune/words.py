@@ -14,8 +14,7 @@ import numpy as np
 from friso.design_method.geometry import Geometry
 from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
-from friso.frequency.bandwidth import bandwidths_at
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import WANTED, bandwidths_at
 from friso.interface.answer import AnswerTable
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
@@ -23,14 +22,13 @@ from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
-from friso.remedies.change import ChangeSize
-from friso.remedies.goal import Goal
-from friso.remedies.least import LEAST
+from friso.remedies.catalogue import BANDWIDTH
+from friso.remedies.least import LEAST, ChangeSize
+from friso.remedies.machines import Goal
 from friso.remedies.method import Advice
 from friso.remedies.relax import RelaxedGoal
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
-from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
 from friso.shown.drawing.prefixes import (
@@ -45,7 +43,7 @@ from friso.shown.loop_words import unstable_loop
 from friso.shown.machine_words import spread_sentences
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
-from friso.stage.transmission import leading_friction
+from friso.stage.tables import leading_friction
 
 COLUMNS = (
     "Works",

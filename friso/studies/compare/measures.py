@@ -1,22 +1,75 @@
-"""Measure machines: swinging, settling, standstill, force, and the loop's margin."""
+"""Measure machines: swinging, settling, standstill, force, and the loop's margin.
+
+Compute medians and paired differences of machines, with 95 % intervals.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.stats import binom
 
-from friso.engine.arrays import Status
+from friso.engine.arrays import ArrayColumns, Status
 from friso.equations.motion import Stand
 from friso.frequency.family import about_resonances, for_poles
 from friso.frequency.loops import Poles
 from friso.frequency.members import limit_cases
 from friso.hunting.criteria import FAILED, RESTS, SWINGS, end_of_traces, outcomes, peaks_in_traces, settling_of_traces
 from friso.hunting.measures import LAST_QUARTER
+from friso.intervals import COVERAGE
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
+
+
+@dataclass(frozen=True)
+class EstimatedValue:
+    """A value and its 95 % interval; NaN if unknown."""
+
+    value: float
+    low: float
+    high: float
+
+
+def median(values: np.ndarray) -> EstimatedValue:
+    """Return the median of values (n,) and its 95 % interval, from those that are not NaN.
+
+    Infinite values are allowed.
+    """
+    numbers = values[~np.isnan(values)]
+    if not numbers.size:
+        return EstimatedValue(np.nan, np.nan, np.nan)
+    return EstimatedValue(float(np.median(numbers)), *quantile_interval(numbers, 0.5))
+
+
+def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
+    """Return the 95 % interval of a quantile of a population, from values (n,) drawn from it.
+
+    A fraction `share` of the population lies below the quantile. The interval by order statistics (David, Nagaraja
+    2003, Order Statistics, Sec. 7.1) holds for any distribution. It is infinite for too few values.
+    """
+    ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
+    low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))
+    return float(ranked[low]), float(ranked[high + 1])
+
+
+def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
+    """Return how much more probable an event is with a change than `before`, on paired machines.
+
+    `flags` and `before`, (count,), are true for machines with the event. The interval is Wald's, with half a machine
+    added to every cell (Agresti, Min 2005, doi:10.1002/sim.1781). The result is NaN without machines.
+    """
+    count = len(flags)
+    if not count:
+        return EstimatedValue(np.nan, np.nan, np.nan)
+    gained, lost = (int(np.count_nonzero(cell)) for cell in (flags & ~before, ~flags & before))
+    more, less, total = gained + 0.5, lost + 0.5, count + 2
+    centre = (more - less) / total
+    half = COVERAGE * np.sqrt((more + less) - (more - less) ** 2 / total) / total
+    return EstimatedValue((gained - lost) / count, max(-1.0, float(centre - half)), min(1.0, float(centre + half)))
+
 
 DENSITY, SLOWEST, FASTEST = 25, 0.1, 10.0
 """Frequencies at which loops are evaluated: per decade, apart from those near resonances; the lowest, over the slowest
@@ -27,7 +80,7 @@ CLOSER, WITHIN = 2, 9
 
 
 @dataclass(frozen=True)
-class MachineMeasures:
+class MachineMeasures(ArrayColumns):
     """Measures of the runs of machines, arrays of shape (count,).
 
     Runs that were not completed have NaN, and no peaks. `outcome` are words of `friso.hunting.criteria.run_outcome`,
@@ -61,15 +114,6 @@ class MachineMeasures:
         return self.outcome == RESTS
 
 
-AnyMeasures = TypeVar("AnyMeasures", "MachineMeasures", "Later")
-
-
-def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
-    """Join the measures of chunks of runs."""
-    names = [field.name for field in fields(parts[0])]
-    return type(parts[0])(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
 def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
     """Measure a chunk of runs of machines, whose reference comes to stand at `stands`.
@@ -93,7 +137,7 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
 
 
 @dataclass(frozen=True)
-class Later:
+class Later(ArrayColumns):
     """Runs that were continued, arrays of shape (runs,).
 
     `done` is true for runs that were completed, and `stays` for machines in position throughout the last half.

@@ -1,8 +1,11 @@
-"""Define the options for bringing a machine to rest: controller settings, a joint, or both."""
+"""Define the options for bringing a machine to rest: controller settings, a joint, or both.
+
+Replace a machine's controller by active disturbance rejection.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
@@ -12,17 +15,61 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth, sped_up
 from friso.equations.conditions import anywhere, level_under_conditions
+from friso.equations.controllers.adrc import BANDWIDTH, OBSERVER_RATIO, crossing_ratio
+from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.settings import SETTINGS, Setting
 from friso.errors import InputError
-from friso.frequency.bandwidth import bandwidths_at
-from friso.frequency.crossover import WANTED, limits
+from friso.frequency.crossover import WANTED, bandwidths_at, limits
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
-from friso.stage import Stage
-from friso.stage.controllers import controller_of
-from friso.studies.compare.disturbance_rejection import ADRC, rejecting
+from friso.stage import ControllerSection, Stage
+from friso.stage.controllers import CONTROLLER, KIND, controller_of
+from friso.stage.tables import moving_mass
 from friso.studies.compare.machines import Machines
 from friso.studies.settings import settings
+
+ADRC = "adrc"
+"""Name of the option, and kind of the controller."""
+
+
+class Rejection(NamedTuple):
+    """Bandwidths of a disturbance-rejecting controller: of its feedback [Hz], of its observer.
+
+    The observer's is a multiple of the feedback's.
+    """
+
+    bandwidth: float
+    observer_ratio: float
+
+
+def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
+    """Return the stage with active disturbance rejection as fast as its present controller.
+
+    The loop of the sliding machine, with the mass for which it is tuned, crosses 0 dB at the lowest of the present
+    `crossings` [Hz]. Force limit and filters are kept. Raises InputError if there is no crossing, or the drive is too
+    slow.
+    """
+    if not crossings:
+        raise InputError(CONTROLLER, "a loop that crosses 0 dB nowhere", "one that does", 'crossover = "8 Hz"')
+    kept = {
+        name: value
+        for name, value in stage.as_written()[CONTROLLER].items()
+        if name in ControllerSection.model_fields and name != "kind"
+    }
+    slow = stage.replace({CONTROLLER: {**kept, "kind": ADRC, "bandwidth": "1 mHz"}})
+    flat = stage.flat()
+    return slow.with_numbers(
+        {
+            BANDWIDTH: min(crossings) / crossing_ratio(slow.flat()[OBSERVER_RATIO]),
+            TUNED_MASS: flat.get(TUNED_MASS, moving_mass(flat)),
+        }
+    )
+
+
+def rejection(flat: Mapping[str, Any]) -> Rejection | None:
+    """Return the bandwidths of a stage's disturbance-rejecting controller, None for another one."""
+    return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None
+
 
 DEADBAND = 0.5
 """Deadband of the integrator over the tolerance for in position (friso's choice). The integrator pauses while the stage
@@ -172,11 +219,7 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     """
     current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
-    return {
-        **flat,
-        **{key: ratio * flat[key] for key in map(controller.key, controller.loop_gain)},
-        **current_loop,
-    }
+    return {**flat, **{key: ratio * flat[key] for key in map(controller.key, controller.loop_gain)}, **current_loop}
 
 
 def options(

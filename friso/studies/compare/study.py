@@ -1,4 +1,7 @@
-"""Compare options: run every option on every machine, all machines of an option at once."""
+"""Compare options: run every option on every machine, all machines of an option at once.
+
+Find the bandwidth from which a controller alone brings random machines to rest.
+"""
 
 from __future__ import annotations
 
@@ -7,30 +10,88 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friso.engine.arrays import Status
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.motion import Stand, last_corner, rests, stands
 from friso.equations.settings import settings_named
+from friso.equations.structure import shared_structure
 from friso.errors import InputError
+from friso.frequency.crossover import bandwidths_at, limits
+from friso.hunting.criteria import settling_in_the_end
 from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
+from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
-from friso.studies.compare.disturbance_rejection import ADRC
+from friso.stage.rig import AS_BUILT
 from friso.studies.compare.machines import Machines, draw_machines
 from friso.studies.compare.measures import (
+    EstimatedValue,
     Later,
     LoopRobustness,
     MachineMeasures,
-    concatenate_chunks,
+    difference,
     linear_loops,
     measure_chunk,
+    median,
     staying_in_position,
 )
-from friso.studies.compare.needed_bandwidth import NeededBandwidth, needed_bandwidth
-from friso.studies.compare.options import OPTIONS, CompareOptions, Option, linear_flat, options
-from friso.studies.compare.statistics import EstimatedValue, difference, median
+from friso.studies.compare.options import ADRC, OPTIONS, CompareOptions, Option, linear_flat, options
 from friso.studies.settings import settings
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, own_motion
+
+
+@dataclass(frozen=True)
+class NeededBandwidth:
+    """Fractions of drawn machines that come to rest in the end by the controller alone, over bandwidth.
+
+    `bandwidths` [Hz], shape (n,), are the last 0 dB crossings of the stage's own open loop, with ever faster
+    controllers. They run from the present one to the highest that keeps enough margin. `shares`, shape (n,), are the
+    fractions, and `factors`, shape (n,), say how much faster the controllers are. The joint is locked, and the
+    controller in continuous time.
+    """
+
+    bandwidths: np.ndarray
+    shares: np.ndarray
+    factors: np.ndarray
+
+    def turning(self, enough: float) -> int | None:
+        """Return the index of the bandwidth from which on enough machines come to rest.
+
+        `enough` is the fraction of machines that counts as enough. Returns None if the fraction at the highest
+        bandwidth is smaller.
+        """
+        missed = np.flatnonzero(self.shares < enough)
+        first = int(missed[-1]) + 1 if missed.size else 0
+        return first if first < len(self.shares) else None
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities behind
+def needed_bandwidth(machines: Machines, locked: Stage, within: float) -> NeededBandwidth | None:
+    """Run moves of some machines at many bandwidths, and count those that come to rest.
+
+    The joint is `locked` in the stage, and rest means `within` [m] of the reference. Returns None if no higher
+    bandwidth keeps the margin.
+    """
+    tried, count = settings.needed_bandwidths, min(machines.count, settings.needed_machines)
+    ideal = locked.replace({table: None for table in AS_BUILT if getattr(locked, table)})
+    flat = ideal.flat()
+    highest, own = limits(linear_flat(locked, locked.flat())).highest_comfortable, bandwidth(flat) or 1.0
+    if highest is None or highest <= own:
+        return None
+    factors = np.geomspace(1.0, highest / own, tried)
+    drawn = {key: np.tile(values[:count], tried) for key, values in machines.keys.items() if key in flat}
+    every = faster(ideal.flat({**as_tuned(flat), **drawn}), np.repeat(factors, count))
+    rests = np.zeros(tried * count, bool)
+    options = RunOptions(rtol=settings.needed_rtol, bands=(within, within), record_from=np.inf)
+    for runs in run_chunks(kernel(shared_structure(every)), every, len(rests), options):
+        done = np.equal(runs.results.statuses, Status.DONE)
+        rests[runs.numbers] = done & np.isfinite(settling_in_the_end(runs.part(every), runs, "inner"))
+    return NeededBandwidth(bandwidths_at(ideal, factors), rests.reshape(tried, count).mean(axis=1), factors)
+
 
 INTERVAL = 1e-3
 """Least time [s] between evaluated samples. It is rounded up to a whole number of the drive's samples."""
@@ -305,13 +366,13 @@ class _Work:
         for recorded in self._recorded(option, self.task, count, 1):
             parts.append(measure_chunk(recorded, self.places, self.within))
             self.progress(before * count + int(recorded.numbers[-1]) + 1, total, label)
-        return concatenate_chunks(parts)
+        return MachineMeasures.joined(parts)
 
     def longer(self, option: Option) -> Later:
         """Run an option on the first machines for longer, and return which stay in position."""
         task = replace(self.task, duration=LONGER * self.task.duration)
         count = min(FOLLOWED, self.machines.count)
-        return concatenate_chunks(
+        return Later.joined(
             [staying_in_position(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)]
         )
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.edges import OtherLaws
+from friso.design_method.population import OtherLaws
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError

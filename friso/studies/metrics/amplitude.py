@@ -1,18 +1,5 @@
 """Amplitude of the hunting cycle"""
 
-import numpy as np
+from friso.studies.metrics.attractor import of_attractor
 
-from friso.studies.metric import Metric
-from friso.studies.metrics.attractor import CRITERION
-
-METRIC = Metric(
-    "Amplitude of what attracts",
-    lambda stage: np.where(stage.attracted.certain, stage.attracted.amplitude, np.nan),
-    source="survey",
-    unit="m",
-    usual=True,
-    place=61,
-    criterion=CRITERION,
-    reasons="attractor",
-    answered_by="attractor",
-)
+METRIC = of_attractor("Amplitude of what attracts", "amplitude", unit="m", place=61)

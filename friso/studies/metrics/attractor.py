@@ -22,6 +22,22 @@ def attractors(stage: StageEvidence) -> np.ndarray:
     return np.where(attracted.certain, kind, "unknown").astype(object)
 
 
+def of_attractor(title: str, quantity: str, unit: str, place: int, limits: tuple[float, float] | None = None) -> Metric:
+    """Return the metric that shows one quantity of the attractor, where it is certain what attracts."""
+    return Metric(
+        title,
+        lambda stage: np.where(stage.attracted.certain, getattr(stage.attracted, quantity), np.nan),
+        source="survey",
+        unit=unit,
+        usual=True,
+        place=place,
+        criterion=CRITERION,
+        reasons="attractor",
+        limits=limits,
+        answered_by="attractor",
+    )
+
+
 METRIC = Metric(
     "What attracts the stage",
     attractors,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from friso.engine.arrays import Status
+from friso.engine.arrays import ArrayColumns, Status
 from friso.equations import motion
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
@@ -18,7 +18,7 @@ from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
-from friso.studies.rig.sizes import free_stage, interval, locked_stage, pace, quicker
+from friso.studies.rig.outcome import free_stage, interval, locked_stage, pace, quicker
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, point_to_point
 
@@ -140,7 +140,7 @@ def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
 
 
 @dataclass(frozen=True)
-class RailRuns:
+class RailRuns(ArrayColumns):
     """Results of runs on rails, each of shape (runs,).
 
     - `peaks`: distinct peaks (see `friso.hunting.criteria.peak_count`).
@@ -179,10 +179,6 @@ class RailRuns:
         """Return which runs have a distinct peak."""
         return self.peaks > 0
 
-    def shaped(self, *shape: int) -> RailRuns:
-        """Return the results with their arrays in another shape."""
-        return RailRuns(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
-
     def share(self, which: Any = ...) -> Share:
         """Return the fraction of runs with a counted peak, and its 95 % interval.
 
@@ -198,13 +194,6 @@ def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[st
     """
     (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
     return recorded
-
-
-def concatenate_runs(parts: list[RailRuns]) -> RailRuns:
-    """Join the results of several lots of runs, one after the other."""
-    return RailRuns(
-        **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(RailRuns)}
-    )
 
 
 def run_moves(
@@ -224,7 +213,7 @@ def run_moves(
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
         parts.append(rail_runs(chunk))
         progress(int(chunk.numbers[-1]) + 1, len(seeds), label)
-    return concatenate_runs(parts)
+    return RailRuns.joined(parts)
 
 
 def rail_runs(recorded: RecordedRuns) -> RailRuns:

@@ -9,12 +9,11 @@ from friso.shown.documents import plain_json
 from friso.version import VERSION
 from friso_thesis.questions.guideline.page import group_rows
 from friso_thesis.questions.guideline.words import accuracy
-from friso_thesis.studies.guideline import Fit, Guideline
 from friso_thesis.studies.guideline.claims import judged_claims
+from friso_thesis.studies.guideline.compute import Fit, Guideline
 from friso_thesis.studies.guideline.edges import OF
 from friso_thesis.studies.guideline.laws import FittedLaw
-from friso_thesis.studies.guideline.thesis_rig import ThesisCase
-from friso_thesis.studies.guideline.worked import WorkedDesign
+from friso_thesis.studies.guideline.worked import ThesisCase, WorkedDesign
 
 
 def guideline_document(guideline: Guideline) -> dict[str, Any]:

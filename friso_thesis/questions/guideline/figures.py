@@ -27,11 +27,10 @@ from friso.shown.drawing.figure import (
     Panel,
     Series,
 )
-from friso_thesis.studies.guideline import Fit, Guideline
+from friso_thesis.studies.guideline.compute import Fit, Guideline
 from friso_thesis.studies.guideline.edges import FLIP, FOLD, JUMP, LOST
 from friso_thesis.studies.guideline.sweeps import Sweep
-from friso_thesis.studies.guideline.thesis_rig import Laws, plain_rig
-from friso_thesis.studies.guideline.worked import STUDIED, ThesisCase
+from friso_thesis.studies.guideline.worked import STUDIED, Laws, ThesisCase, plain_rig
 
 ENDS = {
     FLIP: Category("the cycle flips", BLUE),

@@ -17,17 +17,22 @@ from friso.shown.pages import environment
 from friso.version import VERSION
 from friso_thesis.questions.guideline.figures import guideline_figures
 from friso_thesis.questions.guideline.words import formulas, log_error, number, parasitic_edges, parasitic_sentences
-from friso_thesis.studies.guideline import Guideline
-from friso_thesis.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
 from friso_thesis.studies.guideline.claims import judged_claims
-from friso_thesis.studies.guideline.edges import KINDS, ROUNDS, STEP
+from friso_thesis.studies.guideline.compute import ABOVE, BELOW, MOVES, PERIODS_BESIDE, Guideline
+from friso_thesis.studies.guideline.edges import DISTANCES, KINDS, ROUNDS, STEP
 from friso_thesis.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
 from friso_thesis.studies.guideline.laws import FOLDS, GAIN, Errors
-from friso_thesis.studies.guideline.parasitic import DRIVE
-from friso_thesis.studies.guideline.persistence import DISTANCES
 from friso_thesis.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
-from friso_thesis.studies.guideline.thesis_rig import ThesisCase, plain_rig
-from friso_thesis.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED
+from friso_thesis.studies.guideline.worked import (
+    CLAIMED_AT,
+    DRIVE,
+    GAPS,
+    MARGIN,
+    STATIC,
+    STUDIED,
+    ThesisCase,
+    plain_rig,
+)
 
 PAGE, TABLE = "guideline.md", "guideline_edges.csv"
 
@@ -43,7 +48,7 @@ CONSTANTS: Mapping[str, Any] = {
     "above": ABOVE,
     "distances": len(DISTANCES),
     "moves": MOVES,
-    "periods": PERIODS,
+    "periods": PERIODS_BESIDE,
     "folds": FOLDS,
     "gain": GAIN,
     "limiter": LIMITER_OVER_BRISTLES,

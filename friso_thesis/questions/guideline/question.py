@@ -44,6 +44,6 @@ def guideline(samples: int = SAMPLES, *, folder: Path | None = None, progress: P
     >>> import friso
     >>> friso.guideline(samples=64)  # doctest: +SKIP
     """
-    from friso_thesis.studies.guideline import guideline as computed
+    from friso_thesis.studies.guideline.compute import guideline as computed
 
     return GuidelineAnswer(computed(samples, folder, progress))

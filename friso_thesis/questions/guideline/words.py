@@ -7,11 +7,10 @@ from collections.abc import Sequence
 
 from friso.quantities import percent
 from friso.shown.drawing.prefixes import listed
-from friso_thesis.studies.guideline import Guideline
+from friso_thesis.studies.guideline.compute import Guideline
 from friso_thesis.studies.guideline.groups import GROUPS
 from friso_thesis.studies.guideline.laws import REFERENCE, FittedLaw
-from friso_thesis.studies.guideline.parasitic import ParasiticLimits
-from friso_thesis.studies.guideline.thesis_rig import ThesisCase
+from friso_thesis.studies.guideline.worked import ParasiticLimits, ThesisCase
 
 BASES = {
     "slip": "sigma_0 v_s/F_s",
@@ -104,10 +103,7 @@ def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
             f"crossover is a rule for all modes. {conclusion}"
         )
     dampings = dict.fromkeys(mode.damping_ratio for mode in modes)
-    return [
-        *(_ranges(state, damping, modes) for state in ("locked", "free") for damping in dampings),
-        conclusion,
-    ]
+    return [*(_ranges(state, damping, modes) for state in ("locked", "free") for damping in dampings), conclusion]
 
 
 def _ranges(state: str, damping: float, modes: Sequence[ParasiticLimits]) -> str:

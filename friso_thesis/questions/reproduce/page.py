@@ -15,17 +15,19 @@ from friso.shown.drawing.figure import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLI
 from friso.shown.files import Content, pictures
 from friso.shown.pages import Report, print_image
 from friso.version import VERSION
-from friso_thesis.questions.reproduce import first_screen, words
+from friso_thesis.questions.reproduce import words
 from friso_thesis.questions.reproduce.document import conclusion, reproduce_document
 from friso_thesis.questions.reproduce.figures import reproduction_figures
-from friso_thesis.questions.reproduce.laws import laws_rows, laws_sentences
 from friso_thesis.questions.reproduce.questions import method_rows, question_rows
 from friso_thesis.questions.reproduce.summary import save_summary
-from friso_thesis.studies.thesis import CONVENTIONS, STUDIES, thesis_rig
+from friso_thesis.questions.reproduce.words import laws_rows, laws_sentences
+from friso_thesis.studies.thesis.reading import CONVENTIONS
+from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 
 if TYPE_CHECKING:
-    from friso_thesis.studies.thesis import ClaimVerdict, Reproduction
     from friso_thesis.studies.thesis.laws import ConclusionsByLaw
+    from friso_thesis.studies.thesis.reproduce import Reproduction
+    from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
 COLOURS = {
     "holds": GREEN,
@@ -86,11 +88,11 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
         templates="friso_thesis.shown",
         values={
             "verdicts": verdicts,
-            "right": first_screen.right(verdicts),
-            "as_far": first_screen.as_far,
-            "more_right": first_screen.more_right(verdicts),
-            "other_reason": first_screen.remarks(first_screen.OTHER_REASON, by_claim),
-            "slips": first_screen.remarks(first_screen.SLIPS, by_claim),
+            "right": words.right(verdicts),
+            "as_far": words.as_far,
+            "more_right": words.more_right(verdicts),
+            "other_reason": words.remarks(words.OTHER_REASON, by_claim),
+            "slips": words.remarks(words.SLIPS, by_claim),
             "counts": _counts(verdicts),
             "colours": COLOURS,
             "words": words,

@@ -37,8 +37,7 @@ class ReproduceAnswer(Answer):
 
     def sentences(self) -> Sequence[str]:
         """Say how many claims hold, which open values fit best, and what survives other laws."""
-        from friso_thesis.questions.reproduce.laws import laws_sentences
-        from friso_thesis.questions.reproduce.words import fit_sentence
+        from friso_thesis.questions.reproduce.words import fit_sentence, laws_sentences
 
         fit = fit_sentence(self.result.plausible)
         return [
@@ -49,7 +48,7 @@ class ReproduceAnswer(Answer):
 
     def tables(self) -> Sequence[AnswerTable]:
         """Return the table of conclusions under each friction law; empty unless laws were asked for."""
-        from friso_thesis.questions.reproduce.laws import TITLE, laws_rows
+        from friso_thesis.questions.reproduce.words import TITLE, laws_rows
 
         return [AnswerTable(TITLE, self.laws.laws, laws_rows(self.laws))] if self.laws else []
 

@@ -15,7 +15,7 @@ from friso_thesis.studies.thesis.space import OPEN
 from friso_thesis.studies.thesis.studies import rig_crossover, rig_gains
 
 if TYPE_CHECKING:
-    from friso_thesis.studies.thesis import Reproduction
+    from friso_thesis.studies.thesis.reproduce import Reproduction
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from friso_thesis.questions.reproduce import words
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from friso_thesis.studies.thesis import ClaimVerdict
+    from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
 _A4 = 8.27, 11.69
 _COLUMNS = {"id": 0.05, "where": 0.105, "text": 0.22, "word": 0.71, "met": 0.80, "share": 0.87}

@@ -1,16 +1,25 @@
 """Write the words of `friso reproduce` on a claim: the finding, and how far it agrees.
 
 Each comes in short and in full.
+
+Show the thesis's conclusions under other friction laws, as text, table and JSON.
+
+Write the first screen of the page of `friso reproduce`.
+
+It lists which claims of the thesis are right, which are right for another reason, and where the thesis has small
+mistakes.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from friso.quantities import percent
+from friso.questions.convert.words import SHOWN
 from friso.shown.drawing.prefixes import listed
 from friso_thesis.studies.thesis.plausible import POINTS
 from friso_thesis.studies.thesis.space import OPEN, draw_name
@@ -18,7 +27,54 @@ from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
 if TYPE_CHECKING:
     from friso_thesis.studies.thesis.claims import Part
+    from friso_thesis.studies.thesis.laws import ConclusionByLaw, ConclusionsByLaw
     from friso_thesis.studies.thesis.plausible import Plausible
+    from friso_thesis.studies.thesis.verdicts import ClaimVerdict
+
+TITLE = "Conclusions of the thesis under each friction law"
+
+
+def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
+    """Say how many conclusions survive other friction laws, and which do not.
+
+    Laws under which nothing was judged are named, each with the measured friction that it does not match.
+    """
+    count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.dependent]
+    others = ", ".join(laws.laws[1:])
+    alike = f"{count - len(of_one)} of {count} conclusions have the same judgement"
+    lines = [f"{alike} under every law that preserves what is measured ({others})."]
+    if of_one:
+        lines.append(f"These depend on the law: {listed(of_one, 'and')}.")
+    lines += [f"{law} does not keep {listed([SHOWN[k] for k in lost], 'and')}." for law, lost in laws.left_out.items()]
+    return lines
+
+
+def laws_rows(laws: ConclusionsByLaw) -> list[tuple[str, list[str]]]:
+    """Return the judgement of every claim under each law, as table rows."""
+    return [(c.claim.id, [_judgement_by_law(c, law) for law in laws.laws]) for c in laws.conclusions]
+
+
+def _judgement_by_law(conclusion: ConclusionByLaw, law: str) -> str:
+    turned = conclusion.turned(law)
+    return f"{conclusion.judgement(law)}: {'; '.join(turned)}" if turned else str(conclusion.judgement(law))
+
+
+def laws_document(laws: ConclusionsByLaw) -> dict[str, Any]:
+    """Return the judgements under each law for the JSON document."""
+    return {
+        "laws": list(laws.laws),
+        "left_out": {law: [SHOWN[kind] for kind in lost] for law, lost in laws.left_out.items()},
+        "conclusions": [
+            {
+                "id": conclusion.claim.id,
+                "claim": conclusion.claim.text,
+                "judgements": {law: conclusion.judgement(law) for law in laws.laws},
+                "turned": {law: list(turned) for law in laws.laws if (turned := conclusion.turned(law))},
+            }
+            for conclusion in laws.conclusions
+        ],
+    }
+
 
 SHORT = 160
 """Longest short form of a finding, in letters."""
@@ -207,3 +263,105 @@ def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
         (item.claim, item.criterion, f"{item.printed:g}", f"{item.read:.3g}", f"{item.read / item.printed:.2f}")
         for item in plausible.fit.numbers
     ]
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A remark on a claim, made only if one criterion of the claim turns out as expected.
+
+    `part` is the number of the criterion, from 0. If `met` is true, the remark applies where the criterion is met,
+    otherwise where it is not met.
+    """
+
+    claim: str
+    part: int
+    met: bool
+    text: str
+
+    @property
+    def command(self) -> str:
+        """Return the command that judges the claim alone, and shows more about it."""
+        return f"friso reproduce --only {self.claim}"
+
+
+OTHER_REASON = (
+    Remark(
+        "F8", 0, True,
+        "The loop is stable at every speed if it is linearised before the bristles deflect. In steady sliding, "
+        "friction that falls with the speed makes it unstable at low speeds.",
+    ),
+    Remark(
+        "S41M", 0, False,
+        "More mass ends hunting, but after this move not because the integral action builds up more slowly.",
+    ),
+    Remark(
+        "S342F", 0, False,
+        "A higher crossover settles sooner, but the loop is also stable within a factor of 3 of the first "
+        "eigenfrequency.",
+    ),
+    Remark(
+        "S323C", 1, False,
+        "ode23s is the cheaper solver, but ode45 is not unstable: it costs more, and is right.",
+    ),
+)  # fmt: skip
+"""Remarks on statements that are right, but for another reason than the thesis gives."""
+
+SLIPS = (
+    Remark(
+        "F7", 3, True,
+        "Table 1 prints the joint and the touched limiter in series; they carry the force side by side. With the "
+        "formula as printed there is no second pair of modes.",
+    ),
+    Remark(
+        "F7", 5, True,
+        "The limiter sets which mass line is seen, and not whether the cart sticks.",
+    ),
+    Remark(
+        "F18", 1, False,
+        "2.5 kg instead of 1.7, and 0.75 instead of 0.5, would be one slip: a motor that gives 0.68 and 0.67 of the "
+        "force assumed would show both.",
+    ),
+    Remark(
+        "F14A", 1, False,
+        "A shorter stroke does not allow a stiffer joint: the force at full stroke does not set the limit.",
+    ),
+)  # fmt: skip
+"""Remarks on slips in the text of the thesis."""
+
+
+@dataclass(frozen=True)
+class RemarkRow:
+    """A remark that applies, with the number that shows it."""
+
+    remark: Remark
+    number: str
+
+
+def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[RemarkRow]:
+    """Return the remarks that apply, with the numbers that show it.
+
+    A remark applies if this run has judged its criterion, with the result that the remark expects.
+    """
+    rows = []
+    for remark in of:
+        finding = verdicts[remark.claim].finding
+        if finding and remark.part < len(finding.stated) and finding.stated[remark.part].holds == remark.met:
+            rows.append(RemarkRow(remark, short(finding.stated[remark.part].number)))
+    return rows
+
+
+def as_far(verdict: ClaimVerdict) -> str:
+    """Say in brackets how many criteria of a claim simulation decides; "" if it decides all."""
+    pattern = verdict.finding.pattern if verdict.finding else ()
+    decided = len(pattern) - pattern.count(None)
+    return f" (simulation decides {decided} of {len(pattern)} criteria)" if decided < len(pattern) else ""
+
+
+def more_right(verdicts: Iterable[ClaimVerdict]) -> int:
+    """Return how many claims hold that are not in the thesis's own list of conclusions."""
+    return sum(verdict.judgement == "holds" and not verdict.claim.listed for verdict in verdicts)
+
+
+def right(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
+    """Return the verdicts on claims that hold and are in the thesis's own list of conclusions."""
+    return [verdict for verdict in verdicts if verdict.judgement == "holds" and verdict.claim.listed]

@@ -49,15 +49,13 @@ def _damping(result: InPosition) -> str:
     if recovered[best] < 0.01:
         return "More damping in the joint recovers none of the difference."
     return (
-        f"Damping in the joint recovers little of the difference: {percent(recovered[ten])} at "
-        f"{factor[ten]:.3g} times its "
-        f"own {with_unit(result.own_damping, 'N*s/m')}, and at most {percent(recovered[best])}, at "
+        f"Damping in the joint recovers little of the difference: {percent(recovered[ten])} at {factor[ten]:.3g} times "
+        f"its own {with_unit(result.own_damping, 'N*s/m')}, and at most {percent(recovered[best])}, at "
         f"{with_unit(result.damping[best], 'N*s/m')}. The rest is due to stiffness: the locked stage is held by the "
         "sticking bearing, the free one only by the joint and the controller."
         if recovered[ten] < 0.5
         else f"Damping in the joint recovers {percent(recovered[ten])} of the difference at {factor[ten]:.3g} "
-        "times its own "
-        f"{with_unit(result.own_damping, 'N*s/m')}, and {percent(recovered[best])} at "
+        f"times its own {with_unit(result.own_damping, 'N*s/m')}, and {percent(recovered[best])} at "
         f"{with_unit(result.damping[best], 'N*s/m')}."
     )
 
@@ -89,13 +87,7 @@ def _spectra(result: InPosition) -> Figure:
     above = slice(1, None)
     for case, colour in COLOURS.items():
         lines = [
-            Series(
-                result.frequencies[above],
-                result.runs[case, source].spectrum[0, above],
-                source,
-                line,
-                width=width,
-            )
+            Series(result.frequencies[above], result.runs[case, source].spectrum[0, above], source, line, width=width)
             for source, line, width in zip(SOURCES, (*PARTS, colour), (1.0, 1.0, 1.0, 1.6), strict=True)
         ]
         densities = Axis("Amplitude density", "m/Hz^0.5", (1e-14, 1e-6), log=True)

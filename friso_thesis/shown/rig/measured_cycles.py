@@ -13,15 +13,7 @@ from friso.shown.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.rig.outcome import Outcome
-from friso_thesis.studies.rig.measured_cycles import (
-    AS_SLOW,
-    BINS,
-    COULOMB,
-    MOTORS,
-    SIMILAR,
-    STATIC,
-    CycleComparison,
-)
+from friso_thesis.studies.rig.measured_cycles import AS_SLOW, BINS, COULOMB, MOTORS, SIMILAR, STATIC, CycleComparison
 
 AREA = "#cfdfee"
 LATE = 10.0
@@ -85,8 +77,7 @@ def _rolling(result: CycleComparison) -> str:
     parts = [f"{percent(share)} at {percent(size)}" for share, size in zip(swings, result.harmonics, strict=True)]
     return (
         f"With rolling elements of {with_unit(result.pitch, 'm')} pitch, the following shares keep swinging, by first "
-        "harmonic: "
-        f"{', '.join(parts)}."
+        f"harmonic: {', '.join(parts)}."
     )
 
 
@@ -101,11 +92,10 @@ def _irregular(result: CycleComparison) -> str:
         np.median(values[swings]) for values in (result.field.period_scatter, result.field.height_scatter)
     )
     return (
-        f"Such cycles are lopsided: one side is {sides:.2g} times as high as the other (median). From cycle to "
-        f"cycle they repeat: the period scatters by {percent(scatter, 3)}, the heights by {percent(heights, 3)} "
-        "of the swing. "
-        "Friction at a given place is the same every time, so a varying rail does not make a cycle irregular; what "
-        "changes from cycle to cycle is not in the model."
+        f"Such cycles are lopsided: one side is {sides:.2g} times as high as the other (median). From cycle to cycle "
+        f"they repeat: the period scatters by {percent(scatter, 3)}, the heights by {percent(heights, 3)} of the "
+        "swing. Friction at a given place is the same every time, so a varying rail does not make a cycle irregular; "
+        "what changes from cycle to cycle is not in the model."
     )
 
 
@@ -116,16 +106,14 @@ def _levels(result: CycleComparison) -> str:
     if not len(matches):
         best = np.unravel_index(np.nanargmax(slow), slow.shape)
         return (
-            f"On an even rail none of the friction levels tried makes the cycle that slow; the slowest has "
-            f"{slow[best]:.3g} times the period at "
-            f"{swing[best]:.3g} times the swing ({_level(*best)})."
+            "On an even rail none of the friction levels tried makes the cycle that slow; the slowest has "
+            f"{slow[best]:.3g} times the period at {swing[best]:.3g} times the swing ({_level(*best)})."
         )
     closest = sorted(map(tuple, matches), key=lambda cell: abs(np.log(swing[cell])) + abs(np.log(slow[cell] / 2)))
     named = [f"{_level(*cell)} ({slow[cell]:.3g} and {swing[cell]:.3g})" for cell in closest[:3]]
     return (
         f"On an even rail {len(matches)} of {slow.size} other motors and friction levels make it that slow; closest to "
-        "twice the period at the same swing (period and swing over those of the file): "
-        f"{'; '.join(named)}."
+        f"twice the period at the same swing (period and swing over those of the file): {'; '.join(named)}."
     )
 
 
@@ -264,16 +252,8 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         {"from": low, "to": high, **share_document(share), "period_over_even": slow}
         for low, high, (share, slow) in zip(BINS, BINS[1:], result.by_asymmetry, strict=False)
     ]
-    field = {
-        "deviations": result.deviations,
-        "correlation_lengths_m": result.lengths,
-        "asymmetry": result.asymmetry,
-    }
-    rolling = {
-        "harmonics": result.harmonics,
-        "pitch_m": result.pitch,
-        "asymmetry": result.rolling_asymmetry,
-    }
+    field = {"deviations": result.deviations, "correlation_lengths_m": result.lengths, "asymmetry": result.asymmetry}
+    rolling = {"harmonics": result.harmonics, "pitch_m": result.pitch, "asymmetry": result.rolling_asymmetry}
     levels = {"motors": np.array(MOTORS), "static_over_file": np.array(STATIC), "coulomb_over_file": np.array(COULOMB)}
     return {
         "criteria": CRITERIA,

@@ -3,7 +3,3 @@
 The groups are dimensionless. The edge is swept over the groups. Laws are fitted to it, and their errors are taken from
 samples that were not used for the fit.
 """
-
-from friso_thesis.studies.guideline.compute import SAMPLES, Fit, Guideline, guideline
-
-__all__ = ["SAMPLES", "Fit", "Guideline", "guideline"]

@@ -11,8 +11,7 @@ import numpy as np
 from friso.quantities import percent
 from friso_thesis.studies.guideline.edges import ABOVE, BELOW, KINDS
 from friso_thesis.studies.guideline.edges import UNKNOWN as NOT_TOLD
-from friso_thesis.studies.guideline.thesis_rig import ThesisCase
-from friso_thesis.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
+from friso_thesis.studies.guideline.worked import CLAIMED_AT, STUDIED, ThesisCase, Worked
 from friso_thesis.studies.thesis.reading import OWN, about
 
 HOLDS, IN_PART, DIFFERS, UNKNOWN = "holds", "holds in part", "differs", "unknown"
@@ -152,9 +151,8 @@ def _edges(worked: Worked) -> GuidelineClaim:
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
         text,
-        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of "
-        f"{OWN.about:g} of both "
-        "numbers",
+        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of {OWN.about:g} of "
+        "both numbers",
         _judgement(near),
     )
 

@@ -13,7 +13,7 @@ from scipy.stats import qmc
 
 from friso.hunting import Ensemble
 from friso.progress import Tally
-from friso_thesis.studies.guideline.edges import Edges, concatenate_edges, find_edges
+from friso_thesis.studies.guideline.edges import Edges, find_edges
 from friso_thesis.studies.guideline.groups import flat_of
 from friso_thesis.studies.kept_work import KeptWork
 
@@ -75,7 +75,7 @@ class Sweep:
     def take(self, which: np.ndarray) -> Sweep:
         """Select samples by indices or by a boolean array."""
         values = {name: value[which] for name, value in self.values.items()}
-        return Sweep(values, self.locked[which], Edges(*(getattr(self.edges, e.name)[which] for e in fields(Edges))))
+        return Sweep(values, self.locked[which], self.edges.take(which))
 
     @property
     def edge(self) -> np.ndarray:
@@ -92,7 +92,7 @@ def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
     """Return the samples of all sweeps of one kind."""
     values = {name: np.concatenate([sweep.values[name] for sweep in sweeps]) for name in sweeps[0].values}
     return Sweep(
-        values, np.concatenate([sweep.locked for sweep in sweeps]), concatenate_edges([sweep.edges for sweep in sweeps])
+        values, np.concatenate([sweep.locked for sweep in sweeps]), Edges.joined(sweep.edges for sweep in sweeps)
     )
 
 
@@ -164,7 +164,7 @@ def _in_parts(
         parts.append(keep.part(title, lambda subset=subset, part=part: find_edges(_stages(subset), grid[part])))
         if len(keep.parts) > done:
             tally.add(STEPS[label] * len(grid[part]), label)
-    return concatenate_edges(parts)
+    return Edges.joined(parts)
 
 
 def _stages(values: Mapping[str, np.ndarray]) -> Callable[[np.ndarray, np.ndarray], Ensemble]:

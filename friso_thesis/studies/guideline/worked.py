@@ -1,6 +1,10 @@
 """Work through the steps from friction range and crossover limit to an isolator.
 
 The machine is the thesis rig.
+
+Find how far above the crossover a joint's parasitic mode has to be, by linear analysis.
+
+Compute the edge of hunting of the thesis rig by the laws and by simulation, side by side.
 """
 
 from __future__ import annotations
@@ -14,10 +18,183 @@ import numpy as np
 from scipy.optimize import brentq
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
-from friso_thesis.studies.guideline.parasitic import margin_with
+from friso.frequency import crossover
+from friso.frequency.crossover import Range, limits
+from friso.hunting import Ensemble, find_margin
+from friso.stage import Stage
+from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, find_edges
+from friso_thesis.studies.guideline.groups import values_of
+from friso_thesis.studies.guideline.laws import FittedLaw
 from friso_thesis.studies.guideline.sweeps import LOCKED_BOX
-from friso_thesis.studies.guideline.thesis_rig import FREE_GRID, Laws, ThesisCase, cases, direct, plain_rig
 from friso_thesis.studies.thesis.studies import thesis_rig
+
+RIGID_GRID = np.geomspace(2.0, 60.0, 14)
+FREE_GRID = np.geomspace(1.0, 20.0, 28)
+"""Crossovers tried for the rig [Hz]. There are more than in the sweeps, because some cycles with a free joint cannot be
+closed."""
+
+RigChanges = Mapping[str, Any]
+"""Keys that differ from those of the rig, with SI values."""
+
+
+@dataclass(frozen=True)
+class ThesisCase:
+    """A stage like the rig: what is changed, and its edge [Hz] by the law and as computed.
+
+    The computed edge is NaN if none was found; `kind`, one of `KINDS`, then gives the reason.
+    """
+
+    changes: RigChanges
+    law: float
+    computed: float
+    kind: str = FLIP
+
+    @property
+    def ranked(self) -> float:
+        """Return the computed edge [Hz] for comparisons.
+
+        The result is 0 if the edge lies below the crossovers tried, infinite if above, and NaN if unknown.
+        """
+        return {BELOW: 0.0, ABOVE: np.inf}.get(self.kind, self.computed)
+
+
+@dataclass(frozen=True)
+class Laws:
+    """The law of the edge for a locked joint, and the one for a free joint, which builds on it."""
+
+    locked: FittedLaw
+    free: FittedLaw
+
+    def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
+        """Return the edge [Hz] of stages with the joint locked, by the law.
+
+        Stages are given by keys [SI] with numbers or arrays.
+        """
+        values, rate = _shaped(flat)
+        return self.locked.edge(values) * rate
+
+    def free_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
+        """Return the edge [Hz] of stages with the joint free, by both laws.
+
+        Stages are given by keys [SI] with numbers or arrays.
+        """
+        values, rate = _shaped(flat)
+        return self.free.edge(values, self.locked.edge(values)) * rate
+
+    def rates(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """Return all frequencies [Hz] that enter the two laws, by name.
+
+        Stages are given by keys [SI] with numbers or arrays.
+        """
+        values, rate = _shaped(flat)
+        return {
+            quantity.name: np.exp(log) * rate
+            for law in (self.locked, self.free)
+            for quantity, log in zip(law.law.rates, law.log_rates(values), strict=True)
+        }
+
+
+def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return the dimensionless groups of stages by name, and natural frequencies [Hz].
+
+    The groups are arrays of one shape. Each frequency is that of cart and stage together on the bristle stiffness.
+    """
+    values = values_of(flat)
+    rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
+    arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))
+    return dict(zip(values, arrays, strict=True)), np.atleast_1d(rate)
+
+
+def plain_rig(part: str = "") -> dict[str, Any]:
+    """Return the rig's keys [SI] without its parasitic mode.
+
+    The joint is left out too, unless `part` is "joint".
+    """
+    dropped = "parasitic." if part == "joint" else ("parasitic.", "joint.")
+    return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
+
+
+def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
+    """Return the edges of the rig with each of several changes, by the law and as computed.
+
+    If `free`, the joint is free, otherwise the rig is one rigid mass.
+    """
+    mode = any("parasitic.frequency" in change for change in changes)
+    base = thesis_rig().flat() if mode else plain_rig("joint" if free else "")
+    keys = {key for change in changes for key in change}
+    flat = base | {key: np.array([change.get(key, base[key]) for change in changes], float) for key in keys}
+
+    def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
+        subset = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
+        return Ensemble.held(subset | {CROSSOVER: crossover}, len(which))
+
+    grid = FREE_GRID if free else RIGID_GRID
+    edges = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))
+    with_joint = plain_rig("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
+    law = np.broadcast_to(laws.free_edge(with_joint) if free else laws.locked_edge(with_joint), edges.kind.shape)
+    columns = law.tolist(), edges.crossover.tolist(), edges.kind.astype(str).tolist()
+    return [ThesisCase(*row) for row in zip(changes, *columns, strict=True)]
+
+
+def direct(stage: Stage) -> float:
+    """Return the edge [Hz] that `friso check` finds for a hunting stage; NaN without one."""
+    edge = find_margin(stage, attracting=True)
+    return edge.crossover if edge and edge.crossover else np.nan
+
+
+FREQUENCIES = (100.0, 200.0, 300.0, 600.0, 1000.0)
+"""Frequencies of parasitic modes [Hz]."""
+
+DAMPING_RATIOS = (0.01, 0.001)
+"""Damping ratios of the mode: that of the rig's stage file, and that of bare leaf springs."""
+
+DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
+"""Sample time of the thesis's drive (Sec. 3.5), and a delay of one sample."""
+
+
+@dataclass(frozen=True)
+class ParasiticLimits:
+    """Range of crossovers that a parasitic mode allows, with the joint locked and free.
+
+    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] contains the stage's own crossover. In it the
+    modulus margin is at least 0.5 in the limit cases, and in all states stuck under a bias force. The range is None if
+    the stage lacks this margin at its own crossover.
+    """
+
+    frequency: float
+    damping_ratio: float
+    locked: Range | None
+    free: Range | None
+
+
+def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
+    """Return the crossovers that a stage may have with each of several parasitic modes.
+
+    Each mode takes the place of the stage's own. The stage is sampled like the thesis's drive.
+    """
+    modes = []
+    for damping in DAMPING_RATIOS:
+        for frequency in FREQUENCIES:
+            mode = {"parasitic.frequency": f"{frequency!r} Hz", "parasitic.damping_ratio": damping, **DRIVE}
+            flats = [stage.replace({**mode, "joint.locked": held}).flat() for held in (True, False)]
+            locked, free = (holding(limits(flat).comfortable, flat[CROSSOVER]) for flat in flats)
+            modes.append(ParasiticLimits(frequency, damping, locked, free))
+    return modes
+
+
+def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
+    """Return the least modulus margin of a stage in its settled states.
+
+    Settled states are the limit cases, and all states stuck under a bias force. `changes` are keys that are changed
+    first, in SI. The stage is sampled like the thesis's drive. The margin is 0 if a state is not stable.
+    """
+    return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
+
+
+def holding(ranges: Sequence[Range], crossover: float) -> Range | None:
+    """Return the range [Hz] that contains a crossover [Hz]; None if none does."""
+    return next((window for window in ranges if window[0] <= crossover <= window[1]), None)
+
 
 STATIC = (1.0, 1.5, 2.0, 2.5)
 """Static friction of the rig [N]: the range that the thesis measured (Fig. 20). Table 2 has 3 N."""
@@ -178,11 +355,7 @@ def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
     mode = f"parasitic mode at {stage.flat()['parasitic.frequency']:g} Hz"
     return (
         WorkedMachine(f"one rigid mass of {flat['masses.cart'] + flat['masses.stage']:g} kg", locked, direct(rigid)),
-        WorkedMachine(
-            f"joint locked by its fixtures, {mode}",
-            locked,
-            direct(stage.replace({"joint.locked": True})),
-        ),
+        WorkedMachine(f"joint locked by its fixtures, {mode}", locked, direct(stage.replace({"joint.locked": True}))),
         WorkedMachine(f"joint free, {mode}", free, direct(stage.replace({CROSSOVER: "5 Hz"}))),
     )
 
@@ -264,11 +437,7 @@ def _studies() -> dict[str, tuple[Sequence[Mapping[str, float]], bool]]:
         {"masses.cart": mass * (1 - share), "masses.stage": mass * share} for share in (0.15, 0.3, 0.45, 0.6, 0.8)
     ]
     heavier = [
-        {
-            "masses.cart": n * flat["masses.cart"],
-            "masses.stage": n * flat["masses.stage"],
-            TUNED_MASS: n * mass,
-        }
+        {"masses.cart": n * flat["masses.cart"], "masses.stage": n * flat["masses.stage"], TUNED_MASS: n * mass}
         for n in (0.5, 1.0, 1.5, 2.0, 3.0)
     ]
     return {

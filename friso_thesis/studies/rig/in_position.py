@@ -6,18 +6,18 @@ The experiment shows which disturbance moves the stage, and what damping recover
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.signal import welch
 
+from friso.engine.arrays import ArrayColumns
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.rig.moves_on_rails import crossover, crossover_key, move, with_joint
-from friso.studies.rig.outcome import Outcome, rig_log
-from friso.studies.rig.sizes import interval
+from friso.studies.rig.outcome import Outcome, interval, rig_log
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import MoveTask, standing
 
@@ -52,7 +52,7 @@ SOURCES = ("encoder", "amplifier", "floor", "all")
 
 
 @dataclass(frozen=True)
-class Standstill:
+class Standstill(ArrayColumns):
     """Deviation from the mean [m] of runs at a standstill.
 
     `true` is the true deviation, and `read` the one that the encoder reads, each as RMS and largest value, shape (runs,
@@ -63,10 +63,6 @@ class Standstill:
     read: np.ndarray
     mean: np.ndarray
     spectrum: np.ndarray
-
-    def of_run(self, run: int) -> Standstill:
-        """Return the standstill of one run, by its number."""
-        return Standstill(*(getattr(self, entry.name)[[run]] for entry in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -141,7 +137,7 @@ def in_position(
             task = replace(noisy, injected=np.outer([*factors.values()], noisy.injected))
             recorded = _recorded(fixed, task, seed, _silenced(fixed, factors), len(factors))
             stands = _standstill(recorded, SETTLING)
-            runs |= {(case, source): stands.of_run(row) for row, source in enumerate(factors)}
+            runs |= {(case, source): stands.take([row]) for row, source in enumerate(factors)}
             if "all" in factors:
                 recordings[case] = (recorded, fixed)
                 after[case] = _standstill(_recorded(fixed, after_move, seed), SETTLING)

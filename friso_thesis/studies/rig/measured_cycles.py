@@ -8,7 +8,7 @@ amplitude.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -22,7 +22,6 @@ from friso.stage import Stage
 from friso.studies.rig.experiments.hunting import Trace
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
-    concatenate_runs,
     crossover,
     distance,
     move,
@@ -210,11 +209,9 @@ def started(
     """
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [run_moves(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
-    all_runs = concatenate_runs(runs).shaped(len(tasks), count)
+    all_runs = RailRuns.joined(runs).shaped(len(tasks), count)
     first = np.argmax(all_runs.swings, axis=0)
-    return RailRuns(
-        **{entry.name: getattr(all_runs, entry.name)[first, np.arange(count)] for entry in fields(RailRuns)}
-    )
+    return all_runs.take((first, np.arange(count)))
 
 
 def moves_on_varied_rails(
@@ -279,10 +276,7 @@ def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, Rai
     ideal = {"drive.motor_constant_ratio": 1.0, **flat}
     lanes = {key: np.array([changes.get(key, ideal[key]) for changes in changed.values()]) for key in keys}
     cycles = started(stage, seed, lanes, len(changed), progress, "other drives")
-    return {
-        name: RailRuns(**{entry.name: getattr(cycles, entry.name)[[row]] for entry in fields(RailRuns)})
-        for row, name in enumerate(changed)
-    }
+    return {name: cycles.take([row]) for row, name in enumerate(changed)}
 
 
 def _with_slowest(result: CycleComparison, even: Stage, seed: int, seeds: np.ndarray) -> CycleComparison:

@@ -104,10 +104,7 @@ def stroke_crossover(
     `strokes` and `factors` are relative to the stage's stroke and crossover [-].
     """
     sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
-    cases = {
-        "joint.stroke": np.repeat(sizes, len(frequencies)),
-        crossover_key(stage): np.tile(frequencies, len(sizes)),
-    }
+    cases = {"joint.stroke": np.repeat(sizes, len(frequencies)), crossover_key(stage): np.tile(frequencies, len(sizes))}
     numbers = numbers_of(seed, len(sizes) * len(frequencies), len(seeds))
     runs = run_moves(stage, move(stage), numbers, on_rails(stage, cases, seeds), progress, "moves, joint free")
     return StrokeCrossover(

@@ -17,7 +17,6 @@ from friso.equations.motions.there_and_back import CRUISE
 from friso.progress import silent
 from friso.stage import Stage
 from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT
-from friso.studies.rig.excitation import excite
 from friso.studies.rig.experiments.frf import (
     SETTINGS,
     MeasuredLoop,
@@ -30,7 +29,6 @@ from friso.studies.rig.experiments.frf import (
 )
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
-    concatenate_runs,
     crossover,
     distance,
     move,
@@ -41,8 +39,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import rig_log
-from friso.studies.rig.sizes import freed, locked_stage, pace, travel
+from friso.studies.rig.outcome import excite, freed, locked_stage, pace, rig_log, travel
 from friso_thesis.studies.rig.in_position import InPosition, in_position
 from friso_thesis.studies.rig.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover, limits_of_crossover
@@ -148,7 +145,7 @@ def moves(stage: Stage) -> MovesOnRails:
     first, second = (on_rails(machine, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
     loose = run_moves(free, move(machine), numbers_of(SEED, 1, RAILS), first)
     tasks = [released(machine, share * distance(machine)) for share in DISPLACEMENTS]
-    let_go = concatenate_runs([run_moves(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
+    let_go = RailRuns.joined([run_moves(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
     return MovesOnRails(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from friso.hunting import Bifurcation, KeyRange, Space, edge_curves
 from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
+from friso_thesis.studies.thesis.claims import by_attraction, by_peak_count
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.studies import ThesisStudy
-from friso_thesis.studies.thesis.ways import by_attraction, by_peak_count
 
 if TYPE_CHECKING:
     import xarray as xr

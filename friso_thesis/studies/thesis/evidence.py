@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 from friso.engine.simulate import simulate
 from friso.equations.controllers.van_dijk import ALPHA
-from friso.studies.request import Request
+from friso.studies.study import Request
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Response
 from friso_thesis.studies.thesis.experiments import Experiments
-from friso_thesis.studies.thesis.judges.arguments import HEAVY, LIGHT
+from friso_thesis.studies.thesis.judges.arguments import HEAVIEST, HEAVY, HIGH_ALPHA, LIGHT, LOW_ALPHA
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
-from friso_thesis.studies.thesis.judges.step_by_step import HEAVIEST, HIGH_ALPHA, LOW_ALPHA
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS, analysed
 from friso_thesis.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, masses, thesis_rig

@@ -15,7 +15,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from friso.engine.simulate import simulate
-from friso.frequency.describing.mass_line import mass_line
+from friso.frequency.describing.response import mass_line
 from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.identification.logs.log import Log
@@ -25,7 +25,7 @@ from friso.identification.readings.passes import passes
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.experiments.constant_speed import passes_log
-from friso.studies.rig.sizes import freed, locked_stage, pace
+from friso.studies.rig.outcome import freed, locked_stage, pace
 from friso_thesis.studies.rig.in_position import InPosition
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import (
@@ -153,66 +153,46 @@ class Experiments:
     Constant speeds are run with the joint free, and locked; the loops with the real drive.
     """
 
+    locked_line: LockedLine
+    """Identification of the locked rig (Fig. 17)."""
+
+    joint_steps: JointSteps
+    """Position steps of the joint (Fig. 19)."""
+
+    slow_motion: tuple[SlowMotion, ...]
+    """Slow motion at several speeds (Fig. 20)."""
+
+    constant_speed: tuple[ConstantSpeed, ConstantSpeed]
+    """Motion at constant speed with the joint free and locked (Fig. 21)."""
+
+    rig_loops: RigLoops
+    """Loops and plants of the rig with its real drive (Fig. 17, 18, 22, 23)."""
+
+    moves: MovesOnRails
+    """Moves on several rails (Fig. 24, 25)."""
+
+    grid: StrokeCrossover
+    """Moves over strokes and crossovers (Fig. 26)."""
+
+    cycles: CyclesOnRails
+    """Cycles on even and varied rails (Fig. 27)."""
+
+    standstill: InPosition
+    """Motion of the rig at a standstill under several disturbances (Fig. 28)."""
+
+    traces: RailTraces
+    """Logs of single moves (Fig. 24, 25, 27)."""
+
     def __init__(self, stage: Stage, kept: Kept = NOT_KEPT) -> None:
         self._stage_file, self._kept = stage.to_toml(), kept
-        self._results: dict[str, Any] = {}
 
-    @property
-    def locked_line(self) -> LockedLine:
-        """Return the identification of the locked rig (Fig. 17)."""
-        return self._result(LINE)
-
-    @property
-    def joint_steps(self) -> JointSteps:
-        """Return the position steps of the joint (Fig. 19)."""
-        return self._result(STEPPED)
-
-    @property
-    def slow_motion(self) -> tuple[SlowMotion, ...]:
-        """Return the slow motion at several speeds (Fig. 20)."""
-        return self._result(SLIPS)
-
-    @property
-    def constant_speed(self) -> tuple[ConstantSpeed, ConstantSpeed]:
-        """Return the motion at constant speed with the joint free and locked (Fig. 21)."""
-        return self._result(SPEEDY)
-
-    @property
-    def rig_loops(self) -> RigLoops:
-        """Return loops and plants of the rig with its real drive (Fig. 17, 18, 22, 23)."""
-        return self._result(BUILT)
-
-    @property
-    def moves(self) -> MovesOnRails:
-        """Return moves on several rails (Fig. 24, 25)."""
-        return self._result(MOVES)
-
-    @property
-    def grid(self) -> StrokeCrossover:
-        """Return moves over strokes and crossovers (Fig. 26)."""
-        return self._result(GRID)
-
-    @property
-    def cycles(self) -> CyclesOnRails:
-        """Return cycles on even and varied rails (Fig. 27)."""
-        return self._result(ON_RAILS)
-
-    @property
-    def standstill(self) -> InPosition:
-        """Return the motion of the rig at a standstill under several disturbances (Fig. 28)."""
-        return self._result(STANDSTILL)
-
-    @property
-    def traces(self) -> RailTraces:
-        """Return logs of single moves (Fig. 24, 25, 27)."""
-        return self._result(TRACES)
-
-    def _result(self, name: str) -> Any:
-        if name not in self._results:
-            kind = get_type_hints(vars(Experiments)[name].fget)["return"]
-            about = ("experiment", name, self._stage_file)
-            self._results[name] = self._kept.result(about, kind, partial(_experiment, name, self._stage_file))
-        return self._results[name]
+    def __getattr__(self, name: str) -> Any:
+        """Run an experiment that is not among the attributes yet."""
+        if name not in _RUNS:
+            raise AttributeError(name)
+        about, kind = ("experiment", name, self._stage_file), get_type_hints(Experiments)[name]
+        setattr(self, name, self._kept.result(about, kind, partial(_experiment, name, self._stage_file)))
+        return vars(self)[name]
 
 
 @lru_cache(maxsize=64)

@@ -14,12 +14,21 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.laws.conversion import ELEMENTS, LawConversion, MeasuredKind, compared, measure_friction
 from friso.studies.laws.verdicts import kept_laws
-from friso_thesis.studies.thesis.claims import Claim, ClaimJudgement, Evidence, Finding, Response, claims, registered
+from friso_thesis.studies.thesis.claims import (
+    Claim,
+    ClaimJudgement,
+    Evidence,
+    Finding,
+    Response,
+    by_peak_count,
+    by_way,
+    claims,
+    registered,
+)
 from friso_thesis.studies.thesis.evidence import RESPONSES, maps_of, run_response
 from friso_thesis.studies.thesis.linear import analysed
 from friso_thesis.studies.thesis.reproduce import Reproduction
 from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
-from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 if TYPE_CHECKING:
     import xarray as xr

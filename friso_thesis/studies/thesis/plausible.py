@@ -15,15 +15,14 @@ import numpy as np
 from friso.engine.side_by_side import side_by_side
 from friso.escapes import one_line
 from friso.progress import Tally
-from friso.shares import Share, share
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Registered
+from friso.shares import Share, separation, share
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Registered, by_peak_count, by_way
 from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
 from friso_thesis.studies.thesis.space import OPEN, SEED, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
-from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 DRAWS, EVERY = 48, 3
 """Default number of joint draws, and interval between draws with linear analysis and experiments, which take longer
@@ -139,10 +138,7 @@ class Plausible:
 
 
 def plausible(
-    entries: Mapping[str, Registered],
-    draws: int,
-    kept: Kept = NOT_KEPT,
-    tally: Tally | None = None,
+    entries: Mapping[str, Registered], draws: int, kept: Kept = NOT_KEPT, tally: Tally | None = None
 ) -> Plausible:
     """Judge the claims for `draws` random choices of the values that the thesis leaves open.
 
@@ -215,7 +211,7 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
 
 def _failure(error: Exception) -> Finding:
     """Return the finding for a claim that an error leaves undecided, for some open values."""
-    return Finding((Part("can be computed", False, one_line(f"{type(error).__name__}: {error}")),))
+    return Finding.of(Part("can be computed", False, one_line(f"{type(error).__name__}: {error}")))
 
 
 FAILED = "failed"
@@ -268,24 +264,19 @@ def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) ->
 
     The test is Mann and Whitney's, with Bonferroni's correction.
     """
-    from scipy.stats import mannwhitneyu  # 0.7 s to import
-
     if holds.all() or not holds.any():
         return
     values = [value for value in OPEN if enters(value, entry.needs, RESPONSES, PARTS)]
     every = []
     for value in values:
         numbers = np.array([one.values[value.name] for one in drawn])
-        test = mannwhitneyu(numbers[holds], numbers[~holds])
-        correlation = 2 * float(test.statistic) / (holds.sum() * (~holds).sum()) - 1
-        every.append(Separation(value.name, correlation, float(test.pvalue)))
+        every.append(Separation(value.name, *separation(numbers, holds)))
     chosen = [item for item in every if item.chance < DOUBT / len(values)]
     yield from sorted(chosen, key=lambda item: -abs(item.correlation))
 
 
 def _fit(
-    by_claim_tried: Mapping[str, Sequence[tuple[Draw, Finding | None]]],
-    own: Mapping[str, Finding],
+    by_claim_tried: Mapping[str, Sequence[tuple[Draw, Finding | None]]], own: Mapping[str, Finding]
 ) -> BestFit | None:
     """Return the draw, or friso's `own` choice, that fits the printed numbers best.
 

@@ -60,6 +60,17 @@ def reading() -> WordReading:
     return _READ.get()
 
 
+class _WordsNow:
+    """The words by which claims are judged now, read one by one."""
+
+    def __getattr__(self, word: str) -> float:
+        return getattr(reading(), word)
+
+
+words = cast("WordReading", _WordsNow())
+"""The reading by which claims are judged when a word of it is read."""
+
+
 @contextmanager
 def read_as(other: WordReading) -> Iterator[None]:
     """Judge claims by the reading `other` of the thesis's words within the block."""
@@ -92,45 +103,33 @@ class _NotedReading:
         return getattr(self._own, word)
 
 
-def _otherwise() -> dict[str, WordReading]:
-    factors = {
-        "about": ("about", (1.25, 2.0)),
-        "order": ("of the order of", (2.0, 10.0)),
-        "similar": ("similar", (1.25, 2.0)),
-    }
-    least = {"twice": ("nearly twice", (1.5, 1.9)), "unequal": ("unequal", (1.05, 1.25))}
-    shares = {
-        "few": ("few", (0.02, 0.1)),
-        "same": ("the same", (0.1, 0.25)),
-        "close": ("close", (0.05, 0.2)),
-    }
-    others = {
-        f"“{word}” as within a factor of {value:g}": replace(OWN, **{name: value})
-        for name, (word, values) in factors.items()
-        for value in values
-    }
-    others |= {
-        f"“{word}” as {'within' if name in ('same', 'close') else 'at most'} {percent(value)}": replace(
-            OWN, **{name: value}
-        )
-        for name, (word, values) in shares.items()
-        for value in values
-    }
-    others |= {
-        f"“{word}” as at least {value:g} times": replace(OWN, **{name: value})
-        for name, (word, values) in least.items()
-        for value in values
-    }
-    others |= {f"“half” as {percent(value)}": replace(OWN, half=value) for value in (0.3, 0.7)}
-    others |= {f"“long” as the upper {percent(1 - value)}": replace(OWN, long=value) for value in (0.25, 0.75)}
-    others |= {
-        f"“less regular” from a scatter of {percent(value)} on": replace(OWN, uneven=value) for value in (0.02, 0.1)
-    }
-    others |= {f"“trend” as a rank correlation of {value:g}": replace(OWN, trend=value) for value in (0.3, 0.7)}
-    return others | {f"“large” as {value:g} N s/m and more": replace(OWN, large=value) for value in (10.0, 1e3)}
+_OTHER_VALUES: Mapping[str, tuple[str, tuple[float, float]]] = {
+    "about": ("“about” as within a factor of {value:g}", (1.25, 2.0)),
+    "order": ("“of the order of” as within a factor of {value:g}", (2.0, 10.0)),
+    "similar": ("“similar” as within a factor of {value:g}", (1.25, 2.0)),
+    "few": ("“few” as at most {share}", (0.02, 0.1)),
+    "same": ("“the same” as within {share}", (0.1, 0.25)),
+    "close": ("“close” as within {share}", (0.05, 0.2)),
+    "twice": ("“nearly twice” as at least {value:g} times", (1.5, 1.9)),
+    "unequal": ("“unequal” as at least {value:g} times", (1.05, 1.25)),
+    "half": ("“half” as {share}", (0.3, 0.7)),
+    "long": ("“long” as the upper {rest}", (0.25, 0.75)),
+    "uneven": ("“less regular” from a scatter of {share} on", (0.02, 0.1)),
+    "trend": ("“trend” as a rank correlation of {value:g}", (0.3, 0.7)),
+    "large": ("“large” as {value:g} N s/m and more", (10.0, 1e3)),
+}
+"""Words of WordReading to how another reading of them is called, and its two values.
 
+In the text `share` is the value in percent, and `rest` what it leaves of the whole.
+"""
 
-OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
+OTHERWISE: Mapping[str, WordReading] = MappingProxyType(
+    {
+        text.format(value=value, share=percent(value), rest=percent(1 - value)): replace(OWN, **{word: value})
+        for word, (text, values) in _OTHER_VALUES.items()
+        for value in values
+    }
+)
 """Other reasonable readings, by the change. Each differs in one word, upward or downward."""
 
 
@@ -148,7 +147,7 @@ def about(value: float, expected: float, factor: float | None = None) -> bool:
 
     By default it is the factor of “about”.
     """
-    within = reading().about if factor is None else factor
+    within = words.about if factor is None else factor
     return expected / within <= value <= expected * within
 
 

@@ -14,7 +14,17 @@ from friso.errors import InputError
 from friso.frequency.bode import Bode, bode
 from friso.progress import Progress, Tally, silent
 from friso.quantities import quoted
-from friso_thesis.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
+from friso_thesis.studies.thesis.claims import (
+    Claim,
+    Evidence,
+    Finding,
+    Registered,
+    Response,
+    by_peak_count,
+    by_way,
+    claims,
+    registered,
+)
 from friso_thesis.studies.thesis.cycles import CyclesOnMap, Surveyed, map_cycles, survey
 from friso_thesis.studies.thesis.evidence import RESPONSES, evidence, map_of
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS, Experiments
@@ -24,7 +34,6 @@ from friso_thesis.studies.thesis.plausible import DRAWS, PARTS, Plausible, count
 from friso_thesis.studies.thesis.reading import others_of, read_as, words_read
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
-from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 if TYPE_CHECKING:
     import xarray as xr

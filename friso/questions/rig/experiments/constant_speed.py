@@ -14,9 +14,8 @@ from friso.questions.rig.outcome_view import OutcomeView
 from friso.shown.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.studies.rig.experiments.constant_speed import ConstantSpeedResult, Passes
-from friso.studies.rig.many_speeds import ManySpeeds, PlaceOnRail
+from friso.studies.rig.many_speeds import ManySpeeds, PlaceOnRail, Slow
 from friso.studies.rig.outcome import Outcome, RigLog
-from friso.studies.rig.slow_sliding import Slow
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 """Colours of the places."""

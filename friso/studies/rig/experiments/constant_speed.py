@@ -13,11 +13,20 @@ from friso.identification.readings.friction_position import FrictionPosition, fr
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.stage.transmission import moving_mass
-from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
-from friso.studies.rig.outcome import Outcome, RigLog, rig_log, stopped
-from friso.studies.rig.sizes import freed, interval, locked_stage, longest_travel, pace, travel
-from friso.studies.rig.slow_sliding import Slow, slow_sliding
+from friso.stage.tables import moving_mass
+from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, Slow, many_speeds, mean_friction, slow_sliding
+from friso.studies.rig.outcome import (
+    Outcome,
+    RigLog,
+    freed,
+    interval,
+    locked_stage,
+    longest_travel,
+    pace,
+    rig_log,
+    stopped,
+    travel,
+)
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
 

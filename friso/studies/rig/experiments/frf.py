@@ -16,9 +16,22 @@ from friso.identification.response.mass_line import mass_lines
 from friso.identification.response.response import FrequencyResponse
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.studies.rig.excitation import estimate_plant, excite, loop
-from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked_stage, pace, quicker, travel
+from friso.studies.rig.outcome import (
+    WIDE,
+    Outcome,
+    RigLog,
+    estimate_plant,
+    excite,
+    freed,
+    interval,
+    jointed,
+    locked_stage,
+    loop,
+    pace,
+    quicker,
+    rig_log,
+    travel,
+)
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import standing
 

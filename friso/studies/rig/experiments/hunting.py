@@ -19,7 +19,6 @@ from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
     at_crossovers,
-    concatenate_runs,
     distance,
     move,
     numbers_of,
@@ -30,8 +29,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, rig_log
-from friso.studies.rig.sizes import pace
+from friso.studies.rig.outcome import Outcome, pace, rig_log
 from friso.virtual_rig.run import RecordedRuns
 from friso.virtual_rig.task import MoveTask
 
@@ -181,7 +179,7 @@ def _moves_and_releases(
         ]
     )
     moves = {case: part.shaped(*shape) for case, part in zip(stages, runs, strict=False)}
-    return moves, concatenate_runs(runs[len(moved) :]).shaped(len(DISPLACEMENTS), *shape)
+    return moves, RailRuns.joined(runs[len(moved) :]).shaped(len(DISPLACEMENTS), *shape)
 
 
 def _startable(

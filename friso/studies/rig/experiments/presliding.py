@@ -18,9 +18,18 @@ from friso.quantities import percent
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.tables import friction_law
-from friso.studies.rig.excitation import Excitation, excite
-from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import friction, interval, locked_stage, pace, travel
+from friso.studies.rig.outcome import (
+    Excitation,
+    Outcome,
+    RigLog,
+    excite,
+    friction,
+    interval,
+    locked_stage,
+    pace,
+    rig_log,
+    travel,
+)
 from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import standing
 

@@ -17,8 +17,7 @@ from friso.errors import InputError
 from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import freed, friction, interval, pace, travel
+from friso.studies.rig.outcome import Outcome, RigLog, freed, friction, interval, pace, rig_log, travel
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import legs
 

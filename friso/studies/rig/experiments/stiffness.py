@@ -14,8 +14,7 @@ from friso.identification.experiments.steps import StepStiffness, stiffness_from
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
-from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import FIXED, freed, interval, pace
+from friso.studies.rig.outcome import FIXED, Outcome, RigLog, freed, interval, pace, rig_log
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import staircase
 

@@ -1,6 +1,11 @@
 """Judge what the thesis says about its controller (Sec. 3.2.4, 3.4.2, 4.2.1).
 
 It concerns two forms of the controller, where its crossover may lie, and the motor constant.
+
+Judge Eq. 1 and 2: joint and pre-sliding friction as springs in series.
+
+The stiffness of such springs is derived and differentiated. Both formulas are compared with the results, and Eq. 1 with
+the plant.
 """
 
 from __future__ import annotations
@@ -13,15 +18,83 @@ import sympy as sp
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, as_gains, numbers
 from friso.frequency.crossover import WANTED, settled_margin
 from friso.frequency.family import loops
-from friso.frequency.members import member
+from friso.frequency.members import in_series, member
 from friso.quantities import percent
 from friso.stage import loads
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
-from friso_thesis.studies.thesis.judges.identified_responses import CONSTANTS
+from friso_thesis.studies.thesis.judges.identified_in_time import CONSTANTS
 from friso_thesis.studies.thesis.linear import PLANT
+from friso_thesis.studies.thesis.linear.plants import Springs
 from friso_thesis.studies.thesis.maps import trend, trend_text, verdict_table
-from friso_thesis.studies.thesis.reading import reading
+from friso_thesis.studies.thesis.reading import words
 from friso_thesis.studies.thesis.settings import settings
+
+K_F, K_J = sp.symbols("k_f k_j", positive=True)
+
+PRINTED_STIFFNESS = in_series(K_F, K_J)
+"""Eq. 1 as printed."""
+
+PRINTED_SENSITIVITY = (K_J / K_F / (1 + K_J / K_F)) ** 2
+"""Eq. 2 as printed, with eta = K_J/K_F. It gives the change of the series stiffness with the stiffness of the
+friction."""
+
+
+@judges("E1", figure="Eq. 1, 2", needs=(PLANT,))
+def printed_formulas(evidence: Evidence) -> Finding:
+    """Judge both printed formulas against the balance of forces, and Eq. 1 against the plant."""
+    return Finding.of(
+        *judged_formulas(PRINTED_STIFFNESS, PRINTED_SENSITIVITY),
+        in_the_plant(PRINTED_STIFFNESS, evidence.analysis.springs),
+    )
+
+
+@cache
+def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, Part, Part]:
+    """Judge the given formulas, in K_F and K_J, against two springs that carry one force."""
+    force, middle, end = sp.symbols("F u x")
+    balance = sp.solve([K_F * middle - force, K_J * (end - middle) - force], [middle, end], dict=True)[0]
+    derived = sp.simplify(force / balance[end])
+    slope = sp.diff(derived, K_F)
+    limits = [sp.limit(slope_printed, *to) for to in ((K_J, 0), (K_F, sp.oo))]
+    relative = sp.simplify(slope * K_F / derived)
+    return (
+        Part(
+            "Eq. 1 equals force over displacement of two springs in series",
+            sp.simplify(derived - stiffness) == 0,
+            f"k_e = {_text(derived)}",
+        ),
+        Part(
+            "Eq. 2 equals the derivative of that stiffness with respect to k_f, for all k_f and k_j",
+            sp.simplify(slope - slope_printed) == 0,
+            f"d k_e / d k_f = {_text(sp.factor(slope))}; minus Eq. 2 as printed: "
+            f"{_text(sp.simplify(slope - slope_printed))}",
+        ),
+        Part(
+            "Eq. 2 vanishes with eta = k_j/k_f, whether k_j goes to 0 or k_f to infinity",
+            all(limit == 0 for limit in limits),
+            f"limits {limits[0]} and {limits[1]}; the relative sensitivity, (k_f/k_e) d k_e / d k_f = "
+            f"{_text(relative)}, vanishes too, but with eta instead of its square",
+        ),
+    )
+
+
+def _text(expression: sp.Basic) -> str:
+    """Write a SymPy expression in a readable form, as text."""
+    return str(expression).replace("**", "^").replace("*", " ")
+
+
+def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
+    """Judge a stiffness formula in K_F and K_J against the plant of the declared equations."""
+    eta = springs.joint / springs.bristles
+    expected = float(stiffness.subs({K_F: springs.bristles, K_J: springs.joint}))
+    return Part(
+        "Eq. 1 with k_f = sigma_0 is the force over displacement at rest of the plant linearised with a stuck cart, "
+        "its limiter free",
+        abs(springs.both / expected - 1) <= settings.exact_share,
+        f"plant {springs.both:.6g} N/m, Eq. 1 {expected:.6g} N/m; eta {eta:.3g}: an error of 1 % in k_f changes k_e by "
+        f"{eta / (1 + eta):.2g} %",
+    )
+
 
 S, K_P, TAU_Z, TAU_I, TAU_P = sp.symbols("s k_p tau_z tau_i tau_p", positive=True)
 
@@ -60,23 +133,21 @@ def judged_forms(gains: tuple[sp.Expr, sp.Expr, sp.Expr], tuned: dict[str, float
     values = [float(gain.subs({symbol: tuned[str(symbol)] for symbol in gain.free_symbols})) for gain in gains]
     plain = as_gains(**tuned)
     kp, ki, kd = values
-    return Finding(
-        (
-            Part(
-                "Eq. 6 with some gains, and the time constant of Eq. 7, is Eq. 7 for every s",
-                sp.simplify(law_of_gains(gains) - LAW_OF_RULES) == 0,
-                f"K_p = {_written(gains[0])}, K_i = {_written(gains[1])}, K_d = {_written(gains[2])}",
-                why="The two laws differ.",
-            ),
-            Part(
-                "by Eq. 8 these gains are positive",
-                min(values) > 0,
-                f"K_p {kp:.4g} N/m, K_i {ki:.4g} N/(m s), K_d {kd:.4g} N s/m; the coefficients of Eq. 7 itself are "
-                f"{plain['kp']:.4g}, {plain['ki']:.4g} and {plain['kd']:.4g}: its low-pass acts on all three terms, "
-                "that of Eq. 6 on the derivative alone",
-                why="A gain is negative.",
-            ),
-        )
+    return Finding.of(
+        Part(
+            "Eq. 6 with some gains, and the time constant of Eq. 7, is Eq. 7 for every s",
+            sp.simplify(law_of_gains(gains) - LAW_OF_RULES) == 0,
+            f"K_p = {_written(gains[0])}, K_i = {_written(gains[1])}, K_d = {_written(gains[2])}",
+            why="The two laws differ.",
+        ),
+        Part(
+            "by Eq. 8 these gains are positive",
+            min(values) > 0,
+            f"K_p {kp:.4g} N/m, K_i {ki:.4g} N/(m s), K_d {kd:.4g} N s/m; the coefficients of Eq. 7 itself are "
+            f"{plain['kp']:.4g}, {plain['ki']:.4g} and {plain['kd']:.4g}: its low-pass acts on all three terms, "
+            "that of Eq. 6 on the derivative alone",
+            why="A gain is negative.",
+        ),
     )
 
 
@@ -122,33 +193,31 @@ def judged_crossovers(margins: dict[float, float], first: float, force: float, s
     `margins` has the least modulus margin by crossover, in first eigenfrequencies. `force` and `settling` are the rank
     correlations of force and settling time with the crossover.
     """
-    words, far = reading(), settings.far_crossover_factor
+    far = settings.far_crossover_factor
     near = {ratio: margin for ratio, margin in margins.items() if 1 / far < ratio < far}
     worst = min(near, key=lambda ratio: near[ratio])
     apart = min(margin for ratio, margin in margins.items() if ratio not in near)
-    return Finding(
-        (
-            Part(
-                f"a crossover within a factor of {far:g} of the first eigenfrequency is not stable somewhere, and "
-                "farther from it every one is",
-                near[worst] <= 0 < apart,
-                f"first eigenfrequency {first:.3g} Hz; least modulus margin {near[worst]:.2g} within, at "
-                f"{worst * first:.3g} Hz, {apart:.2g} farther off ({WANTED:g} is comfortable)",
-                why="The lead of the controller keeps the loop stable there too.",
-            ),
-            Part(
-                f"a lower crossover needs less force (mean rank correlation at least {words.trend:g} over the strokes)",
-                force >= words.trend,
-                f"rank correlation {trend_text(force)}",
-                why="The largest force is that of the prescribed acceleration, whatever the crossover.",
-            ),
-            Part(
-                f"settling times fall with the crossover (mean rank correlation at most {-words.trend:g})",
-                settling <= -words.trend,
-                f"rank correlation {trend_text(settling)} of the time into 10 um, over the runs that come to rest",
-                why="Among these runs the time does not fall.",
-            ),
-        )
+    return Finding.of(
+        Part(
+            f"a crossover within a factor of {far:g} of the first eigenfrequency is not stable somewhere, and "
+            "farther from it every one is",
+            near[worst] <= 0 < apart,
+            f"first eigenfrequency {first:.3g} Hz; least modulus margin {near[worst]:.2g} within, at "
+            f"{worst * first:.3g} Hz, {apart:.2g} farther off ({WANTED:g} is comfortable)",
+            why="The lead of the controller keeps the loop stable there too.",
+        ),
+        Part(
+            f"a lower crossover needs less force (mean rank correlation at least {words.trend:g} over the strokes)",
+            force >= words.trend,
+            f"rank correlation {trend_text(force)}",
+            why="The largest force is that of the prescribed acceleration, whatever the crossover.",
+        ),
+        Part(
+            f"settling times fall with the crossover (mean rank correlation at most {-words.trend:g})",
+            settling <= -words.trend,
+            f"rank correlation {trend_text(settling)} of the time into 10 um, over the runs that come to rest",
+            why="Among these runs the time does not fall.",
+        ),
     )
 
 
@@ -165,16 +234,14 @@ def motor_constant_cancels(evidence: Evidence) -> Finding:
     for factor in CONSTANTS:
         shown = {**flat, TUNED_MASS: factor * flat[TUNED_MASS]}
         changes.append(float(np.abs(loops(shown, member(1.0), omega) / factor / own - 1).max()))
-    return Finding(
-        (
-            Part(
-                "the open loop is the one of the true mass, if the controller is tuned for the mass that a wrong motor "
-                "constant shows, with that motor",
-                max(changes) <= settings.exact_share,
-                f"it differs by at most {percent(max(changes), 2)} with motors of "
-                f"{' and '.join(f'{1 / factor:.2g}' for factor in CONSTANTS)} of the force assumed, as Fig. 17 and 18 "
-                "ask for",
-                why="The loop changes.",
-            ),
+    return Finding.of(
+        Part(
+            "the open loop is the one of the true mass, if the controller is tuned for the mass that a wrong motor "
+            "constant shows, with that motor",
+            max(changes) <= settings.exact_share,
+            f"it differs by at most {percent(max(changes), 2)} with motors of "
+            f"{' and '.join(f'{1 / factor:.2g}' for factor in CONSTANTS)} of the force assumed, as Fig. 17 and 18 "
+            "ask for",
+            why="The loop changes.",
         )
     )

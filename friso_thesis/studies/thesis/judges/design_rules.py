@@ -12,9 +12,9 @@ from friso.hunting import find_margin
 from friso.quantities import percent
 from friso.stage import Stage, loads
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges, number_text
-from friso_thesis.studies.thesis.judges.control_and_friction import smallest_gap
+from friso_thesis.studies.thesis.judges.path_and_system import smallest_gap
 from friso_thesis.studies.thesis.maps import begins, ends, sizes, trend, trend_text, verdict_table
-from friso_thesis.studies.thesis.reading import about, reading
+from friso_thesis.studies.thesis.reading import about, words
 from friso_thesis.studies.thesis.studies import LOCKED, masses, thesis_rig
 
 _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
@@ -41,7 +41,7 @@ def rules_of_design(evidence: Evidence) -> Finding:
     """Judge the design rules by maps of parameters, and the one on parasitic modes by margins."""
     rig = evidence.rig
     strokes = _stroke(evidence), _softer_needs_less_stroke(evidence)
-    return Finding((_soft(evidence), _far(rig), *strokes, _gap(evidence), *_crossovers(evidence), _up_to(rig)))
+    return Finding.of(_soft(evidence), _far(rig), *strokes, _gap(evidence), *_crossovers(evidence), _up_to(rig))
 
 
 def _soft(evidence: Evidence) -> Part:
@@ -53,8 +53,8 @@ def _soft(evidence: Evidence) -> Part:
     limit = begins(stiffness, moving, sizes(runs, *axes))[enough]
     return Part(
         f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range comes to rest, "
-        f"and at most of these strokes, more than {percent(reading().half)}, the stage keeps moving with a stiffer one",
-        bool(softest.all() and np.mean(limit < stiffness[-1]) > reading().half),
+        f"and at most of these strokes, more than {percent(words.half)}, the stage keeps moving with a stiffer one",
+        bool(softest.all() and np.mean(limit < stiffness[-1]) > words.half),
         f"softest comes to rest at {softest.sum()} of {softest.size} strokes; the stage keeps moving from "
         f"{limit.min():.0f} to {limit.max():.0f} N/m on",
     )
@@ -98,7 +98,6 @@ def _up_to(rig: Stage) -> Part:
 
 
 def _far(rig: Stage) -> Part:
-    words = reading()
     ratio = _needed_ratio(rig.to_toml())
     return Part(
         f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {words.about:g}) for a "
@@ -135,7 +134,6 @@ def _stroke(evidence: Evidence) -> Part:
 
 def _softer_needs_less_stroke(evidence: Evidence) -> Part:
     """Judge whether a softer joint needs less stroke for rest at 8 Hz."""
-    words = reading()
     stiffness, needed = _strokes_needed(evidence)
     rises = trend(stiffness, needed)
     return Part(
@@ -147,7 +145,6 @@ def _softer_needs_less_stroke(evidence: Evidence) -> Part:
 
 
 def _gap(evidence: Evidence) -> Part:
-    words = reading()
     smallest, error = smallest_gap(evidence)
     return Part(
         f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {_GAP:g} N (within a factor of "
@@ -173,16 +170,14 @@ def _locked_edge() -> str:
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
     """Judge from which crossover the isolated rig, and from which the locked rig, comes to rest."""
-    words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")
     free = float(np.mean(ends(crossover, moving, sizes(runs, CROSSOVER, "joint.stroke"))[stroke >= _STROKE]))
     locked, weighed = (locked_limit(evidence, mass) for mass in (_MOVING_MASS, _WEIGHED))
     return (
         Part(
-            f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 to "
-            "5.5 Hz on "
-            f"(within a factor of {words.about:g})",
+            f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 to 5.5 "
+            f"Hz on (within a factor of {words.about:g})",
             about(free, _WORKS),
             f"{free:.3g} Hz on average",
             printed=_WORKS,
@@ -214,14 +209,12 @@ def locked_limit(evidence: Evidence, mass: float) -> float:
 def experiment_needs_more_crossover(evidence: Evidence) -> Finding:
     """Judge whether the experiment needs more crossover than the parameter study at its mass."""
     weighed, moving = (locked_limit(evidence, mass) for mass in (_WEIGHED, _MOVING_MASS))
-    return Finding(
-        (
-            Part(
-                f"over the map of Fig. 11B, with the {_WEIGHED:g} kg weighed, nothing keeps moving from "
-                f"{_EXPERIMENT:g} Hz on",
-                weighed < _EXPERIMENT,
-                f"limit {weighed:.3g} Hz; {moving:.3g} Hz with the {_MOVING_MASS:g} kg identified",
-                why="Hunting ends no lower in the parameter study: Sec. 4.1 itself says at about 20 Hz.",
-            ),
+    return Finding.of(
+        Part(
+            f"over the map of Fig. 11B, with the {_WEIGHED:g} kg weighed, nothing keeps moving from "
+            f"{_EXPERIMENT:g} Hz on",
+            weighed < _EXPERIMENT,
+            f"limit {weighed:.3g} Hz; {moving:.3g} Hz with the {_MOVING_MASS:g} kg identified",
+            why="Hunting ends no lower in the parameter study: Sec. 4.1 itself says at about 20 Hz.",
         )
     )

@@ -1,6 +1,11 @@
 """Judge stiffness and friction as the thesis identifies them in time (Fig. 19 to 21).
 
 The same experiments are simulated.
+
+Judge the responses by which the thesis identifies its rig (Fig. 17 and 18).
+
+The same experiments are simulated. What the simulation assumes (masses, stiffness, friction of Table 2) must come out
+as entered. So the judges ask whether the experiments show it, and what else they would have to show.
 """
 
 from __future__ import annotations
@@ -12,6 +17,11 @@ from friso.identification.readings.rate_effect import static_friction
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import (
+    BUILT,
+    COULOMB,
+    FORCE,
+    FREQUENCIES,
+    LINE,
     RANGE,
     SLIPS,
     SLOW_TIME,
@@ -20,11 +30,109 @@ from friso_thesis.studies.thesis.experiments import (
     STEPPED,
     ConstantSpeed,
     JointSteps,
+    LockedLine,
     SlowMotion,
 )
-from friso_thesis.studies.thesis.judges.identified_responses import CONSTANTS, FIRST, MEASURED
-from friso_thesis.studies.thesis.judges.rig_loops import RAIL
-from friso_thesis.studies.thesis.reading import reading
+from friso_thesis.studies.thesis.judges.rig_loops import RAIL, on_the_rig, weaker_motor
+from friso_thesis.studies.thesis.linear import PLANT
+from friso_thesis.studies.thesis.reading import words
+
+MEASURED, WEIGHED = (2.5, 0.75), (1.7, 0.5)
+"""Masses [kg] of the whole rig and of its stage: measured by mass lines (Fig. 17, 18), and weighed (Sec. 4.2.1)."""
+
+CONSTANTS = (MEASURED[0] / WEIGHED[0], MEASURED[1] / WEIGHED[1])
+"""Ratios by which the motor constant would have to be underestimated to explain the measured masses."""
+
+_LINE_TO, _NOISY = 200.0, (10.0, 80.0)
+"""Upper end of the visible mass line, and range in which single identifications are noisy [Hz] (Sec. 4.2.1)."""
+
+FIRST, _PARASITIC = 11.0, 300.0
+"""Modes of the free joint [Hz] (Sec. 4.2.1)."""
+
+
+@judges("F17", figure="17", needs=(LINE, BUILT))
+def mass_line_of_the_locked_rig(evidence: Evidence) -> Finding:
+    """Judge the locked rig's mass line and its scatter over places with different friction."""
+    flat = evidence.rig.flat()
+    line = judged_line(evidence.experiments.locked_line, flat["masses.cart"] + flat["masses.stage"])
+    return Finding.of(*line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED[0], WEIGHED[0])))
+
+
+def judged_line(line: LockedLine, moved: float) -> Finding:
+    """Judge how far up the locked rig follows a mass line, which mass it shows, and its scatter.
+
+    `line` has the simulated responses at several places; `moved` [kg] is the mass that moves.
+    """
+    rates, magnitude, scatter = np.array(FREQUENCIES), line.magnitude, line.scatter
+    mean = np.nanmean(magnitude, axis=0)
+    about_one = (mean > 1 / words.about) & (mean < words.about)
+    end = float(max(rates[: len(about_one) if about_one.all() else int(about_one.argmin())], default=0.0))
+    inside = (rates >= _NOISY[0]) & (rates <= _NOISY[1])
+    mass = moved / np.nanmedian(magnitude[:, inside], axis=1)
+    worst, above = float(rates[np.nanargmax(scatter)]), float(np.nanmax(scatter[rates >= 1.5 * _NOISY[1]]))
+    weighed, seen = WEIGHED[0], MEASURED[0]
+    return Finding.of(
+        Part(
+            f"the response stays on the mass line (within a factor of {words.about:g}) up to about {_LINE_TO:g} Hz (at "
+            f"least {_LINE_TO / words.about:.3g} Hz)",
+            end >= _LINE_TO / words.about,
+            f"up to {end:.3g} Hz, of those computed",
+        ),
+        Part(
+            f"the mass read off it is nearer {seen:g} than the {weighed:g} kg weighed (by their ratios)",
+            bool(np.nanmedian(mass) > (seen * weighed) ** 0.5),
+            f"{mass.min():.3g} to {mass.max():.3g} kg at {len(mass)} places",
+            beyond="Simulation cannot decide this: friction hardly moves the line; cables or the motor "
+            f"constant (Sec. 4.2.1), not in the model, may, the latter by the factor {CONSTANTS[0]:.2f}; Fig. 18 "
+            f"asks for {CONSTANTS[1]:.2f}.",
+        ),
+        Part(
+            f"identifications at different places differ most between {_NOISY[0]:g} and {_NOISY[1]:g} Hz, by more "
+            f"than {words.about:g} times as much as from {1.5 * _NOISY[1]:g} Hz",
+            bool(_NOISY[0] <= worst <= _NOISY[1] and np.nanmax(scatter) > words.about * above),
+            f"the phase scatters most at {worst:.3g} Hz, by {np.degrees(np.nanmax(scatter)):.2g} degrees, and by "
+            f"{np.degrees(above):.2g} above. Assumed, as the thesis states neither: sines of {FORCE:g} N; places "
+            f"with static friction spread evenly over the {RANGE[0]:g} to {RANGE[1]:g} N of Fig. 20, "
+            f"{percent(COULOMB)} of it as Coulomb friction",
+        ),
+    )
+
+
+@judges("F18", figure="18", needs=(PLANT, BUILT))
+def response_of_the_free_joint(evidence: Evidence) -> Finding:
+    """Judge whether modes and mass line with the joint free are as the thesis measured them.
+
+    A further question is whether one error of the motor constant explains both masses that the thesis identified.
+    """
+    plants = evidence.analysis.plants
+    stuck, sliding = plants["stuck"], plants["sliding"]
+    reads = sorted((stuck.mass, sliding.mass))
+    seen, weighed = MEASURED[1], WEIGHED[1]
+    factor = seen / float(np.mean(reads))
+    both = "would explain" if abs(factor / CONSTANTS[0] - 1) <= words.close else "does not explain"
+    return Finding.of(
+        Part(
+            f"the first mode is about {FIRST:g} Hz (within {percent(words.close)}) with the cart stuck",
+            bool(abs(stuck.first / FIRST - 1) <= words.close),
+            f"{stuck.first:.3g} Hz stuck, {sliding.first:.3g} Hz sliding: the force hardly moved the cart",
+        ),
+        Part(
+            f"a parasitic mode is about {_PARASITIC:g} Hz (within {percent(words.close)})",
+            bool(abs(stuck.parasitic / _PARASITIC - 1) <= words.close),
+            f"{stuck.parasitic:.4g} Hz (entered in the simulation, from this figure)",
+            self_test=True,
+        ),
+        Part(
+            f"the mass line between them is nearer {seen:g} than the {weighed:g} kg weighed (by their ratios)",
+            bool(reads[0] > (seen * weighed) ** 0.5),
+            f"{reads[0]:.3g} to {reads[1]:.3g} kg",
+            beyond=f"Simulation cannot decide this: the line lies by a factor of {factor:.2f} off, in Fig. 17 "
+            f"by {CONSTANTS[0]:.2f}; one error of the motor constant, which is not in the model, {both} both (to "
+            f"{percent(words.close)}), and the first mode does not depend on it.",
+        ),
+        *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED[1], WEIGHED[1])),
+    )
+
 
 _STIFFNESS = 2.9e3
 """Stiffness of the joint [N/m] in Fig. 19 (Sec. 4.2.2)."""
@@ -44,32 +152,28 @@ def stiffness_from_position_steps(evidence: Evidence) -> Finding:
 
 def judged_steps(steps: JointSteps) -> Finding:
     """Judge whether simulated position steps give the joint's true stiffness, and the thesis's."""
-    words = reading()
     read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
-    return Finding(
-        (
-            Part(
-                f"read as in Sec. 4.2.2 the steps give the joint's stiffness: the 95 % interval holds it, and is "
-                f"within {percent(words.close)} of it",
-                bool(read.holds(steps.stiffness) and read.half_width <= words.close * steps.stiffness),
-                f"{number_text(read.value / 1e3, '.4g', 'N/mm')} ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
-                f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and "
-                "forth, "
-                f"{STANDS:g} s each; no noise",
-                why=read.reason or "The interval misses it, or is wide.",
-                self_test=True,
-            ),
-            Part(
-                f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(words.close)})",
-                bool(abs(read.value / _STIFFNESS - 1) <= words.close),
-                f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
-                beyond="Simulation cannot decide this: cables, misalignment and the motor constant (Sec. 4.2.2) "
-                "are not in the model. The last alone, wrong by as much as the masses of Fig. 17 and 18 require, would "
-                f"make it {larger / 1e3:.3g} N/mm, and {FIRST:g} Hz with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} "
-                "too: the force was scaled differently there, or the joint was softer.",
-            ),
-        )
+    return Finding.of(
+        Part(
+            f"read as in Sec. 4.2.2 the steps give the joint's stiffness: the 95 % interval holds it, and is "
+            f"within {percent(words.close)} of it",
+            bool(read.holds(steps.stiffness) and read.half_width <= words.close * steps.stiffness),
+            f"{number_text(read.value / 1e3, '.4g', 'N/mm')} ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
+            f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and forth, "
+            f"{STANDS:g} s each; no noise",
+            why=read.reason or "The interval misses it, or is wide.",
+            self_test=True,
+        ),
+        Part(
+            f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(words.close)})",
+            bool(abs(read.value / _STIFFNESS - 1) <= words.close),
+            f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
+            beyond="Simulation cannot decide this: cables, misalignment and the motor constant (Sec. 4.2.2) "
+            "are not in the model. The last alone, wrong by as much as the masses of Fig. 17 and 18 require, would "
+            f"make it {larger / 1e3:.3g} N/mm, and {FIRST:g} Hz with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} "
+            "too: the force was scaled differently there, or the joint was softer.",
+        ),
     )
 
 
@@ -90,30 +194,27 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
     truth = runs[0].static
     counts = ", ".join(f"{len(run.result.forces)} slips at {run.speed * 1e3:g} mm/s" for run in runs)
     range_read = f"{forces.min():.3g} to {forces.max():.3g} N" if slips else "none"
-    return Finding(
-        (
-            Part(
-                f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
-                f"relative position within {_SPIKE:g} s",
-                all(len(run.result.forces) > 1 and _spikes(run) for run in runs),
-                f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis states neither); {_UNIFORM}",
-            ),
-            Part(
-                "read from the peaks at all speeds, the 95 % interval holds the static friction of the rig",
-                bool(read.determined and read.holds(truth)),
-                f"{number_text(read.value, unit='N')} ({read.low:.3g} to {read.high:.3g}) of {truth:.3g} N: "
-                f"{read.method}",
-                why=read.reason or "The interval misses it.",
-                self_test=True,
-            ),
-            Part(
-                f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
-                bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
-                range_read,
-                beyond=f"Simulation cannot decide this: the static friction of {truth:g} N is entered (Table 2), "
-                "and it is more than was measured.",
-            ),
-        )
+    return Finding.of(
+        Part(
+            f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
+            f"relative position within {_SPIKE:g} s",
+            all(len(run.result.forces) > 1 and _spikes(run) for run in runs),
+            f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis states neither); {_UNIFORM}",
+        ),
+        Part(
+            "read from the peaks at all speeds, the 95 % interval holds the static friction of the rig",
+            bool(read.determined and read.holds(truth)),
+            f"{number_text(read.value, unit='N')} ({read.low:.3g} to {read.high:.3g}) of {truth:.3g} N: {read.method}",
+            why=read.reason or "The interval misses it.",
+            self_test=True,
+        ),
+        Part(
+            f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
+            bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
+            range_read,
+            beyond=f"Simulation cannot decide this: the static friction of {truth:g} N is entered (Table 2), "
+            "and it is more than was measured.",
+        ),
     )
 
 
@@ -156,7 +257,6 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
     Passes are with the real drive, joint free and locked. Also judge that dynamic friction cannot be determined from
     them.
     """
-    words = reading()
     named = {"free": free, "locked": locked}
     swings = {name: force_swings(runs) for name, runs in named.items()}
     rows = tuple(
@@ -165,29 +265,27 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
         for velocity, part, swing in zip(runs.velocities, runs.log.segments, swings[name], strict=True)
     )
     repeats = free.result.repeatability
-    return Finding(
-        (
-            Part(
-                f"the force oscillates in every pass, the joint free (by more than {percent(words.close)} of its mean)",
-                bool(swings["free"]) and min(swings["free"]) > words.close,
-                f"standard deviation over mean {_between(swings['free'])}, with the joint locked "
-                f"{_between(swings['locked'])}. Assumed: friction that varies along the rail",
-                why="The simulated rig slides steadily.",
-            ),
-            Part(
-                "the oscillation depends on the position: passes over the same places repeat it (correlation above 0)",
-                repeats.determined and repeats.low > 0,
-                f"correlation {_interval(repeats)}, with the joint locked {_interval(locked.result.repeatability)}",
-                why="The loop itself oscillates, by sticking and slipping.",
-            ),
-            Part(
-                "dynamic friction cannot be determined, joint free or locked",
-                not any(runs.result.separated for runs in named.values()),
-                f"free: {free.result.verdict} Locked: {locked.result.verdict}",
-                why="The passes are steady, and repeat each other.",
-            ),
+    return Finding.of(
+        Part(
+            f"the force oscillates in every pass, the joint free (by more than {percent(words.close)} of its mean)",
+            bool(swings["free"]) and min(swings["free"]) > words.close,
+            f"standard deviation over mean {_between(swings['free'])}, with the joint locked "
+            f"{_between(swings['locked'])}. Assumed: friction that varies along the rail",
+            why="The simulated rig slides steadily.",
         ),
-        FindingTable(("joint", "velocity", "mean force", "standard deviation over mean"), rows),
+        Part(
+            "the oscillation depends on the position: passes over the same places repeat it (correlation above 0)",
+            repeats.determined and repeats.low > 0,
+            f"correlation {_interval(repeats)}, with the joint locked {_interval(locked.result.repeatability)}",
+            why="The loop itself oscillates, by sticking and slipping.",
+        ),
+        Part(
+            "dynamic friction cannot be determined, joint free or locked",
+            not any(runs.result.separated for runs in named.values()),
+            f"free: {free.result.verdict} Locked: {locked.result.verdict}",
+            why="The passes are steady, and repeat each other.",
+        ),
+        table=FindingTable(("joint", "velocity", "mean force", "standard deviation over mean"), rows),
     )
 
 

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
 
-import numpy as np
-
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER
+from friso.shares import separation
 from friso.stage import loads
-from friso.studies.samples import Samples
+from friso.studies.axes import Samples
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
 from friso_thesis.studies.thesis.settings import settings
@@ -65,20 +64,9 @@ def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]
     runs = sweep(stage, {}, samples, links, ["peaks", "outcome"], settings.influence_rtol)
     valid = ~runs["outcome"].isin(["invalid", "failed"]).values
     hunts = runs["peaks"].values[valid] > 0
-    return {_NAMES[key]: _rank_biserial(runs[key].values[valid], hunts) for key in spans}
-
-
-def _rank_biserial(values: np.ndarray, hunts: np.ndarray) -> float:
-    """Return how well `values` separate stages that hunt: 1 or -1 fully, 0 not at all.
-
-    This is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1). It is 0 if all stages hunt, or none.
-    """
-    from scipy.stats import mannwhitneyu
-
     if hunts.all() or not hunts.any():
-        return 0.0
-    statistic = float(mannwhitneyu(values[hunts], values[~hunts]).statistic)
-    return 2 * statistic / (hunts.sum() * (~hunts).sum()) - 1
+        return dict.fromkeys((_NAMES[key] for key in spans), 0.0)
+    return {_NAMES[key]: separation(runs[key].values[valid], hunts)[0] for key in spans}
 
 
 def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Finding:
@@ -92,23 +80,21 @@ def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Find
         for name, of in (("locked", locked), ("free", free))
         for place, key in enumerate(orders[name], 1)
     )
-    return Finding(
-        (
-            Part(
-                "with the joint locked the crossover separates the stages that hunt from the others best",
-                orders["locked"][0] == "crossover",
-                _listed(locked, orders["locked"]),
-                why="Another parameter of Table 3 decides more, over its range.",
-            ),
-            Part(
-                "with it free, of the parameters of the joint and the friction, stroke and stiffness do best, the "
-                "crossover apart",
-                {"stroke", "joint stiffness"} == set([key for key in orders["free"] if key != "crossover"][:2]),
-                _listed(free, orders["free"]),
-                why="Another parameter of Table 3 decides more, over its range.",
-            ),
+    return Finding.of(
+        Part(
+            "with the joint locked the crossover separates the stages that hunt from the others best",
+            orders["locked"][0] == "crossover",
+            _listed(locked, orders["locked"]),
+            why="Another parameter of Table 3 decides more, over its range.",
         ),
-        FindingTable(("joint", "rank", "parameter", "rank-biserial correlation"), rows),
+        Part(
+            "with it free, of the parameters of the joint and the friction, stroke and stiffness do best, the "
+            "crossover apart",
+            {"stroke", "joint stiffness"} == set([key for key in orders["free"] if key != "crossover"][:2]),
+            _listed(free, orders["free"]),
+            why="Another parameter of Table 3 decides more, over its range.",
+        ),
+        table=FindingTable(("joint", "rank", "parameter", "rank-biserial correlation"), rows),
     )
 
 

@@ -1,21 +1,141 @@
-"""Judge the open loops, and how fast the controller may be (Fig. 8, 22, 23)."""
+"""Judge the open loops, and how fast the controller may be (Fig. 8, 22, 23).
+
+Judge Fig. 7: the plant in the four limit cases of Table 1.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import WANTED, Range
 from friso.frequency.margins import Margins
-from friso.frequency.ranges import Range
 from friso.frequency.settings import settings as frequency_settings
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import BUILT
 from friso_thesis.studies.thesis.judges.rig_loops import RAIL, measured_free, measured_locked, on_the_rig
-from friso_thesis.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
-from friso_thesis.studies.thesis.linear.loops import SAMPLED
-from friso_thesis.studies.thesis.linear.trials import IDENTIFIED, LITTLE
-from friso_thesis.studies.thesis.reading import about, reading
+from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, PLANT, Linear
+from friso_thesis.studies.thesis.linear.loops import FURTHER, IDENTIFIED, LITTLE, SAMPLED, Contact, CrossoverLoops
+from friso_thesis.studies.thesis.linear.plants import PARASITIC, LimitCase, Speeds
+from friso_thesis.studies.thesis.reading import about, words
+
+_FIRST = 10.0
+"""Eigenfrequency of the free joint [Hz] in the thesis (Sec. 3.4.2)."""
+
+_FREE, _TOUCHED = ("stuck", "sliding"), ("stuck-touched", "sliding-touched")
+
+
+@judges("F7", figure="7", needs=(PLANT,))
+def four_limit_cases(evidence: Evidence) -> Finding:
+    """Judge resonances, antiresonances and mass lines of the plant in the four limit cases."""
+    plants = evidence.analysis.plants
+    return Finding.of(
+        *_joint_modes(plants), *_high_modes(plants), _mass_lines(plants, _masses(evidence)), table=_table(plants)
+    )
+
+
+def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
+    """Return a table with modes and mass line of the plant in each limit case."""
+    rows = []
+    for name in (*_FREE, *_TOUCHED):
+        case = plants[name]
+        pair = case.pair_above
+        above = f"{pair[0]:.4g} and {pair[1]:.4g} Hz" if pair else "none"
+        below = ", ".join(f"{f:.3g} Hz" for f in case.antiresonances if f < case.first) or "none"
+        rows.append((name, below, f"{case.first:.4g} Hz", f"{case.parasitic:.4g} Hz", above, f"{case.mass:.3g} kg"))
+    columns = ("limit case", "antiresonance below", "first resonance", "parasitic mode", "pair above it", "mass line")
+    return FindingTable(columns, tuple(rows))
+
+
+def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
+    """Judge the free joint's first resonance, and whether an antiresonance lies below it.
+
+    There should be one if the cart slides, and none if it is stuck.
+    """
+    low = {name: [f for f in plants[name].antiresonances if f < plants[name].first] for name in _FREE}
+    pair = f"antiresonance {low['sliding'][-1]:.3g} Hz, resonance" if low["sliding"] else "no antiresonance below"
+    return (
+        Part(
+            f"with the limiter free, the first resonance is about {_FIRST:g} Hz (from {_FIRST / words.about:.3g} to "
+            f"{_FIRST * words.about:.3g} Hz), stuck and sliding",
+            all(about(plants[name].first, _FIRST) for name in _FREE),
+            ", ".join(f"{name} {plants[name].first:.3g} Hz" for name in _FREE),
+        ),
+        Part(
+            "an antiresonance lies below that resonance where the cart slides, and none where it is stuck",
+            bool(low["sliding"] and not low["stuck"]),
+            f"sliding: {pair} {plants['sliding'].first:.3g} Hz; stuck: {len(low['stuck'])} antiresonances below it",
+        ),
+    )
+
+
+def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
+    """Judge the parasitic mode, and the two modes above it if the limiter is touched."""
+    names = (*_FREE, *_TOUCHED)
+    pairs = {name: plants[name].pair_above for name in _TOUCHED}
+    free = [name for name in _FREE if plants[name].pair_above]
+    listed = [f"{name} {pair[0]:.4g} and {pair[1]:.4g} Hz" for name, pair in pairs.items() if pair]
+    series = [f"{name} {_and(plants[f'{name}-series'])}" for name in _TOUCHED]
+    ratio = max((pair[1] / plants[name].parasitic for name, pair in pairs.items() if pair), default=float("inf"))
+    above = all(pairs.values())
+    return (
+        Part(
+            f"in all four cases a resonance is about {PARASITIC:g} Hz (from {PARASITIC / words.about:.3g} to "
+            f"{PARASITIC * words.about:.3g} Hz)",
+            all(about(plants[name].parasitic, PARASITIC) for name in names),
+            ", ".join(f"{name} {plants[name].parasitic:.4g} Hz" for name in names),
+            why="With the limiter touched the parasitic mass swings against cart and stage, not against the stage.",
+        ),
+        Part(
+            "with the limiter touched, an antiresonance and then a resonance lie above the parasitic mode, and with it "
+            "free none",
+            above and not free,
+            f"{', '.join(listed) or 'none'}; with the formula that Table 1 prints for a touched limiter, no more modes "
+            f"than with it free: {'; '.join(series)}",
+        ),
+        Part(
+            f"that pair lies just above it: its resonance within half a decade of it (a factor of {words.order:.2g})",
+            above and ratio <= words.order,
+            f"a factor of {ratio:.2g}" if above else "no pair",
+            why=_why_far(ratio) if above else "",
+        ),
+    )
+
+
+def _why_far(ratio: float) -> str:
+    return (
+        "The model idealises the pair: it is that of the cart on the limiter, and of cart and stage against each other "
+        "on it, with k_l of 2e7 N/m as printed (Sec. 3.2.3). Its frequency scales roughly with the root of k_l, which "
+        f"would have to be {(ratio / words.order) ** 2:.2g} times smaller, and its resonance with the part of the "
+        "stage's mass that the parasitic mode leaves."
+    )
+
+
+def _masses(evidence: Evidence) -> dict[bool, float]:
+    """Return the mass [kg] that moves above the first eigenfrequency, by the limiter's state.
+
+    The key is True for a touched limiter, and False for a free one.
+    """
+    flat = evidence.rig.flat()
+    return {False: flat["masses.stage"], True: flat["masses.cart"] + flat["masses.stage"]}
+
+
+def _mass_lines(plants: Mapping[str, LimitCase], expected: Mapping[bool, float]) -> Part:
+    masses = {name: plants[name].mass for name in (*_FREE, *_TOUCHED)}
+    listed = ", ".join(f"{name} {mass:.3g} kg at {plants[name].mass_at:.3g} Hz" for name, mass in masses.items())
+    return Part(
+        f"below the parasitic mode the magnitude follows about {expected[False]:.3g} kg (within a factor of "
+        f"{words.about:g}) with the limiter free and about {expected[True]:.3g} kg with it touched",
+        all(about(mass, expected[name in _TOUCHED]) for name, mass in masses.items()),
+        f"{listed}; it is the limiter that distinguishes them, not, as Sec. 3.4.2 says, sticking and slipping",
+    )
+
+
+def _and(case: LimitCase) -> str:
+    return " and ".join(f"{f:.4g}" for f in case.resonances) + " Hz"
+
 
 _SIMULATED, _MEASURED = 60.0, 48.0
 """Highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
@@ -30,28 +150,24 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 
     Also judge how speed changes the loop, and up to which crossover it may be tuned by the design method.
     """
-    words = reading()
     analysis = evidence.analysis
     single = analysis.free.single
-    return Finding(
-        (
-            _stable_at_speeds(analysis.speeds),
-            Part(
-                "between the prescribed speeds the loop differs far (by more than a factor of "
-                f"{words.order:.2g}) at a tenth "
-                f"of the crossover, and hardly (at most {words.about:g}) at ten times",
-                analysis.speeds.slow > words.order and analysis.speeds.fast <= words.about,
-                f"factor {analysis.speeds.slow:.3g} at a tenth, {analysis.speeds.fast:.3g} at ten times",
-            ),
-            Part(
-                "by the design method of Sec. 3.4.2 (the loop of the whole mass, sliding, crosses 0 dB once) the "
-                f"crossover may be up to {_SIMULATED:g} Hz (or what is the same, {percent(words.same)} less)",
-                single is None or single >= (1 - words.same) * _SIMULATED,
-                f"up to {_hertz(single)}, where {_beyond(analysis.locked)}; all limit cases are stable up to "
-                f"{_hertz(analysis.free.unsampled)} in continuous time; {_edges(analysis, _SIMULATED)}",
-                why="Below that the parasitic mode reaches 0 dB too, whose mass and damping the thesis leaves open.",
-            ),
-        )
+    return Finding.of(
+        _stable_at_speeds(analysis.speeds),
+        Part(
+            f"between the prescribed speeds the loop differs far (by more than a factor of {words.order:.2g}) at a "
+            f"tenth of the crossover, and hardly (at most {words.about:g}) at ten times",
+            analysis.speeds.slow > words.order and analysis.speeds.fast <= words.about,
+            f"factor {analysis.speeds.slow:.3g} at a tenth, {analysis.speeds.fast:.3g} at ten times",
+        ),
+        Part(
+            "by the design method of Sec. 3.4.2 (the loop of the whole mass, sliding, crosses 0 dB once) the "
+            f"crossover may be up to {_SIMULATED:g} Hz (or what is the same, {percent(words.same)} less)",
+            single is None or single >= (1 - words.same) * _SIMULATED,
+            f"up to {_hertz(single)}, where {_beyond(analysis.locked)}; all limit cases are stable up to "
+            f"{_hertz(analysis.free.unsampled)} in continuous time; {_edges(analysis, _SIMULATED)}",
+            why="Below that the parasitic mode reaches 0 dB too, whose mass and damping the thesis leaves open.",
+        ),
     )
 
 
@@ -86,31 +202,28 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 @judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
     """Judge whether loops of the locked rig, sliding, cross 0 dB where they are tuned."""
-    words = reading()
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
     tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
     lowest, highest = min(settings), max(settings)
     further = _further(settings[highest], highest)
     near = min(further, key=lambda f: abs(np.log(f / FURTHER)), default=np.nan)
-    return Finding(
-        (
-            Part(
-                f"at every setting from {lowest:g} to {highest:g} Hz the sliding rig crosses 0 dB about there (within "
-                f"a factor of {words.about:g})",
-                all(about(crossing, f) for f, crossing in tuned.items()),
-                ", ".join(f"{crossing:.3g} Hz tuned to {f:g}" for f, crossing in tuned.items()),
-            ),
-            Part(
-                f"at the highest setting another crossing of 0 dB is about {FURTHER:g} Hz (from "
-                f"{FURTHER / words.about:.3g} to {FURTHER * words.about:.3g} Hz)",
-                about(near, FURTHER),
-                f"tuned to {highest:g} Hz it crosses again at {_frequencies(further)}, to {lowest:g} Hz at "
-                f"{_frequencies(_further(settings[lowest], lowest))}",
-                beyond=f"Simulation cannot decide this. {_why_elsewhere(evidence.analysis.contact)}",
-            ),
-            _threatened(settings[highest], highest, further),
-            *on_the_rig(evidence, measured_locked),
-        )
+    return Finding.of(
+        Part(
+            f"at every setting from {lowest:g} to {highest:g} Hz the sliding rig crosses 0 dB about there (within "
+            f"a factor of {words.about:g})",
+            all(about(crossing, f) for f, crossing in tuned.items()),
+            ", ".join(f"{crossing:.3g} Hz tuned to {f:g}" for f, crossing in tuned.items()),
+        ),
+        Part(
+            f"at the highest setting another crossing of 0 dB is about {FURTHER:g} Hz (from "
+            f"{FURTHER / words.about:.3g} to {FURTHER * words.about:.3g} Hz)",
+            about(near, FURTHER),
+            f"tuned to {highest:g} Hz it crosses again at {_frequencies(further)}, to {lowest:g} Hz at "
+            f"{_frequencies(_further(settings[lowest], lowest))}",
+            beyond=f"Simulation cannot decide this. {_why_elsewhere(evidence.analysis.contact)}",
+        ),
+        _threatened(settings[highest], highest, further),
+        *on_the_rig(evidence, measured_locked),
     )
 
 
@@ -154,33 +267,30 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
 
     The highest crossover up to which it is stable is judged as well.
     """
-    words = reading()
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]
     crossing = {name: crossing_nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
     crossed = ", ".join(f"{name} {number_text(f, unit='Hz')}" for name, f in crossing.items())
     highest = analysis.free.unsampled
-    return Finding(
-        (
-            Part(
-                f"tuned to {min(analysis.free.margins):g} Hz for the whole mass, the free joint's loop crosses 0 dB "
-                f"about {_CROSSES:g} Hz (from {_CROSSES / words.about:.3g} to {_CROSSES * words.about:.3g} Hz), "
-                "stuck and sliding",
-                all(about(f, _CROSSES) for f in crossing.values()),
-                f"{crossed}; with the masses identified ({', tuned for '.join(IDENTIFIED.values())}) "
-                f"{crossing_nearest(analysis.identified, _CROSSES):.3g} Hz",
-            ),
-            Part(
-                f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
-                f"{_MEASURED / words.about:.3g} to {_MEASURED * words.about:.3g} Hz)",
-                highest is not None and about(highest, _MEASURED),
-                f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, _MEASURED)}",
-                beyond="Simulation cannot decide this: the rig's controller samples and delays, but the thesis "
-                "gives no delay, and its frame has resonances (Sec. 4.3.1) that the model does not have.",
-            ),
-            *on_the_rig(evidence, measured_free),
+    return Finding.of(
+        Part(
+            f"tuned to {min(analysis.free.margins):g} Hz for the whole mass, the free joint's loop crosses 0 dB "
+            f"about {_CROSSES:g} Hz (from {_CROSSES / words.about:.3g} to {_CROSSES * words.about:.3g} Hz), "
+            "stuck and sliding",
+            all(about(f, _CROSSES) for f in crossing.values()),
+            f"{crossed}; with the masses identified ({', tuned for '.join(IDENTIFIED.values())}) "
+            f"{crossing_nearest(analysis.identified, _CROSSES):.3g} Hz",
         ),
-        _sampled(analysis),
+        Part(
+            f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
+            f"{_MEASURED / words.about:.3g} to {_MEASURED * words.about:.3g} Hz)",
+            highest is not None and about(highest, _MEASURED),
+            f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, _MEASURED)}",
+            beyond="Simulation cannot decide this: the rig's controller samples and delays, but the thesis "
+            "gives no delay, and its frame has resonances (Sec. 4.3.1) that the model does not have.",
+        ),
+        *on_the_rig(evidence, measured_free),
+        table=_sampled(analysis),
     )
 
 

@@ -20,7 +20,7 @@ from friso_thesis.studies.thesis.claims import BESIDE, Evidence, Finding, Findin
 from friso_thesis.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 from friso_thesis.studies.thesis.judges.rig_loops import RAIL
 from friso_thesis.studies.thesis.maps import trend, trend_text
-from friso_thesis.studies.thesis.reading import about, reading
+from friso_thesis.studies.thesis.reading import about, words
 
 _ASSUMED = (
     f"Assumed: friction that varies by {percent(AS_BUILT['rail.static_deviation'])} over "
@@ -60,19 +60,16 @@ def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
 
 def judged_move(moves: MovesOnRails) -> Finding:
     """Judge on how many rails peaks are counted after the move, joint locked and joint free."""
-    words = reading()
     locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
-    return Finding(
-        (
-            Part(
-                f"with the joint locked peaks are counted, on at least {percent(words.half)} of the rails",
-                locked[0] >= words.half * locked[1] > 0,
-                f"{_rails(locked)}. {_ASSUMED}",
-                why="Where friction differs between the two places at which the stage sticks, its swings die out.",
-                undecided=_beside(locked, words.half),
-            ),
-            Part("with the joint free on none", free[0] == 0 < free[1], _rails(free)),
-        )
+    return Finding.of(
+        Part(
+            f"with the joint locked peaks are counted, on at least {percent(words.half)} of the rails",
+            locked[0] >= words.half * locked[1] > 0,
+            f"{_rails(locked)}. {_ASSUMED}",
+            why="Where friction differs between the two places at which the stage sticks, its swings die out.",
+            undecided=_beside(locked, words.half),
+        ),
+        Part("with the joint free on none", free[0] == 0 < free[1], _rails(free)),
     )
 
 
@@ -85,35 +82,31 @@ def locked_needs_crossover(evidence: Evidence) -> Finding:
 def judged_crossovers(moves: MovesOnRails) -> Finding:
     """Judge at which crossovers peaks are counted after moves and releases, joint locked."""
     low, middle, high = (_runs_with_peaks(moves.locked, row) for row in range(3))
-    words, quiet = reading(), (middle[1] - middle[0], middle[1])
+    quiet = middle[1] - middle[0], middle[1]
     settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
     lasts = moves.released.counted & moves.released.swings
     started = int((lasts.any(axis=0) & settle).sum())
-    return Finding(
-        (
-            Part(
-                f"peaks are counted on no rail at {moves.crossovers[2]:g} Hz, on some at {moves.crossovers[0]:g} Hz",
-                high[0] == 0 < low[0],
-                f"{_rails(low)} at {moves.crossovers[0]:g} Hz, {_rails(high)} at "
-                f"{moves.crossovers[2]:g} Hz. {_ASSUMED}",
-            ),
-            Part(
-                f"at {moves.crossovers[1]:g} Hz no peaks after the same move are no exception: there are none on more "
-                f"than a few rails ({percent(words.few)}), and on more rails than at {moves.crossovers[0]:g} Hz",
-                quiet[0] > words.few * quiet[1] and middle[0] < low[0],
-                f"none on {_rails(quiet)} at {moves.crossovers[1]:g} Hz; peaks on {middle[0]} rails, on {low[0]} at "
-                f"{moves.crossovers[0]:g} Hz",
-                undecided=_beside(quiet, words.few),
-            ),
-            Part(
-                f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
-                started > 0,
-                f"{started} of {int(settle.sum())} such rails, released {percent(max(DISPLACEMENTS))} of the "
-                "move to either "
-                "side",
-                why="None of the starts tried on these rails keeps swinging.",
-            ),
-        )
+    return Finding.of(
+        Part(
+            f"peaks are counted on no rail at {moves.crossovers[2]:g} Hz, on some at {moves.crossovers[0]:g} Hz",
+            high[0] == 0 < low[0],
+            f"{_rails(low)} at {moves.crossovers[0]:g} Hz, {_rails(high)} at {moves.crossovers[2]:g} Hz. {_ASSUMED}",
+        ),
+        Part(
+            f"at {moves.crossovers[1]:g} Hz no peaks after the same move are no exception: there are none on more "
+            f"than a few rails ({percent(words.few)}), and on more rails than at {moves.crossovers[0]:g} Hz",
+            quiet[0] > words.few * quiet[1] and middle[0] < low[0],
+            f"none on {_rails(quiet)} at {moves.crossovers[1]:g} Hz; peaks on {middle[0]} rails, on {low[0]} at "
+            f"{moves.crossovers[0]:g} Hz",
+            undecided=_beside(quiet, words.few),
+        ),
+        Part(
+            f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
+            started > 0,
+            f"{started} of {int(settle.sum())} such rails, released {percent(max(DISPLACEMENTS))} of the move to "
+            "either side",
+            why="None of the starts tried on these rails keeps swinging.",
+        ),
     )
 
 
@@ -129,25 +122,23 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
     The limit is a crossover. Also judge that peaks are counted at every stroke at the lowest crossover, and at none at
     the highest.
     """
-    limits, share, words = grid.limits, grid.share, reading()
+    limits, share = grid.limits, grid.share
     falls = trend(grid.strokes, limits)
     named = ", ".join(
         f"{limit:.3g} Hz at {stroke * 1e3:.3g} mm" for limit, stroke in zip(limits, grid.strokes, strict=True)
     )
-    return Finding(
-        (
-            Part(
-                "at the highest crossover no peaks are counted at any stroke, at the lowest some are at every stroke",
-                bool((share[:, -1] == 0).all() and (share[:, 0] > 0).all()),
-                f"none above {named} (up to {len(grid.rails)} rails a cell). {_ASSUMED}",
-            ),
-            Part(
-                "the limit of the crossover falls with the stroke, as in Fig. 16A (rank correlation at most "
-                f"{-words.trend:g}), and is lower at the largest stroke than at the smallest",
-                bool(falls <= -words.trend and limits[-1] < limits[0]),
-                f"rank correlation {trend_text(falls)}: {limits[-1]:.3g} against {limits[0]:.3g} Hz",
-            ),
-        )
+    return Finding.of(
+        Part(
+            "at the highest crossover no peaks are counted at any stroke, at the lowest some are at every stroke",
+            bool((share[:, -1] == 0).all() and (share[:, 0] > 0).all()),
+            f"none above {named} (up to {len(grid.rails)} rails a cell). {_ASSUMED}",
+        ),
+        Part(
+            "the limit of the crossover falls with the stroke, as in Fig. 16A (rank correlation at most "
+            f"{-words.trend:g}), and is lower at the largest stroke than at the smallest",
+            bool(falls <= -words.trend and limits[-1] < limits[0]),
+            f"rank correlation {trend_text(falls)}: {limits[-1]:.3g} against {limits[0]:.3g} Hz",
+        ),
     )
 
 
@@ -162,7 +153,6 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
 
     Also judge whether cycles on varied rails are slower, lopsided and irregular, as measured.
     """
-    words = reading()
     even, rails = cycles.even, cycles.rails
     swings = rails.swings
     slower = np.where(swings, rails.period, np.nan) / even.period[0]
@@ -173,44 +163,41 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
     swinging = f"{int(swings.sum())} of {len(swings)} rails still swing at the end"
     times = f", with {np.nanmin(slower):.3g} to {np.nanmax(slower):.3g} times its period" if similar.any() else ""
     scatter = float(np.nanmedian(rails.period_scatter)) if np.isfinite(rails.period_scatter).any() else np.nan
-    return Finding(
-        (
-            Part(
-                "on an even rail the cycle is symmetric, of the order of a millimetre from peak to peak",
-                bool(even.swings[0])
-                and about(float(even.swing[0]), 1e-3, words.order)
-                and about(float(even.above[0] / even.below[0]), 1.0),
-                f"{even.swing[0] * 1e3:.3g} mm, period {even.period[0]:.3g} s, one side "
-                f"{even.above[0] / even.below[0]:.3g} times the other",
-                why="There is no lasting swing on an even rail.",
-            ),
-            Part(
-                f"on a rail that varies its period is nearly twice as long (at least {words.twice:g} times) at a "
-                f"similar swing (within a factor of {words.similar:g}), on at least {percent(words.half)} of those "
-                "that keep swinging",
-                bool(swings.any() and (slower[similar] >= words.twice).sum() >= words.half * swings.sum()),
-                f"{swinging}{times}. {_ASSUMED}",
-                why="The rail is not the cause: friction that differs between the two sides slows a cycle down, "
-                "and ends "
-                f"it before it is twice as slow. {_weak_motor(cycles)}",
-            ),
-            Part(
-                f"there its two sides differ (by a factor of more than {words.unequal:g}, on at least "
-                f"{percent(words.half)} of those that keep swinging)",
-                bool(len(lopsided) and np.quantile(lopsided, 1 - words.half) > np.log(words.unequal)),
-                f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
-                if len(lopsided)
-                else "nothing swings on",
-                why="Too few keep swinging.",
-            ),
-            Part(
-                f"there it is less regular from cycle to cycle (period scatters by more than {percent(words.uneven)})",
-                scatter > words.uneven,
-                f"median scatter of the period {percent(scatter)}",
-                why="Friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
-                "the model.",
-            ),
-        )
+    return Finding.of(
+        Part(
+            "on an even rail the cycle is symmetric, of the order of a millimetre from peak to peak",
+            bool(even.swings[0])
+            and about(float(even.swing[0]), 1e-3, words.order)
+            and about(float(even.above[0] / even.below[0]), 1.0),
+            f"{even.swing[0] * 1e3:.3g} mm, period {even.period[0]:.3g} s, one side "
+            f"{even.above[0] / even.below[0]:.3g} times the other",
+            why="There is no lasting swing on an even rail.",
+        ),
+        Part(
+            f"on a rail that varies its period is nearly twice as long (at least {words.twice:g} times) at a "
+            f"similar swing (within a factor of {words.similar:g}), on at least {percent(words.half)} of those "
+            "that keep swinging",
+            bool(swings.any() and (slower[similar] >= words.twice).sum() >= words.half * swings.sum()),
+            f"{swinging}{times}. {_ASSUMED}",
+            why="The rail is not the cause: friction that differs between the two sides slows a cycle down, "
+            f"and ends it before it is twice as slow. {_weak_motor(cycles)}",
+        ),
+        Part(
+            f"there its two sides differ (by a factor of more than {words.unequal:g}, on at least "
+            f"{percent(words.half)} of those that keep swinging)",
+            bool(len(lopsided) and np.quantile(lopsided, 1 - words.half) > np.log(words.unequal)),
+            f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
+            if len(lopsided)
+            else "nothing swings on",
+            why="Too few keep swinging.",
+        ),
+        Part(
+            f"there it is less regular from cycle to cycle (period scatters by more than {percent(words.uneven)})",
+            scatter > words.uneven,
+            f"median scatter of the period {percent(scatter)}",
+            why="Friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
+            "the model.",
+        ),
     )
 
 
@@ -239,7 +226,6 @@ def free_joint_stands_less_still(evidence: Evidence) -> Finding:
 
 def judged_standstill(standstill: InPosition) -> Finding:
     """Judge whether the stage stands less still with its joint free, and what damping recovers."""
-    words = reading()
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")
     expected = _DEVIATIONS[1] / _DEVIATIONS[0]
@@ -248,43 +234,38 @@ def judged_standstill(standstill: InPosition) -> Finding:
         f"Assumed: {standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {BITS} bits), a "
         "quiet laboratory's floor"
     )
-    return Finding(
-        (
-            Part(
-                f"locked the deviation is of the order of {_DEVIATIONS[0] * 1e6:g} um, free of "
-                f"{_DEVIATIONS[1] * 1e6:g} um",
-                _sized((peaks[0], peaks[1])),
-                f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
-                beyond=f"Simulation cannot decide this. {_over_noise(standstill)}",
-            ),
-            Part(
-                f"free it is of the order of {expected:g} times as large as locked",
-                about(ratio, expected, words.order),
-                f"ratio of RMS values: {number_text(ratio, '.2g')}",
-                undecided=_turned_by_noise(standstill),
-            ),
-            Part(
-                f"the joint lacks damping: ten times as much removes at least {percent(words.half)} of the difference",
-                tenfold >= words.half,
-                f"{percent(tenfold)} at {10 * standstill.own_damping:g} N s/m, "
-                f"{percent(standstill.recovered.max())} at the most tried",
-                why="The sticking bearing holds the locked stage with its stiff bristles, the free one is held "
-                "only by the "
-                "joint and the controller.",
-            ),
+    return Finding.of(
+        Part(
+            f"locked the deviation is of the order of {_DEVIATIONS[0] * 1e6:g} um, free of {_DEVIATIONS[1] * 1e6:g} um",
+            _sized((peaks[0], peaks[1])),
+            f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
+            beyond=f"Simulation cannot decide this. {_over_noise(standstill)}",
         ),
-        _noises(standstill),
+        Part(
+            f"free it is of the order of {expected:g} times as large as locked",
+            about(ratio, expected, words.order),
+            f"ratio of RMS values: {number_text(ratio, '.2g')}",
+            undecided=_turned_by_noise(standstill),
+        ),
+        Part(
+            f"the joint lacks damping: ten times as much removes at least {percent(words.half)} of the difference",
+            tenfold >= words.half,
+            f"{percent(tenfold)} at {10 * standstill.own_damping:g} N s/m, "
+            f"{percent(standstill.recovered.max())} at the most tried",
+            why="The sticking bearing holds the locked stage with its stiff bristles, the free one is held "
+            "only by the joint and the controller.",
+        ),
+        table=_noises(standstill),
     )
 
 
 def _sized(peaks: tuple[float, float]) -> bool:
-    words = reading()
     return all(about(peak, size, words.order) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
 
 
 def _turned_by_noise(standstill: InPosition) -> str:
     """Say that the noise of the force decides whether the ratio of peaks is as measured; "" if it does not."""
-    words, expected = reading(), _DEVIATIONS[1] / _DEVIATIONS[0]
+    expected = _DEVIATIONS[1] / _DEVIATIONS[0]
     ratios = [free / locked for locked, free in standstill.louder.values()]
     if len({about(value, expected, words.order) for value in ratios}) < 2:
         return ""

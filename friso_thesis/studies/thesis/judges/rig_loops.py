@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.quantities import percent
-from friso.studies.rig.excitation import SLIDING
 from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, crossing_near_target, highest_stable
+from friso.studies.rig.outcome import SLIDING
 from friso_thesis.studies.thesis.as_built import AS_BUILT, RigLoops
 from friso_thesis.studies.thesis.claims import Evidence, Part, number_text
-from friso_thesis.studies.thesis.reading import about, reading
+from friso_thesis.studies.thesis.reading import about, words
 
 _HIGHEST, _OTHER, _FREE = 48.0, 600.0, 20.0
 """Highest setting, crossing that threatens stability (Fig. 22), and crossing of the free joint (Fig. 23) [Hz]."""
@@ -41,7 +41,6 @@ def measured_locked(loops: RigLoops) -> tuple[Part, ...]:
 
 
 def _crossings(loops: RigLoops) -> Part:
-    words = reading()
     read = {loop.tuned: crossing_near_target(loop) for loop in loops.locked}
     return Part(
         f"measured on the rig as built, every open loop crosses 0 dB about where it is tuned (within {words.about:g})",
@@ -54,7 +53,6 @@ def _crossings(loops: RigLoops) -> Part:
 
 def _further(loops: RigLoops) -> Part:
     """Judge whether the locked loop tuned to the highest crossover crosses 0 dB a second time."""
-    words = reading()
     last = loops.locked[-1]
     above = [crossing.value for crossing in last.crossings if crossing.value > words.about * last.tuned]
     near, gain = _peak(last, BEYOND * last.tuned)

@@ -1,6 +1,8 @@
 """Judge Fig. 13: the terms of the force while the stage sticks, at two friction gaps.
 
 The gap is static minus Coulomb friction.
+
+Judge Fig. 5: the response of the locked rig.
 """
 
 from __future__ import annotations
@@ -13,11 +15,35 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting.criteria import COUNTED_AFTER
+from friso.hunting.measures import BANDS
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import NOTHING_TO_COMPARE, Evidence, Finding, Part, Response, judges
+from friso_thesis.studies.thesis.reading import words
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+@judges("F5", figure="5", needs=("locked",))
+def locked_rig_hunts(evidence: Evidence) -> Finding:
+    """Judge whether peaks, period and amplitude of the locked rig are as in the thesis."""
+    cell = evidence.responses["locked"].cell
+    peaks, period, amplitude = int(cell["count"]), float(cell["period"]), float(cell["peak_to_peak"]) / 2
+    size = f"amplitude {amplitude * 1e3:.3g} mm" if amplitude > BANDS[0] else "no amplitude"
+    return Finding.of(
+        Part("at least one peak is counted after 10 s, as in every map", peaks >= 1, f"{peaks} peaks"),
+        Part(
+            f"the period lies between {1 / words.order:.2g} s and 10 s",
+            1 / words.order <= period <= 10,
+            f"period {period:.3g} s" if np.isfinite(period) else "no period",
+        ),
+        Part(
+            f"the amplitude (half of peak to peak) lies between {1 / words.order:.2g} and {words.order:.2g} mm",
+            1e-3 / words.order <= amplitude <= 1e-3 * words.order,
+            size,
+        ),
+    )
+
 
 WIDE, NARROW = "F_c 0.5 N", "F_c 1.5 N"
 """Names of the responses at F_s 4 N with the wide and the narrow gap."""
@@ -74,23 +100,20 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
     """
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
     undecided = "" if wide.both and narrow.both else NOTHING_TO_COMPARE
-    return Finding(
-        (
-            Part(
-                "the mean time from stick (cart slower than the Stribeck velocity) to break-away (faster again) is "
-                "longer with F_c 1.5 N than with 0.5 N",
-                narrow.mean(narrow.time) > wide.mean(wide.time),
-                f"{narrow.words(narrow.time, _seconds)} against {wide.words(wide.time, _seconds)}",
-                undecided=undecided,
-            ),
-            Part(
-                "the mean share of the integral action in the force at break-away is larger with F_c 1.5 N than with "
-                "0.5 N",
-                narrow.mean(narrow.integral) > wide.mean(wide.integral),
-                f"{narrow.words(narrow.integral, percent)} against {wide.words(wide.integral, percent)}",
-                undecided=undecided,
-            ),
-        )
+    return Finding.of(
+        Part(
+            "the mean time from stick (cart slower than the Stribeck velocity) to break-away (faster again) is "
+            "longer with F_c 1.5 N than with 0.5 N",
+            narrow.mean(narrow.time) > wide.mean(wide.time),
+            f"{narrow.words(narrow.time, seconds)} against {wide.words(wide.time, seconds)}",
+            undecided=undecided,
+        ),
+        Part(
+            "the mean share of the integral action in the force at break-away is larger with F_c 1.5 N than with 0.5 N",
+            narrow.mean(narrow.integral) > wide.mean(wide.integral),
+            f"{narrow.words(narrow.integral, percent)} against {wide.words(wide.integral, percent)}",
+            undecided=undecided,
+        ),
     )
 
 
@@ -122,5 +145,6 @@ def slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
     return [(i, k) for i, k in spells if time[k] - time[i] > TURNING]
 
 
-def _seconds(time: float) -> str:
+def seconds(time: float) -> str:
+    """Write a time [s]."""
     return f"{time:.2f} s"

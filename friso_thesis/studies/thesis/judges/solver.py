@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.evidence import findings_on_file
 from friso.hunting.criteria import SWINGS
 from friso.quantities import percent
+from friso.stage import Stage
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
-from friso_thesis.studies.thesis.reading import reading
+from friso_thesis.studies.thesis.reading import words
 from friso_thesis.studies.thesis.studies import thesis_rig
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 EVIDENCE = "thesis.solver"
 """Name of the finding on ode23s (`benchmarks/ode23s.py`), which takes 200 000 steps a run."""
@@ -78,15 +76,11 @@ def own_runs(rtol: float) -> Mapping[str, Counted]:
 
     The swing is 0 for a stage that does not swing at the end.
     """
-    return {name: _counted(_run(changes, rtol)) for name, changes in CASES.items()}
+    return {name: _counted(thesis_rig().replace(dict(changes)), rtol) for name, changes in CASES.items()}
 
 
-def _run(changes: Mapping[str, Any], rtol: float) -> xr.Dataset:
-    stage = thesis_rig().replace(dict(changes))
-    return sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
-
-
-def _counted(cell: xr.Dataset) -> Counted:
+def _counted(stage: Stage, rtol: float) -> Counted:
+    cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
     swing = float(cell["peak_to_peak"]) if cell["outcome"].item() == SWINGS else 0.0
     return int(cell["peaks"]), swing, float(cell["steps"])
 
@@ -97,38 +91,35 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
     All arguments have runs by name: `theirs` by ode23s, `tight` by friso at a tight tolerance, and `loose` by friso at
     the thesis's.
     """
-    words = reading()
     swinging = [name for name, (_, swing, _) in tight.items() if swing > 0]
     counts = [name for name in tight if theirs[name][0] != tight[name][0]]
     off = {name: abs(theirs[name][1] / tight[name][1] - 1) for name in swinging}
     own = [name for name in tight if loose[name][0] != tight[name][0]]
     steps = [int(count) for _, _, count in theirs.values()], [int(count) for _, _, count in loose.values()]
     rows = tuple((_title(name), *(_text(runs[name]) for runs in (theirs, tight, loose))) for name in tight)
-    return Finding(
-        (
-            Part(
-                f"ode23s, relative tolerance {RTOL:g}, steps of at most 1e-4 s, counts as many peaks as friso at "
-                f"{TIGHT:g} in each of {len(tight)} runs",
-                not counts,
-                f"in {len(tight) - len(counts)} of {len(tight)}"
-                + (f"; not in {', '.join(map(_title, counts))}" if counts else ""),
-                why="The tolerance decides where a run is near an edge of hunting, or bounces on the limiter.",
-            ),
-            Part(
-                f"the swing at the end is the same (within {percent(words.same)}) in each run that swings at {TIGHT:g}",
-                bool(off) and max(off.values()) <= words.same,
-                f"off by at most {percent(max(off.values()), 2)} in {len(off)} runs" if off else "no run swings",
-                why="The tolerance is too loose for these.",
-            ),
-            Part(
-                f"friso at {RTOL:g}, without a largest step but the two hundredth of the run, counts as many in each",
-                not own,
-                f"in {len(tight) - len(own)} of {len(tight)}; {min(steps[1])} to {max(steps[1])} steps a run, ode23s "
-                f"{min(steps[0])} to {max(steps[0])}",
-                self_test=True,
-            ),
+    return Finding.of(
+        Part(
+            f"ode23s, relative tolerance {RTOL:g}, steps of at most 1e-4 s, counts as many peaks as friso at "
+            f"{TIGHT:g} in each of {len(tight)} runs",
+            not counts,
+            f"in {len(tight) - len(counts)} of {len(tight)}"
+            + (f"; not in {', '.join(map(_title, counts))}" if counts else ""),
+            why="The tolerance decides where a run is near an edge of hunting, or bounces on the limiter.",
         ),
-        FindingTable(("run", "ode23s", f"friso, {TIGHT:g}", f"friso, {RTOL:g}"), rows),
+        Part(
+            f"the swing at the end is the same (within {percent(words.same)}) in each run that swings at {TIGHT:g}",
+            bool(off) and max(off.values()) <= words.same,
+            f"off by at most {percent(max(off.values()), 2)} in {len(off)} runs" if off else "no run swings",
+            why="The tolerance is too loose for these.",
+        ),
+        Part(
+            f"friso at {RTOL:g}, without a largest step but the two hundredth of the run, counts as many in each",
+            not own,
+            f"in {len(tight) - len(own)} of {len(tight)}; {min(steps[1])} to {max(steps[1])} steps a run, ode23s "
+            f"{min(steps[0])} to {max(steps[0])}",
+            self_test=True,
+        ),
+        table=FindingTable(("run", "ode23s", f"friso, {TIGHT:g}", f"friso, {RTOL:g}"), rows),
     )
 
 
@@ -147,7 +138,6 @@ def judged_solvers(values: Mapping[str, float]) -> Finding:
 
     `values` has steps, evaluations, peaks and swing of each run, named as in `benchmarks.ode23s.other_solvers`.
     """
-    words = reading()
     cost = {name: {joint: values[f"{joint}_{name}_evaluations"] for joint in ("locked", "free")} for name in _SOLVERS}
     cheaper = min(cost["ode15s"][joint] / cost["ode23s"][joint] for joint in ("locked", "free"))
     swing = values["locked_ode45_swing_m"] / values["locked_ode23s_swing_m"]
@@ -163,26 +153,24 @@ def judged_solvers(values: Mapping[str, float]) -> Finding:
         for name in _SOLVERS
         for joint in ("locked", "free")
     )
-    return Finding(
-        (
-            Part(
-                "ode23s evaluates the equations less often than ode15s at the same tolerance, joint locked and free",
-                cheaper > 1,
-                f"ode15s needs {cheaper:.2g} times as many and more, those of numerical Jacobians included. Assumed: "
-                "SciPy's BDF and RK45 for ode15s and ode45, without a largest step",
-                why="The method of several steps saves more than it starts again at each break-away.",
-            ),
-            Part(
-                "ode45 is unstable: it counts other peaks than ode23s, or another swing (by more than "
-                f"{percent(words.same)})",
-                not right or abs(swing - 1) > words.same,
-                f"{'the same peaks' if right else 'other peaks'}, {swing:.3g} times the swing, at "
-                f"{min(cost['ode45'][joint] / cost['ode23s'][joint] for joint in ('locked', 'free')):.2g} times the "
-                "evaluations and more",
-                why="Its control of the step keeps it stable: it costs more, and is right.",
-            ),
+    return Finding.of(
+        Part(
+            "ode23s evaluates the equations less often than ode15s at the same tolerance, joint locked and free",
+            cheaper > 1,
+            f"ode15s needs {cheaper:.2g} times as many and more, those of numerical Jacobians included. Assumed: "
+            "SciPy's BDF and RK45 for ode15s and ode45, without a largest step",
+            why="The method of several steps saves more than it starts again at each break-away.",
         ),
-        FindingTable(("solver", "steps", "evaluations", "counted peaks", "swing at the end"), rows),
+        Part(
+            "ode45 is unstable: it counts other peaks than ode23s, or another swing (by more than "
+            f"{percent(words.same)})",
+            not right or abs(swing - 1) > words.same,
+            f"{'the same peaks' if right else 'other peaks'}, {swing:.3g} times the swing, at "
+            f"{min(cost['ode45'][joint] / cost['ode23s'][joint] for joint in ('locked', 'free')):.2g} times the "
+            "evaluations and more",
+            why="Its control of the step keeps it stable: it costs more, and is right.",
+        ),
+        table=FindingTable(("solver", "steps", "evaluations", "counted peaks", "swing at the end"), rows),
     )
 
 

@@ -10,28 +10,23 @@ from types import MappingProxyType
 from friso.frequency.margins import Margins
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
-from friso_thesis.studies.thesis.linear.loops import SETTINGS, CrossoverLoops, loops_of
-from friso_thesis.studies.thesis.linear.plants import PARASITIC, LimitCase, Springs, limit_cases_of, springs_of
-from friso_thesis.studies.thesis.linear.speeds import Speeds, loop_over_speed
-from friso_thesis.studies.thesis.linear.trials import FURTHER, Contact, identified_loop, soft_contact
+from friso_thesis.studies.thesis.linear.loops import (
+    SETTINGS,
+    Contact,
+    CrossoverLoops,
+    identified_loop,
+    loops_of,
+    soft_contact,
+)
+from friso_thesis.studies.thesis.linear.plants import (
+    LimitCase,
+    Speeds,
+    Springs,
+    limit_cases_of,
+    loop_over_speed,
+    springs_of,
+)
 from friso_thesis.studies.thesis.studies import LOCKED
-
-__all__ = [
-    "FREE",
-    "FURTHER",
-    "LOCKED_LOOP",
-    "NEEDS",
-    "PARASITIC",
-    "PLANT",
-    "Contact",
-    "CrossoverLoops",
-    "LimitCase",
-    "Linear",
-    "PartNeeded",
-    "Speeds",
-    "Springs",
-    "analysed",
-]
 
 PLANT, FREE, LOCKED_LOOP = "limit cases", "loop, joint free", "loop, joint locked"
 

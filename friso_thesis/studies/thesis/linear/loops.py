@@ -1,6 +1,8 @@
 """Compute the rig's loops at the thesis's crossovers, and how fast it may be controlled.
 
 This is done with and without its drive.
+
+Try changes that would make the model match measurements: masses, a softer contact.
 """
 
 from __future__ import annotations
@@ -12,16 +14,65 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
-from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import range_end, searched_crossovers, stable_crossovers
-from friso.frequency.drive import DriveTiming
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.frequency.crossover import range_end, ranges_below, searched_crossovers, stable_crossovers
 from friso.frequency.family import controller_response, loops, plant_poles, plants
 from friso.frequency.margins import Margins, frequencies, margins, with_resonances
-from friso.frequency.members import concatenate_families, limit_cases
-from friso.frequency.ranges import ranges_below
+from friso.frequency.members import Members, in_series, limit_cases
 from friso.frequency.settings import settings as frequency_settings
+from friso.frequency.system import DriveTiming
 from friso.stage import Stage
 from friso.studies.rig.experiments.frf import SETTINGS as MEASURED_SETTINGS
+from friso_thesis.studies.thesis.studies import LOCKED
+
+IDENTIFIED: Mapping[str, Any] = {"masses.stage": "0.75 kg", TUNED_MASS: "2.5 kg"}
+"""The masses that the thesis identified (Sec. 4.2.1)."""
+
+FURTHER = 600.0
+"""Further crossing of 0 dB that the thesis measured [Hz] (Sec. 4.2.4)."""
+
+AT_HIGHEST: Mapping[str, Any] = {**LOCKED, CROSSOVER: "48 Hz"}
+"""Setting at which the thesis measured a further crossing."""
+
+LITTLE = "1 N*s/m"
+"""Limiter damping of a contact with hardly any loss."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact of cart and stage so soft that its mode lies at a further crossing of 0 dB.
+
+    The thesis measured this crossing with the joint locked. The contact has a `stiffness` [N/m]. `margins` are those of
+    the loop with the cart sliding, tuned to the highest crossover, with the rig's limiter damping; `undamped` are those
+    with little damping.
+    """
+
+    stiffness: float
+    margins: Margins
+    undamped: Margins
+
+
+def identified_loop(stage: Stage) -> Margins:
+    """Return the margins of the sliding cart, joint free, with the identified masses."""
+    return _sliding(stage.replace(dict(IDENTIFIED)))
+
+
+def soft_contact(stage: Stage) -> Contact:
+    """Compute a contact of cart and stage whose mode lies at the further 0 dB crossing measured.
+
+    The part of the stage that its parasitic mode carries hardly takes part in the contact's mode.
+    """
+    flat = stage.flat()
+    reduced = in_series(flat["masses.cart"], flat["masses.stage"] - flat["parasitic.mass"])
+    stiffness = float((2 * np.pi * FURTHER) ** 2 * reduced)
+    soft = stage.replace({**AT_HIGHEST, "joint.limiter_stiffness": f"{stiffness!r} N/m"})
+    return Contact(stiffness, _sliding(soft), _sliding(soft.replace({"joint.limiter_damping": LITTLE})))
+
+
+def _sliding(stage: Stage) -> Margins:
+    flat = stage.flat()
+    return margins(flat, limit_cases(flat)["sliding"])
+
 
 SETTINGS = tuple(8.0 * factor for factor in MEASURED_SETTINGS)
 """Crossovers [Hz] of Fig. 22, equal for the model and for the measured rig, which are drawn together."""
@@ -74,7 +125,7 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> CrossoverLoops:
     """Return the loops of a stage, tuned to the crossovers `settings` [Hz]."""
     flat = stage.flat()
     tuned = {f: _tuned(flat, f) for f in settings}
-    resonances = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
+    resonances = plant_poles(flat, Members.joined(limit_cases(flat).values()))
     omega = with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [resonances])
     moving = limit_cases(flat)["sliding"]
     drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
@@ -122,7 +173,7 @@ def _highest(flat: Mapping[str, Any]) -> float | None:
 
     The result is None if it is stable up to the end of the search, and 0 if it is at no crossover.
     """
-    ranges = stable_crossovers(flat, concatenate_families([*limit_cases(flat).values()]))
+    ranges = stable_crossovers(flat, Members.joined(limit_cases(flat).values()))
     end = range_end(ranges, flat[CROSSOVER]) or 0.0
     return None if end == searched_crossovers(flat)[1] else end
 
