@@ -36,9 +36,6 @@ from friso.studies.metric import (
     usual_metrics,
     worded,
 )
-from friso.virtual_rig.response import measured_recording
-from friso.virtual_rig.run import run_flat, with_complete_drive
-from friso.virtual_rig.task import motion_task
 
 TIMING = tuple(
     f"drive.{name}"
@@ -70,6 +67,11 @@ def built_runs(
     runs hold only statistics and statuses: turning points come from the drive's samples, and are in the measures. Once
     `cancel` is set, no further chunk begins.
     """
+    # 0.1 s to import, of use for real drives alone
+    from friso.virtual_rig.response import measured_recording
+    from friso.virtual_rig.run import run_flat, with_complete_drive
+    from friso.virtual_rig.task import motion_task
+
     timing = [np.broadcast_to(flat[key], (count,)) for key in TIMING if key in flat]
     kinds, which = np.unique(np.stack([np.zeros(count), *timing]), axis=1, return_inverse=True)
     for kind in range(kinds.shape[1]):
