@@ -19,18 +19,22 @@ import friso
 from friso.identification import moves as moves_analysis
 from friso.identification.doubt import DOUBTS, FitCase, RecordCase, leading_effect
 from friso.identification.doubts import coupling, delay, force_digits, friction_by_direction, load_friction, play
-from friso.identification.errors import errors_of
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.moves import _play_that_looks_alike
 from friso.identification.inverse_model import inverse_model
-from friso.identification.logs.integrated import integrated
+from friso.identification.logs.assemble import integrated
 from friso.identification.logs.log import Log
-from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
+from friso.identification.moves import IdentifiedMoves, errors_of, identify_moves, simulated_log
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import identifiable
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
-from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
-from friso.identification.output_error.identifiable import IdentifiableFit, believed, bounds_as_much
+from friso.identification.output_error.identifiable import (
+    IdentifiableFit,
+    believed,
+    bounds_as_much,
+    with_force_settled,
+    with_smoothness_settled,
+)
 from friso.identification.output_error.parameters import BRISTLES, EXPONENT, MASS, RATIO, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
 from friso.identification.output_error.refine import bounds_of, mean_square

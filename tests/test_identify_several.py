@@ -14,8 +14,7 @@ from friso.errors import InputError
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.kind import as_set_up
 from friso.identification.kinds import KINDS
-from friso.identification.logs.joined import join_logs
-from friso.identification.logs.log import Log
+from friso.identification.logs.log import Log, join_logs
 from friso.identification.method import check_predictions, identify
 from friso.identification.readings.common import record
 from friso.identification.readings.course import Course

@@ -12,19 +12,24 @@ from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import external
-from friso.identification.response.arbitrary import local_polynomial
 from friso.identification.response.closed_loop import feedback
-from friso.identification.response.departure import Departure, Drag, departure, friction_from_departure
+from friso.identification.response.departure import (
+    Departure,
+    Drag,
+    Explanation,
+    departure,
+    explained,
+    friction_from_departure,
+)
+from friso.identification.response.estimators import local_polynomial, multisine
 from friso.identification.response.limit_cases import Visible, visible
 from friso.identification.response.mass_line import StraightLine, mass_lines
 from friso.identification.response.modes import Modes, fit_modes
 from friso.identification.response.one_mass import needs_two
 from friso.identification.response.period import find_periods
-from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
 from friso.identification.response.response import Channels, FrequencyResponse
 from friso.identification.response.settings import settings
-from friso.identification.response.simulated import Explanation, explained
 from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
 
 FrequencyRange = tuple[float, float]
@@ -120,12 +125,16 @@ def _outputs(logs: Sequence[Log]) -> list[str]:
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
     """Convert a response from another instrument; scatter between lines gives its accuracy."""
     output, _, unit = measured.unit.partition("/")
-    unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
-    return FrequencyResponse(
-        measured.frequency, measured.response, np.zeros(lines), unknown, unknown, np.full(lines, 2.0), "measured",
-        Channels("force", unit or "1", "position", output or "1"), measured.coherence,
-        ("the file gives no deviations: the scatter between neighbouring lines stands for them",),
-    )  # fmt: skip
+    return FrequencyResponse.undivided(
+        measured.frequency,
+        measured.response,
+        np.zeros(len(measured.frequency)),
+        2.0,
+        kind="measured",
+        channels=Channels("force", unit or "1", "position", output or "1"),
+        coherence=measured.coherence,
+        warnings=("the file gives no deviations: the scatter between neighbouring lines stands for them",),
+    )
 
 
 def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:

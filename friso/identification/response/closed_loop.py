@@ -1,4 +1,4 @@
-"""Detect closed loops in records, and compute the measured open loop and its crossovers."""
+"""Detect closed loops in records, and find the crossovers of a measured open loop."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift
-from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
 from friso.quantities import percent
 
@@ -84,30 +84,6 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
     return float(residual @ residual)
 
 
-def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """Describe where estimates without and with the reference differ beyond their deviations.
-
-    Both responses must have the same spectral lines. The result is empty if they agree.
-    """
-    _same_lines(direct, indirect)
-    weight = 1 / (direct.deviation**2 + indirect.deviation**2)
-    off = np.array_split(weight * (direct.response - indirect.response), settings.bands_of_a_bias)
-    sums = [
-        2 * abs(np.sum(part)) ** 2 / np.sum(scale)
-        for part, scale in zip(off, np.array_split(weight, settings.bands_of_a_bias), strict=True)
-    ]
-    chance = float(stats.chi2.sf(np.sum(sums), 2 * settings.bands_of_a_bias))
-    if chance > 1e-3:
-        return ()
-    return (f"direct and indirect estimates differ (chance {chance:.1g}): the direct one is biased by the loop",)
-
-
-def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> FrequencyResponse:
-    """Return the open loop L = C G, from plant G and controller C (lines,) [input per output]."""
-    loop = plant.times(np.asarray(controller), "loop", plant.channels.input_unit)
-    return FrequencyResponse(**{**vars(loop), "channels": Channels("error", "1", "loop", "1")})
-
-
 def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
     """Return the frequencies [Hz] at which |L| passes 1, each with its interval, rising.
 
@@ -137,9 +113,3 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
     """Merge passages through 1 into one: the middle one's frequency, and the range of all."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
-
-
-def _same_lines(first: FrequencyResponse, second: FrequencyResponse) -> None:
-    """Check that two responses have the same spectral lines. Raises InputError if not."""
-    if not np.array_equal(first.frequency, second.frequency):
-        raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

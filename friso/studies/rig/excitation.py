@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identification.response.periodic import multisine
+from friso.identification.response.estimators import multisine
 from friso.identification.response.records import ResponseRecord, from_log
 from friso.identification.response.response import Channels, FrequencyResponse
 from friso.stage import Stage

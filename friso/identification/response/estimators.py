@@ -1,8 +1,8 @@
-"""Estimate responses from periodic excitation, with noise and distortion separated.
+"""Estimate responses from periodic excitation, with noise and distortion separated, and from any other.
 
-The robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4: noise differs from period to
-period, nonlinear distortion from one random-phase realisation to another. With an external reference (closed loop,
-indirect) both spectra are taken relative to it, which makes them comparable.
+For periodic excitation, the robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4:
+noise differs from period to period, nonlinear distortion from one random-phase realisation to another. With an external
+reference (closed loop, indirect) both spectra are taken relative to it, which makes them comparable.
 """
 
 from __future__ import annotations
@@ -152,3 +152,49 @@ def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarr
     near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[: settings.lines_sharing_variance]
     local = np.maximum(power[near].mean(axis=0), 0.0)
     return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])
+
+
+def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
+    """Estimate a response by the local polynomial method, free of leakage.
+
+    The method is that of Pintelon, Schoukens, 2nd ed., ch. 7: about every line, response and transient are polynomials
+    of order 2 in the frequency over 17 lines of the spectrum of the whole record; the residual is the noise. One line
+    in 9 is returned, so that neighbours share little. With a reference the method is indirect, which a closed loop
+    requires: the response is the ratio of the responses of output and input to the reference. Raises InputError for a
+    record of fewer than 200 samples.
+    """
+    record, side = record.checked(200), settings.lines_on_a_side
+    size = len(record.driving)
+    driving, excitation, answer = (
+        np.fft.rfft(channel - channel.mean()) / size for channel in (record.driving, record.input, record.output)
+    )
+    centres = np.arange(1 + side, len(driving) - side - 1, side + 1)
+    around = np.arange(-side, side + 1)
+    strength = np.sqrt(np.mean(np.abs(driving[centres[:, None] + around]) ** 2, axis=1))
+    strong = strength > settings.amplitude_of_a_weak_line * strength.max()
+    centres, scale = centres[strong], strength[strong]
+    window = centres[:, None] + around
+    powers = (around / side)[:, None] ** np.arange(settings.order_of_local_polynomials + 1)
+    regressors = driving[window][:, :, None] * powers / scale[:, None, None]
+    transient = np.broadcast_to(powers, (len(centres), *powers.shape))
+    columns = np.concatenate([regressors, transient], axis=2)
+    q, r = np.linalg.qr(columns)
+    row = np.linalg.inv(r)[:, 0, :]
+    fitted = [np.einsum("kij,ki->kj", q.conj(), quantity[window]) for quantity in (excitation, answer)]
+    gain, output = (np.einsum("kj,kj->k", row, quantity) for quantity in fitted)
+    response = output / gain
+    left = answer[window] - response[:, None] * excitation[window]
+    left = left - np.einsum("kij,kj->ki", q, np.einsum("kij,ki->kj", q.conj(), left))
+    free = window.shape[1] - columns.shape[2]
+    variance = np.sum(np.abs(left) ** 2, axis=1) / free
+    deviation = np.sqrt(variance * np.sum(np.abs(row) ** 2, axis=1)) / np.abs(gain)
+    return FrequencyResponse.undivided(
+        centres / (size * record.sample_time),
+        response,
+        deviation,
+        2.0 * free,
+        kind="local polynomial",
+        channels=channels or Channels(),
+        warnings=("noise and nonlinear distortion cannot be distinguished: the deviation covers both",),
+        sample_time=record.sample_time,
+    )
