@@ -11,7 +11,14 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.doubt import FitCase, FittedCase, KeyCase, judged_fit, judged_keys, leading_effect, raised
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import FilteredMotion, InverseModel, directions, inverse_model, motion, unit_of
+from friso.identification.inverse_model import (
+    FilteredMotion,
+    InverseModel,
+    directions,
+    inverse_model,
+    moved_in,
+    unit_of,
+)
 from friso.identification.kind import FirstEstimates
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for
@@ -26,7 +33,7 @@ from friso.identification.output_error.to_keys import drawn_from, estimates_of
 from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
 from friso.identification.settings import identification_settings
-from friso.identification.spread import correlation_length
+from friso.identification.spread import binned, correlation_length
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -104,10 +111,8 @@ def identify_moves(
     inverse = inverse_model(log, bandwidth, False, share)
     by_direction = inverse_model(log, inverse.bandwidth, True, share)
     tell(log.name, inverse.estimates)
-    follows, loop = _problems(log, part, flat, inverse, own_loop)
-    moved = motion(
-        log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth
-    )
+    moved = moved_in(log, log["position"][part], inverse.bandwidth)
+    follows, loop = _problems(log, part, flat, inverse, float(np.abs(moved.velocity).max()), own_loop)
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
@@ -219,19 +224,13 @@ def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> 
 
 
 def _problems(
-    log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
+    log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, speed: float, own_loop: bool
 ) -> tuple[Problem, Problem | None]:
     """Set up two fits: of the stage that follows the log, and of the stage in its own loop.
 
-    Both have all parameters of their equations. The second is None without `own_loop`.
+    Both have all parameters of their equations. The second is None without `own_loop`. `speed` [m/s] is the highest of
+    the log.
     """
-    speed = float(
-        np.abs(
-            motion(
-                log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth
-            ).velocity
-        ).max()
-    )
     levels = _levels(log, flat, inverse)
     position = log["position"][part]
     every = fit_parameters(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
@@ -307,8 +306,8 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
     `bandwidth` [Hz] is the motion's.
     """
-    measured = motion(log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * bandwidth)
-    modelled = motion(simulated.position, log.sample_time, identification_settings.smoothing_bandwidths * bandwidth)
+    measured = moved_in(log, log["position"][part], bandwidth)
+    modelled = moved_in(log, simulated.position, bandwidth)
     disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
     return SimulationErrors(
         _relative(log["position"][part], simulated.position),
@@ -353,10 +352,9 @@ def _explained(residual: np.ndarray, along: np.ndarray) -> float:
 
     `along`, shape (n,), is a position or a speed. The fraction that chance explains is subtracted.
     """
-    edges = np.linspace(along.min(), along.max(), identification_settings.bins_of_a_residual + 1)
-    bins = np.clip(np.digitize(along, edges) - 1, 0, identification_settings.bins_of_a_residual - 1)
-    count = np.bincount(bins, minlength=identification_settings.bins_of_a_residual)
-    means = np.bincount(bins, residual, minlength=identification_settings.bins_of_a_residual) / np.maximum(count, 1)
+    bins = binned(along, identification_settings.bins_of_a_residual)
+    count = np.bincount(bins)
+    means = np.bincount(bins, residual) / np.maximum(count, 1)
     power = float(np.mean(residual**2))
     independent = len(residual) / correlation_length(residual)
     share = float(np.sum(count * means**2)) / len(residual) / power if power else 0.0

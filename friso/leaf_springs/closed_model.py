@@ -11,9 +11,8 @@ import numpy as np
 
 from friso.leaf_springs import closed_forms, plate
 from friso.leaf_springs.closed_forms import CLAMPED, SHEAR, axial, edgewise_shear
-from friso.leaf_springs.evaluation import Evaluation, Mode, peak_of
-from friso.leaf_springs.mechanism import Mechanism, along_motion
-from friso.leaf_springs.naming import mode_name
+from friso.leaf_springs.evaluation import Evaluation, Mode
+from friso.leaf_springs.mechanism import Mechanism
 from friso.leaf_springs.settings import settings
 
 
@@ -59,12 +58,7 @@ def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
     """
     stage, leaves = shape[:6], following(mechanism, shape[:6])
     leaves[:, :, 2] += shape[6] / np.sqrt(mechanism.leaves * mechanism.leaf_mass) * _clamped_shape()
-    actuator, sensor = (
-        float(along_motion(mechanism, point, stage[:, None])[0]) for point in (mechanism.actuation, mechanism.sensor)
-    )
-    arm = np.array(mechanism.body.centre) - np.array([mechanism.length, 0.0, 0.0])
-    name = mode_name(stage, mechanism.body.mass, np.array(mechanism.body.inertia), arm, leaves, mechanism.leaf_mass)
-    return Mode(name, float(frequency), actuator, sensor, peak_of(mechanism, actuator, sensor), stage, leaves)
+    return Mode.of(mechanism, frequency, stage, leaves)
 
 
 def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
@@ -153,13 +147,11 @@ def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndar
     """
     s = x - mechanism.length / 2
     sheared = 1 / (SHEAR * mechanism.shear * mechanism.area)
-    shape, ends = (mechanism.length, mechanism.width, mechanism.poisson), 2 * s / mechanism.length
+    shape, ends = mechanism.plate_shape, 2 * s / mechanism.length
     compliance = (plate.cubic_twist(ends, *shape) * ends**3) @ weight
     free = plate.tilted(plate.free_twist(s, *shape) * weight, ends**3, ends, compliance) / weight
-    twist = free / (mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
-    curl = plate.compliance_profile(s, mechanism.length, mechanism.width, mechanism.poisson) / (
-        mechanism.young * mechanism.bending
-    )
+    twist = free / (mechanism.torsional_rigidity)
+    curl = plate.compliance_profile(s, *mechanism.plate_shape) / (mechanism.young * mechanism.bending)
     columns = (
         1 / axial(mechanism),
         1 / edgewise_shear(mechanism),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from friso.leaf_springs.mechanism import Mechanism
+from friso.leaf_springs.mechanism import Mechanism, along_motion
+from friso.leaf_springs.naming import mode_name
 from friso.leaf_springs.settings import settings
 
 
@@ -21,7 +21,8 @@ class Mode:
     middle of the leaf ends, and a rotation [1/m] about it.
 
     `actuator` and `sensor` [1/sqrt(kg)] tell how far the mode moves along the motion, where the actuator pushes and
-    where the sensor measures. `peak` tells how far its resonance rises over the line of the stage's mass.
+    where the sensor measures. `peak` tells how far its resonance rises over the line of the stage's mass: their
+    product, the residue, over 1/m of the stage's mass m and over 2 zeta.
     """
 
     name: str
@@ -31,6 +32,19 @@ class Mode:
     peak: float
     stage: np.ndarray
     leaves: np.ndarray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
+        """Build and name a mode from its frequency [Hz] and the motions of stage and leaves."""
+        actuator, sensor = (
+            float(along_motion(mechanism, point, stage[:, None])[0])
+            for point in (mechanism.actuation, mechanism.sensor)
+        )
+        body, leaf_mass = mechanism.body, float(mechanism.leaf_mass)
+        arm = np.subtract(body.centre, (mechanism.length, 0.0, 0.0)).astype(float)
+        name = mode_name(stage, float(body.mass), body.inertia, arm, leaves, leaf_mass)
+        peak = abs(actuator * sensor) * float(body.mass) / (2 * float(mechanism.damping_ratio))
+        return cls(name, float(frequency), actuator, sensor, peak, stage, leaves)
 
     @property
     def interferes(self) -> bool:
@@ -137,16 +151,3 @@ class Evaluation:
             counts[mode.name] += 1
             named[mode.name if counts[mode.name] == 1 else f"{mode.name} ({counts[mode.name]})"] = mode
         return named
-
-
-def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
-    """Return how far a mode's resonance rises above the line of the stage's mass, as a factor.
-
-    `actuator` and `sensor` are the mode's motions [1/sqrt(kg)] at these places. Their product, the residue, is divided
-    by 1/m of the stage's mass m and by 2 zeta.
-    """
-    return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
-
-
-LeafModel = Callable[[Mechanism, float], Evaluation]
-"""A model of mechanisms: evaluates one at a stroke [m]."""

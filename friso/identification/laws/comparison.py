@@ -91,10 +91,8 @@ def _worse(differences: np.ndarray, level: float) -> bool:
     count, level = len(differences), level / 2  # of two tests
     chance = student.ppf(1 - level, count - 1) * differences.std(ddof=1) / np.sqrt(count) if count > 1 else np.inf
     more_often = binomtest(int((differences > 0).sum()), count, alternative="greater").pvalue < level
-    return bool(
-        differences.mean() > max(chance, settings.difference_of_worse_laws)
-        or (more_often and np.median(differences) > settings.difference_of_worse_laws)
-    )
+    least = settings.difference_of_worse_laws
+    return bool(differences.mean() > max(chance, least) or (more_often and np.median(differences) > least))
 
 
 def comparable() -> list[str]:

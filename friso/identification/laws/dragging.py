@@ -50,9 +50,8 @@ class DraggedRecord:
         starts[:, shape.position] = self.position[0]
         starts[:, shape.velocity] = inputs.velocity[0]  # a record may begin in motion
         forces = np.full((runs, len(self.force)), np.nan)
-        for part in run_driven(
-            shape, {**flat, "motion.duration": 1.0}, runs, inputs, starts, settings.tolerance_of_dragging
-        ):
+        timed = {**flat, "motion.duration": 1.0}
+        for part in run_driven(shape, timed, runs, inputs, starts, settings.tolerance_of_dragging):
             impulse = part.states[:, :, -1]
             mean = np.diff(impulse, axis=1) / self.interval
             middle = np.pad((mean[:, 1:] + mean[:, :-1]) / 2, ((0, 0), (1, 1)), mode="edge")
@@ -70,10 +69,8 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
     if why := why_unseen(whole, settings.samples_of_a_dragged_record):
         return why
     cutoff = cutoff_of(whole)
-    record = whole.seen(
-        settings.band_of_the_motion * cutoff,
-        max(int(1 / (settings.samples_of_a_dragged_period * cutoff * whole.interval)), 1),
-    ).beginning(settings.most_samples_of_a_record)
+    every = max(int(1 / (settings.samples_of_a_dragged_period * cutoff * whole.interval)), 1)
+    record = whole.seen(settings.band_of_the_motion * cutoff, every).beginning(settings.most_samples_of_a_record)
     low_pass = LowPass(record.time, cutoff)
     body, force, acceleration = at_bearing(record, between, between.mass)
     return DraggedRecord(log.name, body, low_pass, low_pass(force), low_pass(acceleration))

@@ -75,14 +75,8 @@ class LawProblem:
         """Return the keys of the law [SI] that belong to fitted numbers, shape (parameters,)."""
         value = dict(zip(self.names, np.exp(numbers), strict=True))
         static = value["coulomb"] + value["gap"]
-        before = self.before.levels
-        levels = replace(
-            before,
-            static=static,
-            coulomb=value["coulomb"],
-            stribeck_velocity=value["stribeck_velocity"],
-            viscous=value["viscous"],
-        )
+        shown = {name: value[name] for name in ("coulomb", "stribeck_velocity", "viscous")}
+        levels = replace(self.before.levels, static=static, **shown)
         measured = MeasuredFriction(levels, value["stiffness"], value["damping"], np.zeros(1), np.zeros(1))
         law = friction_law(self.law)
         return law.shaped(measured, {name: value[name] for name in law.shape})
@@ -109,23 +103,26 @@ class LawProblem:
 
         The starts have the shape (starts, parameters), and `used` has a mask of shape (m,) for each record.
         """
-        weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
-
+        weights = [
+            mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std()
+            for mask, record in zip(used, self.records, strict=True)
+        ]
+        step = settings.step_of_a_logarithm
         rows: dict[bytes, np.ndarray] = {}  # residual and derivatives from runs side by side
 
         def at(numbers: np.ndarray) -> np.ndarray:
             if numbers.tobytes() not in rows:
                 rows.clear()
-                moved = numbers + settings.step_of_a_logarithm * np.eye(len(numbers))
+                moved = numbers + step * np.eye(len(numbers))
                 rows[numbers.tobytes()] = self._weighed(np.vstack([numbers, moved]), weights)
             return rows[numbers.tobytes()]
 
         def jacobian(numbers: np.ndarray) -> np.ndarray:
             here = at(numbers)
-            return (here[1:] - here[0]).T / settings.step_of_a_logarithm
+            return (here[1:] - here[0]).T / step
 
         low, high = self.bounds
-        starts = np.clip(starts, low + 2 * settings.step_of_a_logarithm, high - 2 * settings.step_of_a_logarithm)
+        starts = np.clip(starts, low + 2 * step, high - 2 * step)
         first = starts[np.argmin(np.sum(self._weighed(starts, weights) ** 2, axis=1))]
         options: dict[str, Any] = {
             "max_nfev": settings.evaluations_of_a_fit,
@@ -145,10 +142,6 @@ class LawProblem:
         starts[:, self.names.index("stiffness")] += np.log(settings.stiffness_factors)
         return starts
 
-    def _pairs(self, used: Sequence[np.ndarray]) -> list[tuple[np.ndarray, DraggedRecord]]:
-        """Pair the masks of used samples with their records."""
-        return list(zip(used, self.records, strict=True))
-
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
         """Return weighted residuals of all records side by side, shape (rows, samples).
 
@@ -156,9 +149,5 @@ class LawProblem:
         """
         with np.errstate(invalid="ignore"):  # a failed run may be infinite where its weight is 0
             parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]
-        return np.nan_to_num(
-            np.hstack(parts),
-            nan=settings.residual_of_a_failed_run,
-            posinf=settings.residual_of_a_failed_run,
-            neginf=-settings.residual_of_a_failed_run,
-        )
+        failed = settings.residual_of_a_failed_run
+        return np.nan_to_num(np.hstack(parts), nan=failed, posinf=failed, neginf=-failed)

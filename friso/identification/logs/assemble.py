@@ -98,9 +98,8 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
         time = instants(choice, clock, reading, notes)
         foreign = reading.mapping.sample_time is not None and choice.channel.values.size not in sizes
         if optional and (time is None or foreign):
-            notes.warnings.append(
-                f"{role}: {choice.channel.name} left out: its length differs, or it has no time stamps"
-            )
+            name = choice.channel.name
+            notes.warnings.append(f"{role}: {name} left out: its length differs, or it has no time stamps")
             continue
         if time is None:
             raise no_time(choice.channel, reading)
@@ -112,13 +111,8 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
             notes.warnings.append(f"{role}: {error.actual} left out; to use it: {error.example}")
             continue
         if time.size != values.size:
-            raise LogError(
-                role,
-                f"{values.size} values for {time.size} time stamps",
-                "one value per time stamp",
-                "",
-                reading.origin,
-            )
+            actual = f"{values.size} values for {time.size} time stamps"
+            raise LogError(role, actual, "one value per time stamp", "", reading.origin)
         tracks[role] = _track(role, choice, time, values, notes)
     notes.read += _clocks(clock, reading)
     notes.warnings += _contradicted(chosen, reading, notes)
@@ -149,11 +143,8 @@ def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Note
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
     """Write lines that say where the sample times of the log come from."""
-    if reading.mapping.sample_time is not None:
-        return [
-            f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
-            "used"
-        ]
+    if (specified := reading.mapping.sample_time) is not None:
+        return [f"time: one sample every {specified:.9g} s, as specified; the times in the file are not used"]
     if clock is not None:
         return [f"time: {clock.channel.name} ({clock.channel.source}), {clock.reason}"]
     columns = [c for c in reading.table.channels if c.unit and (role_of(c.name) or ("",))[0] == "time"]
@@ -168,15 +159,11 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
+    name, slower = f"{role}: {choice.channel.name}", "it is sampled {} times slower"
     if (n := checks.samples_held(values)) > 1:
-        notes.warnings.append(
-            f"{role}: {choice.channel.name} holds each value for {n} samples: it is sampled {n} times slower"
-        )
+        notes.warnings.append(f"{name} holds each value for {n} samples: {slower.format(n)}")
     elif role not in ("reference", "disturbance") and (n := checks.interpolated(values)) > 1:
-        notes.warnings.append(
-            f"{role}: {choice.channel.name} runs in straight lines of {n} samples: it is sampled {n} times slower and "
-            "interpolated"
-        )
+        notes.warnings.append(f"{name} runs in straight lines of {n} samples: {slower.format(n)} and interpolated")
     return channel_track
 
 
@@ -193,10 +180,8 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
         raise LogError("time", f"{base.period:g} s between samples", expected, '--unit TIME="ms"')
     for role in {*needed, "position", "force"} & set(signals):
         if checks.constant(role, signals[role]):
-            value = quoted(float(signals[role][0]))
-            raise LogError(
-                role, f"a constant signal, {value} throughout", "a signal that changes", f'--map {role}="CHANNEL"'
-            )
+            actual = f"a constant signal, {quoted(float(signals[role][0]))} throughout"
+            raise LogError(role, actual, "a signal that changes", f'--map {role}="CHANNEL"')
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
@@ -211,9 +196,8 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
             lines.append(f"{role}: constant throughout")
         share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
         if share > settings.share_of_clipped_samples:
-            lines.append(
-                f"{role}: {percent(share, 3)} of the samples lie on flat tops at its extremes: saturated or clipped"
-            )
+            on_tops = f"{percent(share, 3)} of the samples lie on flat tops at its extremes"
+            lines.append(f"{role}: {on_tops}: saturated or clipped")
     position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
     same_kind = ("position" in notes.units) == ("velocity" in notes.units)
     if position is not None and velocity is not None and same_kind:
@@ -228,7 +212,7 @@ def _lost(base: Track) -> list[str]:
     """Write how many samples were lost and interpolated, as a list of one line; [] if none were."""
     if not base.bridged.any():
         return []
-    places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)
+    places = len(checks.runs(base.bridged))
     where = "1 place" if places == 1 else f"{places} places"
     return [
         f"{np.count_nonzero(base.bridged)} of {base.bridged.size} samples lost, in {where}, interpolated by a cubic "

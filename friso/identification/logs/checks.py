@@ -8,6 +8,12 @@ from friso.errors import LogError
 from friso.identification.logs.settings import settings
 
 
+def runs(mask: np.ndarray) -> list[slice]:
+    """Return the stretches over which a mask, shape (n,), is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Drop samples that repeat the previous time stamp [s] and value, and count them.
 
@@ -85,11 +91,10 @@ def clipped_share(values: np.ndarray) -> float:
     count, inside = 0, (values[1:] > values.min()) & (values[1:] < values.max())
     repeats = np.count_nonzero(steps[inside] == 0) >= settings.share_of_repeated_values * np.count_nonzero(inside)
     for extreme in (values.max(), values.min()):
-        edges = np.flatnonzero(np.diff(np.r_[False, values == extreme, False].astype(np.int8)))
-        for start, stop in zip(edges[::2], edges[1::2], strict=True):
-            kink = start >= 2 and steps[start - 2] >= 0.2 * steps.max()
-            if stop - start >= 3 and (kink or not repeats):
-                count += int(stop - start)
+        for top in runs(values == extreme):
+            kink = top.start >= 2 and steps[top.start - 2] >= 0.2 * steps.max()
+            if top.stop - top.start >= 3 and (kink or not repeats):
+                count += top.stop - top.start
     return count / values.size
 
 
@@ -130,10 +135,8 @@ def interpolated(values: np.ndarray) -> int:
         return 1
     for n in range(settings.slowest_sampling, 1, -1):
         whole = bends[: bends.size // n * n].reshape(-1, n)
-        if (
-            whole.sum(axis=0).max() > settings.share_of_all_bends * whole.sum()
-            and np.count_nonzero(whole.max(axis=1)) >= 50
-        ):
+        alike = whole.sum(axis=0).max() > settings.share_of_all_bends * whole.sum()
+        if alike and np.count_nonzero(whole.max(axis=1)) >= 50:
             return n
     return 1
 

@@ -16,12 +16,8 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
     """
     part = max(parts, key=lambda span: span.stop - span.start)
     slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
-    return _line(
-        "velocity",
-        "the derivative of position",
-        in_blocks(lambda a, b: lag(slope[a:b], speed[a:b]), slope.size),
-        period,
-    )
+    estimate = in_blocks(lambda a, b: lag(slope[a:b], speed[a:b]), slope.size)
+    return _line("velocity", "the derivative of position", estimate, period)
 
 
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
@@ -124,9 +120,8 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
         return ""
     late, early = (late, early) if value > 0 else (early, late)
     size = f"{abs(value) * period * 1e3:.3g} ms +/- {half * period * 1e3:.2g} ms (95 %)"
-    return (
-        f"{late} seems to come after {early} by {size}: a delay between two instruments looks like this; not corrected"
-    )
+    after = f"{late} seems to come after {early} by {size}"
+    return f"{after}: a delay between two instruments looks like this; not corrected"
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
@@ -136,8 +131,7 @@ def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
     """
     from scipy.signal import savgol_filter
 
-    if values.size <= 2 * settings.samples_of_a_derivative:
+    window = settings.samples_of_a_derivative
+    if values.size <= 2 * window:
         return values
-    return np.asarray(savgol_filter(values, settings.samples_of_a_derivative, 3, deriv=order, delta=period))[
-        settings.samples_of_a_derivative : -settings.samples_of_a_derivative
-    ]
+    return np.asarray(savgol_filter(values, window, 3, deriv=order, delta=period))[window:-window]

@@ -117,19 +117,16 @@ def join_logs(logs: Sequence[Log]) -> Log:
         segments += [slice(part.start + start, part.stop + start) for part in log.segments]
         start += log.time.size
         end = float(times[-1][-1]) + 1.0
-    return Log(
-        ", ".join(log.name for log in logs),
-        np.concatenate(times),
-        first.sample_time,
-        {role: np.concatenate([log[role] for log in logs]) for role in first.signals},
-        tuple(segments),
-        first.units,
-        first.scalars,
-        tuple(dict.fromkeys(line for log in logs for line in log.read)),
-        tuple(dict.fromkeys(line for log in logs for line in log.warnings)),
-        first.setup,
-        first.axis,
-        np.concatenate([log.measured(slice(0, log.time.size)) == 0 for log in logs]),
+    return replace(
+        first,
+        name=", ".join(log.name for log in logs),
+        time=np.concatenate(times),
+        signals={role: np.concatenate([log[role] for log in logs]) for role in first.signals},
+        segments=tuple(segments),
+        read=tuple(dict.fromkeys(line for log in logs for line in log.read)),
+        warnings=tuple(dict.fromkeys(line for log in logs for line in log.warnings)),
+        bridged=np.concatenate([log.measured(slice(0, log.time.size)) == 0 for log in logs]),
+        is_excerpt=False,
         is_integrated=any(log.is_integrated for log in logs),
     )
 

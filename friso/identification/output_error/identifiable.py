@@ -188,9 +188,8 @@ def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
     """Tell whether a fit with more parameters, `full`, is better than `plain` beyond chance."""
     more = len(full.free) - len(plain.free)
-    return bool(
-        plain.cost > full.cost * (1 + chi2.ppf(settings.probability_of_more_parameters, more) / full.independent)
-    )
+    chance = chi2.ppf(settings.probability_of_more_parameters, more) / full.independent
+    return bool(plain.cost > full.cost * (1 + chance))
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
@@ -233,7 +232,7 @@ def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
 
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     """Tell whether the record contains motion in which a parameter could have a visible effect."""
-    parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
+    parameter = problem.parameter(name)
     if name in CURVE:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
     if name in BRISTLES:
@@ -243,7 +242,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
 
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
     """Tell whether a profile interval is closed on both sides and narrow."""
-    parameter = next(one for one in full.problem.parameters if one.name == seen.name)
+    parameter = full.problem.parameter(seen.name)
     closed = not (seen.open_low or seen.open_high)
     return closed and (not parameter.logarithmic or seen.high < settings.factor_of_a_sharp_profile * seen.low)
 
@@ -271,10 +270,8 @@ def why_not_shown(name: str, covered: Coverage) -> str:
         if not np.isfinite(high):
             return "no steady motion at all, in which the Stribeck effect would show"
         if high > settings.speed_factor_of_coverage**2 * low:
-            return (
-                f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would "
-                "show"
-            )
+            gap = f"between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s"
+            return f"no steady motion {gap}, where the Stribeck effect would show"
     if name in BRISTLES:
         return (
             "the record passes too quickly, for its sampling, through the first micrometres of every motion, where the "
@@ -312,8 +309,8 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
     swapped = polished_again(fit, replace(problem, inputs=other, unsettled=(problem.inputs, *turned)))
     better, worse = sorted((fit, swapped), key=lambda one: one.cost)
-    if better.left > settings.noise_ratio_of_a_closed_fit * problem.noise_left(noise) or worse.cost < better.cost * (
-        1 + chi2.ppf(settings.probability_of_an_effect, 1) / better.independent
-    ):
+    unexplained = better.left > settings.noise_ratio_of_a_closed_fit * problem.noise_left(noise)
+    chance = chi2.ppf(settings.probability_of_an_effect, 1) / better.independent
+    if unexplained or worse.cost < better.cost * (1 + chance):
         return better
     return polished_again(better, replace(better.problem, unsettled=turned if better is swapped else sharper))

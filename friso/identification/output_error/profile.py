@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.refine import Refined, bounds_of, mean_square, refine_fit
+from friso.identification.output_error.fit import OutputErrorFit, shift_against
+from friso.identification.output_error.refine import Refined, mean_square, refine_fit
 from friso.identification.output_error.settings import settings
 
 WORSE = float(chi2.ppf(0.95, 1))
@@ -41,7 +41,7 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     fit with which costs are compared. The values reach beyond the interval's ends, or over the whole range. Returns the
     profile and the fits behind it.
     """
-    low, high = (float(end[number]) for end in bounds_of(fit.problem))
+    low, high = (float(end[number]) for end in fit.problem.bounds)
     centre = fit.inner[number]
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
     limit = best * (1 + WORSE / fit.independent)
@@ -71,21 +71,13 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
         return Refined(starts, mean_square(fit.problem.residuals(starts)))
     following = starts.copy()
     following[:, list(others)] += np.outer(values - fit.inner[number], _following(fit, number, others))
-    following = np.clip(following, *bounds_of(fit.problem))
+    following = np.clip(following, *fit.problem.bounds)
     stay, follow = mean_square(fit.problem.residuals(np.vstack([starts, following]))).reshape(2, -1)
     inner, cost = np.where((follow < stay)[:, None], following, starts), np.minimum(stay, follow)
     away = ~np.isclose(values, fit.inner[number], rtol=0, atol=1e-6 * np.ptp(values))
-    free = np.zeros(starts.shape, bool)
-    free[:, list(others)] = True
-    refined = refine_fit(
-        [fit.problem],
-        inner[away],
-        free[away],
-        settings.iterations_of_a_profile,
-        settings.cost_share_of_a_profile * WORSE / fit.independent,
-        aim=limit,
-        slopes=fit.slopes,
-    )
+    free = np.isin(np.arange(starts.shape[1]), others)
+    until = settings.iterations_of_a_profile, settings.cost_share_of_a_profile * WORSE / fit.independent
+    refined = refine_fit([fit.problem], inner[away], free, *until, aim=limit, slopes=fit.slopes)
     inner[away], cost[away] = refined.inner, refined.cost
     return Refined(inner, cost)
 
@@ -100,10 +92,7 @@ def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.
         return np.zeros(len(others))
     slopes = fit.linearised[1]
     along, across = slopes[:, fit.free.index(number)], slopes[:, [fit.free.index(other) for other in others]]
-    size = np.linalg.norm(across, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    rcond = settings.smallest_singular_value
-    return -np.linalg.lstsq(across / size, along, rcond=rcond)[0] / size
+    return shift_against(along, across)
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:

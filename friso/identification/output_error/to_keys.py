@@ -10,7 +10,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import IdentifiableFit, why_not_shown
-from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, FitParameter, keys_of
+from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, FitParameter, keys_at
 from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.settings import settings
 from friso.identification.output_error.settings import settings as output_error_settings
@@ -35,13 +35,10 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     keys, slopes = _slopes(fit)
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
-    shares = [
-        output_error_settings.static_error_of_following
-        if key == "friction.static" and not fit.problem.closed
-        else reading_settings.linearity_of_sensors
-        for key in keys
-    ]
-    linear = np.array(shares) * np.abs([values[key] for key in keys]) / COVERAGE
+    shares = np.full(len(keys), reading_settings.linearity_of_sensors)
+    if "friction.static" in keys and not fit.problem.closed:
+        shares[keys.index("friction.static")] = output_error_settings.static_error_of_following
+    linear = shares * np.abs([values[key] for key in keys]) / COVERAGE
     of_logarithm = {parameter.name for parameter in parameters if parameter.logarithmic}
     logarithmic = np.isin([_OWNERS.get(key, key) for key in keys], [*of_logarithm])
     spread_of_keys = np.sqrt(np.diag(covariance))
@@ -122,10 +119,8 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
 
 def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
     """Return the keys of the stage file with the SI values that follow from fitted numbers."""
-    values = {
-        parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
-    }
-    return {key: float(value) for key, value in keys_of(fit.problem.flat, values).items()}
+    values = keys_at(fit.problem.flat, fit.problem.parameters, inner)
+    return {key: float(value) for key, value in values.items()}
 
 
 def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:

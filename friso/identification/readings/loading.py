@@ -35,19 +35,8 @@ def stiffness_of_loading(
     without = np.array([_spring(products.sum(axis=0) - product) for product in products])
     error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
     value = _spring(products.sum(axis=0))
-    estimate = by_t(
-        KEY,
-        UNIT,
-        Mean(value, error, count - 1),
-        METHOD,
-        settings.linearity_of_sensors * abs(value),
-        settings.linearity_of_sensors * abs(value),
-    )
-    return (
-        estimate
-        if estimate.low > 0
-        else Estimate.unknown(KEY, UNIT, METHOD, SOFT, 0.0, max(estimate.high, 0.0) or np.inf)
-    )
+    linear = settings.linearity_of_sensors * abs(value)
+    return by_t(KEY, UNIT, Mean(value, error, count - 1), METHOD, linear, linear).if_positive(SOFT)
 
 
 def _spring(products: np.ndarray) -> float:

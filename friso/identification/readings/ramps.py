@@ -48,26 +48,20 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     """
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []
-    threshold, quick, stops = 0.0, 0, 0
+    cutoff, threshold, quick, stops = settings.low_pass_of_ramps, 0.0, 0, 0
+    shortest = max(settings.periods_of_a_ramp / (cutoff * log.sample_time), settings.samples_of_a_ramp)
     for part in log.segments:
         if part.stop - part.start < settings.samples_with_a_ramp:
             continue
-        breaks = slips(body[part], log.sample_time, settings.low_pass_of_ramps)
+        breaks = slips(body[part], log.sample_time, cutoff)
         threshold = max(threshold, breaks.threshold)
-        pushed = low_pass(force[part], log.sample_time, settings.low_pass_of_ramps)
-        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
-        for onset, start, rest, fastest, direction in marks:
+        pushed = low_pass(force[part], log.sample_time, cutoff)
+        for onset, start, rest, fastest, direction in breaks.starts:
             push = direction * force[part][rest : start + 1]
             if _lowest(push) > settings.force_share_of_a_start * float(direction * pushed[start]) > 0:
                 stops += 1
                 continue
-            begin, shortest = (
-                rest + _half(push),
-                max(
-                    settings.periods_of_a_ramp / (settings.low_pass_of_ramps * log.sample_time),
-                    settings.samples_of_a_ramp,
-                ),
-            )
+            begin = rest + _half(push)
             before = pushed[max(rest, start - round(shortest))]
             if start - begin < shortest or direction * (2 * before - pushed[rest] - pushed[start]) < 0:
                 quick += 1
@@ -78,9 +72,7 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
                 # friction opposes the motion, so the force's impulse is at least mass times speed
                 heaviest = direction * float(pushed[onset:fastest].sum()) * log.sample_time / abs(breaks.speed[fastest])
                 signals = direction * force[part], direction * body[part]
-                top = peak(
-                    *signals, mass or heaviest, log.sample_time, rising, (begin, start), settings.low_pass_of_ramps
-                )
+                top = peak(*signals, mass or heaviest, log.sample_time, rising, (begin, start), cutoff)
                 if mass:
                     at, level, unsure = top.at, top.level, top.unsure
                 else:
@@ -91,16 +83,13 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 8).T
     notes = []
     if quick:
-        notes.append(
-            f"{quick} ramps rise too fast for a low-pass at {settings.low_pass_of_ramps:g} Hz (or the sampling) and "
-            "are left out."
-        )
+        too_fast = f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling)"
+        notes.append(f"{too_fast} and are left out.")
     if stops:
         notes.append(f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:
         notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
-    times, places, directions, forces, rates, unsure, late, speeds = table
-    return Ramps(times, places, directions, forces, rates, unsure, late, speeds, threshold, tuple(notes))
+    return Ramps(*table, threshold, tuple(notes))
 
 
 def _lowest(push: np.ndarray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -63,6 +64,35 @@ class Bench:
     warnings: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Realisations:
+    """Logs of one experiment, each a realisation of its excitation.
+
+    `period` [s] is the approximate period of the excitation; None means that it is searched.
+    """
+
+    logs: Sequence[Log]
+    period: float | None
+
+    @cached_property
+    def records(self) -> dict[str, list[ResponseRecord]]:
+        """Return a record for each log, by output: the driven mass, and the other mass if measured in all.
+
+        Returns {} without logs.
+        """
+        outputs = ["position", "cart_position"][: 1 + all("cart_position" in log for log in self.logs)]
+        return {output: [_record(log, output) for log in self.logs] for output in outputs if self.logs}
+
+    def responses(self, which: slice = slice(None)) -> list[FrequencyResponse]:
+        """Estimate the response of each output from the logs `which`."""
+        first = self.logs[which][0]
+        return [_response(records[which], first, output, self.period) for output, records in self.records.items()]
+
+    def single(self, number: int, band: FrequencyRange) -> TwoMass:
+        """Fit the two-mass model to one log, by its number, within a band [Hz]."""
+        return fit_two_mass(*self.responses(slice(number, number + 1)), band=band)
+
+
 def analyse(
     logs: Sequence[Log],
     band: FrequencyRange | None = None,
@@ -75,30 +105,29 @@ def analyse(
     of friction); `period` [s] is the approximate period of the excitation (default: searched). Raises InputError if no
     response can be estimated.
     """
-    records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
+    runs = Realisations(logs, period)
+    positions = runs.records.get("position", [])
     if measured is not None:
         driven, other = as_measured(measured), None
     else:
-        driven, other = _clear([_response(of_output, logs[0], output, period) for output, of_output in records.items()])
-    warnings = [text for record in records.get("position", []) if record.reference is None for text in feedback(record)]
-    first = band or (
-        float(max(driven.frequency[0], driven.frequency[-1] * settings.frequency_above_friction)),
-        _top(driven),
-    )
+        driven, other = _clear(runs.responses())
+    warnings = [text for record in positions if record.reference is None for text in feedback(record)]
+    lowest, highest = float(driven.frequency[0]), float(driven.frequency[-1])
+    first = band or (max(lowest, highest * settings.frequency_above_friction), _top(driven))
     model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
     if model and band is None and _below(model, first):
         model = _attempt([], "two masses", fit_two_mass, driven, other, None) or model
     departs = _attempt(warnings, "departure", departure, driven, model.predict) if model else None
     used = band or _above(driven, departs)
     if model and len(logs) > 1:
-        model = _attempt(warnings, "two masses", _of_all, records, logs, driven, other, used, period)
+        model = _attempt(warnings, "two masses", _of_all, runs, driven, other, used)
     if model and band is None and other is None and _below(model, used):
         low = model["antiresonance frequency"].value
         seen = "no antiresonance in" if np.isnan(low) else f"an antiresonance at {low:.3g} Hz, below"
         warnings.append(f"no two masses: {seen} the band of the model, {used[0]:.3g} to {used[1]:.3g} Hz")
         model = None
     upper = driven.between(*used)
-    drag, explanation = _friction(warnings, records.get("position", []), driven, departs, model, period)
+    drag, explanation = _friction(warnings, positions, driven, departs, model, period)
     if model and not needs_two(model, driven, other):
         warnings.append("no two masses: one mass, with viscous friction and a spring to ground, explains the response")
         model = None
@@ -108,18 +137,8 @@ def analyse(
         tuple(logs), driven, other, used,
         _attempt(warnings, "mass lines", mass_lines, upper) or (), modes, model,
         _attempt(warnings, "limit cases", visible, upper, modes), departs, drag, explanation,
-        _left_out(warnings, records, logs, used, period), tuple(dict.fromkeys([*driven.warnings, *warnings])),
+        _left_out(warnings, runs, used), tuple(dict.fromkeys([*driven.warnings, *warnings])),
     )  # fmt: skip
-
-
-def _outputs(logs: Sequence[Log]) -> list[str]:
-    """List the outputs in all logs: the driven mass, and the other mass if measured in all.
-
-    Returns [] without logs.
-    """
-    if not logs:
-        return []
-    return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
@@ -214,31 +233,13 @@ def _top(driven: FrequencyResponse) -> float:
 
 
 def _of_all(
-    records: dict[str, list[ResponseRecord]],
-    logs: Sequence[Log],
-    driven: FrequencyResponse,
-    other: FrequencyResponse | None,
-    band: FrequencyRange,
-    period: float | None,
+    runs: Realisations, driven: FrequencyResponse, other: FrequencyResponse | None, band: FrequencyRange
 ) -> TwoMass:
     """Fit the two-mass model to all realisations, and widen intervals to their scatter.
 
     The scatter is that of fits to single realisations.
     """
-    apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
-    return widened(fit_two_mass(driven, other, band), apart)
-
-
-def _single(
-    records: dict[str, list[ResponseRecord]],
-    logs: Sequence[Log],
-    which: int,
-    band: FrequencyRange,
-    period: float | None,
-) -> TwoMass:
-    """Fit the two-mass model to a single realisation, the one with the index `which` in `logs`."""
-    responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
-    return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
+    return widened(fit_two_mass(driven, other, band), [runs.single(i, band) for i in range(len(runs.logs))])
 
 
 def _friction(
@@ -282,30 +283,23 @@ def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
 
 
 def _left_out(
-    warnings: list[str],
-    records: dict[str, list[ResponseRecord]],
-    logs: Sequence[Log],
-    band: FrequencyRange,
-    period: float | None,
+    warnings: list[str], runs: Realisations, band: FrequencyRange
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
     """Return, for each log, the relative errors with which the model of another log predicts it.
 
     The result is empty for a single log. A log is left out if no model fits the other one; `warnings` get the reason.
     """
-    if len(logs) < 2:
-        return ()
     rows = []
-    for i, log in enumerate(logs):
-        model = _attempt(warnings, "two masses", _single, records, logs, (i + 1) % len(logs), band, period)
+    for i, log in enumerate(runs.logs if len(runs.logs) > 1 else ()):
+        model = _attempt(warnings, "two masses", runs.single, (i + 1) % len(runs.logs), band)
         if model is not None:
-            rows.append((log.name, _errors(model, log, band, period, len(records) > 1)))
+            rows.append((log.name, _errors(model, log, band, runs.period, len(runs.records) > 1)))
     return tuple(rows)
 
 
 def _errors(model: TwoMass, log: Log, band: FrequencyRange, period: float | None, both: bool) -> tuple[float, ...]:
     """Return the relative prediction errors of the driven mass and, with `both`, of the other."""
-    outputs = [("position", True), *([("cart_position", False)] if both else [])]
     return tuple(
-        relative_error(lambda f, c=collocated: model.predict(f, c), _record(log, output), band, period)
-        for output, collocated in outputs
+        relative_error(lambda f, c=output == "position": model.predict(f, c), _record(log, output), band, period)
+        for output in ("position", "cart_position")[: 1 + both]
     )

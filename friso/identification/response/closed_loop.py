@@ -61,19 +61,16 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
     With `direct`, the present sample of the output is no past. Returns the probability (F-test) that the output's past
     does not help, and the fraction of the input's unpredicted part that it explains.
     """
-    target = driven[settings.past_of_the_input :]
-    past = [driven[settings.past_of_the_input - lag : -lag] for lag in range(1, settings.past_of_the_input + 1)]
-    first = int(direct)
-    other = [
-        answer[settings.past_of_the_input - lag : len(answer) - lag]
-        for lag in range(first, settings.past_of_the_output + first)
-    ]
+    own, others, first = settings.past_of_the_input, settings.past_of_the_output, int(direct)
+    target = driven[own:]
+    past = [driven[own - lag : -lag] for lag in range(1, own + 1)]
+    other = [answer[own - lag : len(answer) - lag] for lag in range(first, others + first)]
     before, after = (_residual_power(target, columns) for columns in (past, past + other))
-    free = len(target) - settings.past_of_the_input - settings.past_of_the_output - 1
+    free = len(target) - own - others - 1
     if not after > 0:
         return 1.0, 0.0
-    statistic = (before - after) / settings.past_of_the_output / (after / free)
-    return float(stats.f.sf(statistic, settings.past_of_the_output, free)), float(1 - after / before)
+    statistic = (before - after) / others / (after / free)
+    return float(stats.f.sf(statistic, others, free)), float(1 - after / before)
 
 
 def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
@@ -104,10 +101,8 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
             groups.append([])
         groups[-1].append((centre - half, centre, centre + half))
     passages = [passage for group in groups for passage in ([_merged_passage(group)] if len(group) % 2 else group)]
-    method, crossed = "where the open loop passes 0 dB", []
-    for number, (low, centre, high) in enumerate(np.exp(passages).reshape(-1, 3).tolist(), 1):
-        crossed.append(Estimate(f"crossover {number}", "Hz", centre, low, high, method))
-    return tuple(crossed)
+    method, crossed = "where the open loop passes 0 dB", enumerate(np.exp(passages).reshape(-1, 3).tolist(), 1)
+    return tuple(Estimate(f"crossover {n}", "Hz", centre, low, high, method) for n, (low, centre, high) in crossed)
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:

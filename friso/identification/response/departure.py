@@ -11,7 +11,7 @@ from scipy import stats
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.estimators import multisine
-from friso.identification.response.fitting import refined
+from friso.identification.response.fitting import ResponseTarget
 from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
@@ -47,12 +47,8 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
     """
     frequency = response.frequency
     if len(frequency) < 4 * settings.lines_of_a_window:
-        raise InputError(
-            "response",
-            f"{len(frequency)} lines",
-            f"at least {4 * settings.lines_of_a_window} lines",
-            "a multisine of 100 lines",
-        )
+        least = f"at least {4 * settings.lines_of_a_window} lines"
+        raise InputError("response", f"{len(frequency)} lines", least, "a multisine of 100 lines")
     ratio = response.response / model(frequency)
     weight = 2 * np.abs(response.response) ** 2 / response.scatter() ** 2
     half, ones = len(frequency) // 2, np.ones(settings.lines_of_a_window)
@@ -66,9 +62,8 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
         onset = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
         return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
     last = int(off[-1]) + settings.lines_of_a_window - 1
-    low, high = frequency[last - settings.lines_of_a_window + 1], frequency[last]
-    middle = float(frequency[last - settings.lines_of_a_window // 2])
-    onset = Estimate(name, "Hz", middle, float(low), float(high), method)
+    places = last - settings.lines_of_a_window // 2, last - settings.lines_of_a_window + 1, last
+    onset = Estimate(name, "Hz", *(float(frequency[place]) for place in places), method)
     return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
 
 
@@ -127,7 +122,7 @@ def friction_from_departure(
         return (1 / (np.exp(p[0]) * s**2 + p[1] * s + p[2]))[None]
 
     inertia = float(np.median(1 / np.abs(values[-4:] * s[-4:] ** 2)))
-    fit = refined(model, np.array([np.log(inertia), inertia, 0.0]), values[None], deviation[None])
+    fit = ResponseTarget(model, values[None], deviation[None]).refined(np.array([np.log(inertia), inertia, 0.0]))
     into, out = part.channels.input_unit, part.channels.output_unit
     method = "mass, damper and spring fitted to the response"
     mass = fit.estimate("mass", f"{into} s^2/{out}", method, lambda p: float(np.exp(p[0])), positive=True)
@@ -141,9 +136,8 @@ def friction_from_departure(
         warnings.append("besides friction a spring acts (guide, cable, cogging or friction before sliding)")
     if left > 0.5:
         warnings.append("friction as a damper and a spring leaves more than half of the departure unexplained")
-    return Drag(
-        mass, damping, stiffness, _coulomb(damping, velocity, into), velocity, sign, float(left), tuple(warnings)
-    )
+    coulomb = _coulomb(damping, velocity, into)
+    return Drag(mass, damping, stiffness, coulomb, velocity, sign, float(left), tuple(warnings))
 
 
 def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
@@ -196,13 +190,12 @@ def explained(
         raise InputError("factors", f"{list(factors)}", "factors with 1 among them, the recorded input", "(0.5, 1, 2)")
     forces = np.concatenate([factor * drag.sign * np.stack(inputs) for factor in factors])
     spring = max(drag.stiffness.value, 0.0)
-    positions = slid(
-        np.tile(forces, settings.periods_simulated), sample_time, drag.mass.value, drag.coulomb.value, spring
-    )[0]
+    repeated = np.tile(forces, settings.periods_simulated)
+    positions = slid(repeated, sample_time, drag.mass.value, drag.coulomb.value, spring)[0]
     settled = slice(4 * forces.shape[1], None)
     records = [
-        ResponseRecord(drag.sign * np.tile(force, settings.periods_simulated)[settled], position[settled], sample_time)
-        for force, position in zip(forces, positions, strict=True)
+        ResponseRecord(drag.sign * force[settled], position[settled], sample_time)
+        for force, position in zip(repeated, positions, strict=True)
     ]
     groups = {factor: records[i * len(inputs) : (i + 1) * len(inputs)] for i, factor in enumerate(factors)}
     responses = {factor: multisine(group, channels=measured.channels) for factor, group in groups.items()}

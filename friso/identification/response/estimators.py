@@ -31,9 +31,8 @@ def multisine(
     spectra_of_records, remarks = _together([spectra(record, period) for record in records])
     excited = np.logical_and.reduce([realisation.excited for realisation in spectra_of_records])
     if not excited.any():
-        raise InputError(
-            "records", "realisations without a common line", "the same excited lines", "one period for all"
-        )
+        actual = "realisations without a common line"
+        raise InputError("records", actual, "the same excited lines", "one period for all")
     response, noise = _averaged(spectra_of_records, excited)
     degrees = np.full(response.shape, 2.0 * sum(len(realisation.input) - 1 for realisation in spectra_of_records))
     if len(spectra_of_records) > 1:
@@ -47,21 +46,9 @@ def multisine(
     warnings = dict.fromkeys([*remarks, *(text for realisation in spectra_of_records for text in realisation.warnings)])
     if not distortion_known:
         warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
-    frequency = spectra_of_records[0].frequency[excited]
-    known_channels = channels or Channels()
-    return FrequencyResponse(
-        frequency,
-        response,
-        deviation,
-        noise,
-        distortion,
-        degrees,
-        "multisine",
-        known_channels,
-        None,
-        tuple(warnings),
-        records[0].sample_time,
-    )
+    lines = (spectra_of_records[0].frequency[excited], response, deviation, noise, distortion, degrees)
+    origin = {"channels": channels or Channels(), "warnings": tuple(warnings), "sample_time": records[0].sample_time}
+    return FrequencyResponse(*lines, "multisine", **origin)
 
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
@@ -102,10 +89,8 @@ def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
     response = outputs.mean(axis=0) / gain
     variance = np.zeros(len(response))
     for realisation in records:
-        residuals = (realisation.output[:, excited] - response * realisation.input[:, excited]) / realisation.reference[
-            excited
-        ]
-        variance += np.var(residuals, axis=0, ddof=1) / len(residuals)
+        left = realisation.output[:, excited] - response * realisation.input[:, excited]
+        variance += np.var(left / realisation.reference[excited], axis=0, ddof=1) / len(left)
     return response, np.sqrt(variance) / (len(records) * np.abs(gain))
 
 
@@ -114,9 +99,11 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
     Both are averaged over periods.
     """
-    outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
-    inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
-    return np.array(outputs), np.array(inputs)
+    outputs, inputs = (
+        np.array([getattr(one, name)[:, excited].mean(axis=0) / one.reference[excited] for one in records])
+        for name in ("output", "input")
+    )
+    return outputs, inputs
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -64,12 +64,8 @@ def _resonances(modes: Modes | None) -> Mapping[str, float]:
     """
     if modes is None:
         return {}
-    frequencies = {
-        estimate.name.removesuffix(" frequency"): estimate.value
-        for estimate in modes.estimates
-        if estimate.unit == "Hz"
-    }
-    return dict(sorted(frequencies.items(), key=lambda item: item[1]))
+    frequencies = sorted((one for one in modes.estimates if one.unit == "Hz"), key=lambda one: one.value)
+    return {one.name.removesuffix(" frequency"): one.value for one in frequencies}
 
 
 def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
@@ -100,7 +96,6 @@ def _verdict(case: str, pairs: Mapping[str, float]) -> str:
     if case == "sliding":
         return "cart sliding: " + ("free joint, antiresonance and resonance" if pair else "no joint mode is seen")
     if case == "stuck":
-        return "cart stuck: " + (
-            "friction or joint as a spring, then a mode" if "resonance" in kinds else "spring alone"
-        )
+        spring = "friction or joint as a spring, then a mode" if "resonance" in kinds else "spring alone"
+        return f"cart stuck: {spring}"
     return "no straight line below the modes: the cart may be stuck or sliding"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.response.fitting import ResponseFit, refined
+from friso.identification.response.fitting import ResponseFit, ResponseTarget
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
 
@@ -22,17 +23,13 @@ METHOD = "rational fit of the response"
 class Modes:
     """A fit of modes over `band` [Hz], with its resonances and antiresonances by frequency.
 
-    Estimates are called "resonance 1 frequency" and so on. `order` says how the number of modes was chosen. `low_level`
-    and `high_level` are the acceleration per input below and above all modes (mass lines), unknown without a rigid
-    body.
+    Estimates are called "resonance 1 frequency" and so on. `order` says how the number of modes was chosen.
     """
 
     shape: RationalShape
     fit: ResponseFit
     scale: float
     estimates: tuple[Estimate, ...]
-    low_level: Estimate
-    high_level: Estimate
     order: str
     band: tuple[float, float]
     warnings: tuple[str, ...]
@@ -62,14 +59,14 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
     rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, settings.modes_at_most)]
     shape, start, *_ = simplest_model(rows)
     low, high = bounds(shape, s)
-    fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
+    target = ResponseTarget(lambda p: rational(p, shape, s)[None], part.response[None], deviation[None])
+    fit = target.refined(start, low, high)
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
-    low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
     warnings = [*_cancelling(fit, shape, scale, limits)]
     if fit.reduced > settings.misfit_of_a_right_model:
         warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
     estimates = _pairs(fit, shape, scale, limits)
-    return Modes(shape, fit, scale, estimates, low_level, high_level, _described(shape, rows), limits, tuple(warnings))
+    return Modes(shape, fit, scale, estimates, _described(shape, rows), limits, tuple(warnings))
 
 
 def _described(shape: RationalShape, rows: list[Row]) -> str:
@@ -128,23 +125,6 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
         return complex(candidates[np.argmin(np.abs(candidates - root))]) if candidates.size else complex(np.nan, np.nan)
 
     return nearest
-
-
-def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
-    """Return the acceleration per input on the mass line below or above all modes.
-
-    `which` is "low" or "high". Below all modes the rigid body alone counts; above, the residues of the modes are added.
-    The level is not determined without a rigid body, or above if modes beyond the band still act.
-    """
-    unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
-    name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"
-    if not shape.rigid:
-        return Estimate.unknown(name, unit, METHOD, "no rigid body fits the response in this band")
-    if which == "high" and shape.constant:
-        return Estimate.unknown(name, unit, METHOD, "modes beyond the band still act at its upper end")
-    stop = shape.nonlinear + (1 if which == "low" else 1 + shape.modes)
-    factor = (2 * np.pi * scale) ** 2
-    return fit.estimate(name, unit, METHOD, lambda p: factor * float(np.sum(p[shape.nonlinear : stop])))
 
 
 @dataclass(frozen=True)
@@ -224,10 +204,8 @@ def _better(larger: Row, smaller: Row) -> bool:
 
     Its Bayesian criterion and its sum of squares must both be lower by more than the settings ask.
     """
-    return (
-        larger.bic < smaller.bic - settings.criterion_of_a_mode
-        and larger.squares < settings.squares_left_by_a_mode * smaller.squares
-    )
+    lower = larger.bic < smaller.bic - settings.criterion_of_a_mode
+    return lower and larger.squares < settings.squares_left_by_a_mode * smaller.squares
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
@@ -307,9 +285,8 @@ def _eliminated(
         return _linear_parameters(_columns(nonlinear, shape, s), values, deviation)[1]
 
     lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
-    return least_squares(
-        left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=settings.tolerance_of_a_fit, max_nfev=60
-    ).x
+    options: Any = {"bounds": (lower, upper), "ftol": settings.tolerance_of_a_fit, "max_nfev": 60}
+    return least_squares(left, np.clip(start, lower, upper), **options).x
 
 
 def _completed(
@@ -334,10 +311,7 @@ def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.nd
     numerator = np.zeros(1)
     for number, residue in enumerate(linear):
         others = [factor for other, factor in enumerate(factors) if other != number]
-        product = np.array([residue])
-        for factor in others:
-            product = np.polymul(product, factor)
-        numerator = np.polyadd(numerator, product)
+        numerator = np.polyadd(numerator, reduce(np.polymul, others, np.array([residue])))
     zeros = np.roots(numerator)
     poles = omega * (-damping + 1j * np.sqrt(np.maximum(1 - damping**2, 0.0)))
     return poles[np.argsort(np.abs(poles))], zeros[zeros.imag > 1e-6 * np.abs(zeros)]

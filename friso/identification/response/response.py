@@ -120,9 +120,8 @@ class FrequencyResponse:
             text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
             if self.coherence is not None and self.coherence.size:
                 text += f", coherence at most {np.max(self.coherence):.2g}"
-            expected = (
-                f"a response of {ratio:g} deviations and a coherence of {settings.coherence_of_a_line:g} on some line"
-            )
+            coherence = f"a coherence of {settings.coherence_of_a_line:g}"
+            expected = f"a response of {ratio:g} deviations and {coherence} on some line"
             raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
             return self

@@ -97,9 +97,7 @@ def _channels(
     labels, notes, out = table["Name"], [], []
     clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
     times = [_floats(path, form, frame, start) for start in clocks]
-    times = [
-        time[: int(np.flatnonzero(~np.isnan(time))[-1]) + 1] if not np.isnan(time).all() else time[:0] for time in times
-    ]
+    times = [time[: int(np.flatnonzero(~np.isnan(time)).max(initial=-1)) + 1] for time in times]
     _no_shifted_rows(path, form, frame, times)
     for start, end, time in zip(clocks, [*clocks[1:], len(labels)], times, strict=True):
         if not time.size:
