@@ -10,10 +10,10 @@ import scipy.io
 from refusals import Wording
 from scipy import signal
 
+from friso.identification.response.analysis import visible
 from friso.identification.response.closed_loop import feedback
 from friso.identification.response.departure import departure, explained, friction_from_departure
 from friso.identification.response.estimators import multisine
-from friso.identification.response.limit_cases import visible
 from friso.identification.response.mass_line import mass_lines
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.records import ResponseRecord, relative_error

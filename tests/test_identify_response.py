@@ -14,11 +14,10 @@ from friso.identification.estimate import Estimate
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
-from friso.identification.response.analysis import analyse
+from friso.identification.response.analysis import analyse, visible
 from friso.identification.response.closed_loop import crossovers, feedback
 from friso.identification.response.departure import Drag, departure, explained, friction_from_departure, slid
 from friso.identification.response.estimators import local_polynomial, multisine
-from friso.identification.response.limit_cases import visible
 from friso.identification.response.mass_line import mass_lines, straight_lines
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.one_mass import fit_one_mass

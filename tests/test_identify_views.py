@@ -30,9 +30,9 @@ from friso.identification.method import Experiment, Identification, Prediction
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, SimulationErrors, residual_of
 from friso.identification.output_error.coverage import coverage
 from friso.identification.output_error.fit import OutputErrorFit, first_values
+from friso.identification.output_error.identifiable import Profile
 from friso.identification.output_error.parameters import fit_parameters
 from friso.identification.output_error.problem import Simulated, loop_problem, tracking
-from friso.identification.output_error.profile import Profile
 from friso.identification.quality import Quality
 from friso.identification.readings.at_bearing import Between
 from friso.identification.readings.common import deflections, record

@@ -24,10 +24,9 @@ from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import IdentifiableFit, fit_identifiable
+from friso.identification.output_error.identifiable import IdentifiableFit, Profile, fit_identifiable
 from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
-from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
 from friso.identification.output_error.to_keys import drawn_from, estimates_of
 from friso.identification.quality import Quality, quality_of

@@ -65,17 +65,12 @@ def _claims_together(courses: Sequence[Course]) -> str | None:
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
 
 
-def _partial(log: Log) -> bool:
-    """Tell whether a log alone has too few ramps to determine static friction."""
-    return len(static_from_ramps(log).ramps.times) < reading_settings.fewest_ramps
-
-
 KIND = ExperimentKind[BreakAway](
     analyse=of_one(lambda log, prior, settings: static_from_ramps(log, sum(prior.masses(log)))),
     estimates=lambda result, stage: (replace(result.static, name="friction.static"),),
     after=("frequency", "moves"),
     foreign=("force",),
     per_unit=True,
-    partial=_partial,
+    partial=lambda log: len(static_from_ramps(log).ramps.times) < reading_settings.fewest_ramps,
     claims_together=_claims_together,
 )

@@ -25,9 +25,8 @@ from friso.identification.readings.common import (
     low_pass,
     on_bearing,
     rate,
+    solve_normal_equations,
 )
-from friso.identification.readings.loading import METHOD as LOADED
-from friso.identification.readings.loading import stiffness_of_loading
 from friso.identification.readings.rate_effect import static_friction
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.readings.slips import Slip, slips
@@ -38,6 +37,9 @@ from friso.stage import Stage
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
 
 KEY = "friction.static"
+
+LOADED = "joint.stiffness", "N/m", "force over deflection while the cart sticks"
+"""Key, unit and method of the joint's stiffness from a log of slips."""
 
 
 @dataclass(frozen=True)
@@ -152,9 +154,44 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
     pushed = _actuator(log, 0.0, cutoff)
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"
-        return Estimate.unknown("joint.stiffness", "N/m", LOADED, reason)
+        return Estimate.unknown(*LOADED, reason)
     bending = by_segment(log, deflected, rate, cutoff)
     return stiffness_of_loading(deflected, bending, _acceleration(log, cutoff), pushed, loads)
+
+
+def stiffness_of_loading(
+    deflection: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, force: np.ndarray, loads: list[slice]
+) -> Estimate:
+    """Estimate the stiffness [N/m] of a joint that is loaded between slips of the cart.
+
+    The deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the actuator's force [N] are
+    low-passed, shape (n,). `loads` are the samples between slips, in which the cart sticks and the joint is loaded.
+
+    Least squares fits a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
+    joint. The error is by the jackknife over loads. Creep of the cart does not matter. With fewer than three loads the
+    stiffness is unknown.
+    """
+    count = len(loads)
+    if count < reading_settings.fewest_loads:
+        return Estimate.unknown(*LOADED, f"{count} loads between slips: {reading_settings.fewest_loads} are needed")
+    signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, acceleration, force)]) for s in loads]
+    products = np.array([x @ x.T for x in signals])
+    if not products[:, 0, 0].sum() > 0:
+        return Estimate.unknown(*LOADED, "the deflection stays the same")
+    without = np.array([_spring(products.sum(axis=0) - product) for product in products])
+    error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
+    value = _spring(products.sum(axis=0))
+    linear, (key, unit, method) = reading_settings.linearity_of_sensors * abs(value), LOADED
+    estimate = by_t(key, unit, Mean(value, error, count - 1), method, linear, linear)
+    return estimate.if_positive("more deflection does not need more force")
+
+
+def _spring(products: np.ndarray) -> float:
+    """Fit the last of several signals by all others, and return the coefficient of the first.
+
+    `products`, shape (signals, signals), are the scalar products of the signals.
+    """
+    return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])
 
 
 def _peak(pull: np.ndarray, sample_time: float, cutoff: float, slip: Slip) -> tuple[int, float, float, float, bool]:

@@ -16,8 +16,7 @@ from scipy.stats import t as student
 
 from friso.errors import InputError
 from friso.identification.kind import Prior
-from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
-from friso.identification.laws.fit import LawFit, LawProblem
+from friso.identification.laws.fit import DraggedRecord, LawFit, LawProblem, blocks, dragged_record
 from friso.identification.laws.settings import settings
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import believed_between

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from friso.errors import InputError, LogError
-from friso.identification.logs import checks, delays
+from friso.identification.logs import checks
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import FORMATS
 from friso.identification.logs.gaps import check_gaps, told_by_mechanics
@@ -202,9 +202,9 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
     same_kind = ("position" in notes.units) == ("velocity" in notes.units)
     if position is not None and velocity is not None and same_kind:
         lines.append(checks.velocity_warning(position, velocity, period, parts))
-        lines.append(delays.velocity_line(position, velocity, period, parts))
+        lines.append(checks.velocity_line(position, velocity, period, parts))
     if position is not None and force is not None:
-        lines.append(delays.force_line(position, force, period, parts))
+        lines.append(checks.force_line(position, force, period, parts))
     return [line for line in lines if line]
 
 

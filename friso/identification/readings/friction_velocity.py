@@ -224,8 +224,9 @@ def _direction(
         return _one_speed(speeds, friction, method, spent)
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
-    names = (("friction.coulomb", "N"), ("friction.viscous", "N s/m"))
-    coulomb, viscous = (_fitted(*name, i, solution, covariance, freedom, method) for i, name in enumerate(names))
+    level, slope = map(Mean, map(float, solution), np.sqrt(np.diag(covariance)).tolist(), [freedom] * 2)
+    coulomb = by_t("friction.coulomb", "N", level, method)
+    viscous = by_t("friction.viscous", "N s/m", slope, method)
     low, high = speeds.min() * 1e3, speeds.max() * 1e3
     if coulomb.determined and coulomb.low <= 0:
         ends = "with none, within its error" if coulomb.high > 0 else "below zero, as that of no bearing does"
@@ -278,13 +279,6 @@ def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Directi
     """
     high, low = coulomb.withheld(reason, high=coulomb.high), viscous.withheld(reason, low=viscous.low)
     return replace(_nothing(reason), coulomb=high, viscous=low)
-
-
-def _fitted(
-    name: str, unit: str, place: int, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
-) -> Estimate:
-    """Make the estimate of one number of a linear fit, at index `place` of its `solution`."""
-    return by_t(name, unit, Mean(float(solution[place]), float(covariance[place, place] ** 0.5), freedom), method)
 
 
 def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:
