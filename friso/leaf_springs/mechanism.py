@@ -87,12 +87,8 @@ class Mechanism:
         inertia = _triple(section, "inertia", cube_inertia(bare.body.mass))
         centre = _triple(section, "centre", bare.body.centre)
         actuation = _triple(section, "actuation", centre)
-        return replace(
-            bare,
-            body=MovingBody(bare.body.mass, inertia, centre),
-            actuation=actuation,
-            sensor=_triple(section, "sensor", actuation),
-        )
+        body, sensor = MovingBody(bare.body.mass, inertia, centre), _triple(section, "sensor", actuation)
+        return replace(bare, body=body, actuation=actuation, sensor=sensor)
 
     def member(self, number: int) -> Mechanism:
         """Return one mechanism, with plain numbers, out of many that are arrays, by its number."""

@@ -96,7 +96,8 @@ class Realisations:
 
     def single(self, number: int, band: FrequencyRange) -> TwoMass:
         """Fit the two-mass model to one log, by its number, within a band [Hz]."""
-        return fit_two_mass(*self.responses(slice(number, number + 1)), band=band)
+        driven, *other = self.responses(slice(number, number + 1))
+        return fit_two_mass(driven, other[0] if other else None, band)
 
 
 def analyse(

@@ -57,9 +57,8 @@ def read_twincat(path: Path) -> ChannelTable:
     if first is None or names_at is None:
         raise LogError("log", "a TwinCAT Scope export without rows of numbers", "an export with data", "", str(path))
     table = {cells[0]: cells for cells in rows[names_at:first] if cells and cells[0]}
-    sample = ";".join(
-        cell for cells in rows[names_at:] for cell in cells if is_number(cell, ",") or is_number(cell, ".")
-    )
+    below = (cell for cells in rows[names_at:] for cell in cells)
+    sample = ";".join(cell for cell in below if is_number(cell, ",") or is_number(cell, "."))
     decimal = "," if delimiter != "," and "," in sample else "."
     if delimiter != "," and decimal == "." and "." not in sample:
         decimal = ","  # whole numbers only so far: the export's locale writes a comma unless a point shows
