@@ -358,9 +358,8 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     elif mode == POSITION_FILTER:
         left.append("the filter of the commanded position (input_filter_bandwidth)")
     elif mode != TRAJECTORY:
-        left.append(
-            f"input_mode = {mode:g}: how the drive comes to its position; none of its feedforward is taken over"
-        )
+        how = "how the drive comes to its position; none of its feedforward is taken over"
+        left.append(f"input_mode = {mode:g}: {how}")
     accelerates, brakes = (axis.number(f"{MOVE}.{name}", 0.0) for name in ("accel_limit", "decel_limit"))
     if accelerates and brakes and accelerates != brakes:
         left.append(f"decel_limit = {brakes:g} turn/s^2: friso's move brakes as it accelerates")

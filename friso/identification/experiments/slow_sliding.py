@@ -207,13 +207,10 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
     scale = float(equation.friction.std())
     complete = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
-    options: Any = {
-        "jac": lambda p: equation.derivatives(p) / scale,
-        "bounds": (low, high),
-        "ftol": experiment_settings.tolerance_of_sliding,
-        "xtol": experiment_settings.tolerance_of_sliding,
-    }
-    fits: Any = [least_squares(lambda p: equation.residual(p) / scale, start, **options) for start in complete]
+    off, slopes = (lambda p: equation.residual(p) / scale), (lambda p: equation.derivatives(p) / scale)
+    tolerance = experiment_settings.tolerance_of_sliding
+    options: Any = {"jac": slopes, "bounds": (low, high), "ftol": tolerance, "xtol": tolerance}
+    fits: Any = [least_squares(off, start, **options) for start in complete]
     return min(fits, key=lambda fit: fit.cost).x
 
 

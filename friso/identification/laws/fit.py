@@ -131,13 +131,10 @@ class LawProblem:
         low, high = self.bounds
         starts = np.clip(starts, low + 2 * step, high - 2 * step)
         first = starts[np.argmin(np.sum(self._weighed(starts, weights) ** 2, axis=1))]
-        options: dict[str, Any] = {
-            "max_nfev": settings.evaluations_of_a_fit,
-            "xtol": settings.tolerance_of_a_fit,
-            "ftol": settings.tolerance_of_a_fit,
-            "jac": jacobian,
-        }
-        best = least_squares(lambda numbers: at(numbers)[0], first, bounds=(low, high), **options).x
+        tolerance = settings.tolerance_of_a_fit
+        options: dict[str, Any] = {"bounds": (low, high), "xtol": tolerance, "ftol": tolerance, "jac": jacobian}
+        residual, most = (lambda numbers: at(numbers)[0]), settings.evaluations_of_a_fit
+        best = least_squares(residual, first, max_nfev=most, **options).x
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:

@@ -194,9 +194,8 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
 
     The values are in SI units, and even in the logarithm for a logarithmic parameter.
     """
-    return parameter.outer(
-        rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), settings.machines_drawn)
-    )
+    ends = parameter.inner(parameter.low), parameter.inner(parameter.high)
+    return parameter.outer(rng.uniform(*ends, settings.machines_drawn))
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
