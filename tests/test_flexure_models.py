@@ -15,7 +15,7 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from friso.leaf_springs import closed_forms, curved, plate
+from friso.leaf_springs import closed_forms, closed_model, plate
 from friso.leaf_springs.beam_system import BeamFailure, Configuration, LeafBeams
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.closed_model import closed_form_model
@@ -178,8 +178,8 @@ def test_units_of_force_and_mass(springs: Mechanism, force: float, density: floa
 @given(springs=mechanisms(), share=st.floats(0.0, 0.05))
 def test_stiffness_at_the_stage(springs: Mechanism, share: float) -> None:
     straight = closed_forms.stage_stiffness(springs)
-    assert curved.stage_stiffness_at(springs, 0.0) == pytest.approx(straight, rel=2e-3, abs=1e-6 * straight[2, 2])
-    bent = curved.stage_stiffness_at(springs, share * springs.length)
+    assert closed_model.stage_stiffness_at(springs, 0.0) == pytest.approx(straight, rel=2e-3, abs=1e-6 * straight[2, 2])
+    bent = closed_model.stage_stiffness_at(springs, share * springs.length)
     unit = np.array([1, 1, 1, *[springs.length] * 3])
     for matrix in (straight, bent):
         even = matrix / np.outer(unit, unit)

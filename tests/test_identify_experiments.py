@@ -25,9 +25,10 @@ from friso.identification.experiments.steps import stiffness_from_steps
 from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.identification.kind import NOTHING_CHOSEN, Prior
 from friso.identification.kinds import KINDS
+from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
-from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, runs, t_value
+from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, t_value
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity

@@ -11,8 +11,7 @@ from friso.equations.friction.measured import MeasuredFriction
 from friso.errors import InputError
 from friso.identification import method
 from friso.identification.laws.comparison import LawComparison, LawPrediction, comparable
-from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
-from friso.identification.laws.fit import LawFit, LawProblem
+from friso.identification.laws.fit import DraggedRecord, LawFit, LawProblem, blocks, dragged_record
 from friso.identification.method import Identification
 from friso.identification.readings.at_bearing import Between, LowPass
 from friso.identification.readings.common import record

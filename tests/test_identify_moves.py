@@ -19,21 +19,25 @@ import friso
 from friso.identification import moves as moves_analysis
 from friso.identification.doubt import DOUBTS, FitCase, RecordCase, leading_effect
 from friso.identification.doubts import coupling, delay, force_digits, friction_by_direction, load_friction, play
-from friso.identification.errors import errors_of
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.moves import _play_that_looks_alike
-from friso.identification.inverse_model import inverse_model
-from friso.identification.logs.integrated import integrated
+from friso.identification.inverse_model import inverse_model, moved_in
+from friso.identification.logs.assemble import integrated
 from friso.identification.logs.log import Log
-from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
+from friso.identification.moves import IdentifiedMoves, errors_of, identify_moves, simulated_log
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import identifiable
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
-from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
-from friso.identification.output_error.identifiable import IdentifiableFit, believed, bounds_as_much
+from friso.identification.output_error.identifiable import (
+    IdentifiableFit,
+    believed,
+    bounds_as_much,
+    with_force_settled,
+    with_smoothness_settled,
+)
 from friso.identification.output_error.parameters import BRISTLES, EXPONENT, MASS, RATIO, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
-from friso.identification.output_error.refine import bounds_of, mean_square
+from friso.identification.output_error.refine import mean_square
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality
@@ -250,7 +254,7 @@ def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, IdentifiedM
 
 def test_starts_stay_in_their_ranges(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
     result = quick[2].fit
-    low, high = bounds_of(result.problem)
+    low, high = result.problem.bounds
     every = range(len(result.inner))
     for starts in (nearby(result), everywhere(result.problem, tuple(every), result.inner)):
         assert starts[0] == pytest.approx(result.inner)
@@ -274,7 +278,9 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     log = replace(log, signals={role: values[:2000] for role, values in log.signals.items()}, time=log.time[:2000])
     log = replace(log, segments=(slice(0, 2000),))
     flat = {**machine.flat, "friction.viscous_asymmetry": 0.0}
-    inputs = moves_analysis._problems(log, log.segments[0], flat, inverse_model(log), True)[1]
+    inverse = inverse_model(log)
+    speed = float(np.abs(moved_in(log, log["position"], inverse.bandwidth).velocity).max())
+    inputs = moves_analysis._problems(log, log.segments[0], flat, inverse, speed, True)[1]
     assert inputs is not None
     exact = replace(inputs, target=loop_problem(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
     names = [item.name for item in inputs.parameters]

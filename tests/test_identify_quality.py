@@ -760,6 +760,8 @@ class Valley:
         FitParameter(name, "", 0.0, -3.0, 3.0, logarithmic=False) for name in ("a", "b")
     )
 
+    bounds = Problem.bounds
+
     def _off(self, inner: np.ndarray) -> np.ndarray:
         return self.weight * np.stack([10 * (inner[:, 1] - inner[:, 0] ** 2), 1 - inner[:, 0]], axis=1)
 

@@ -14,8 +14,7 @@ from test_identify_views import moves
 import friso
 from friso.identification.inverse_model import inverse_model, motion, unit_of
 from friso.identification.kind import AnalysisSettings
-from friso.identification.logs.assemble import read_log
-from friso.identification.logs.integrated import NOTE
+from friso.identification.logs.assemble import NOTE, read_log
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
 from friso.identification.method import Identification, identify

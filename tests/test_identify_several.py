@@ -14,8 +14,7 @@ from friso.errors import InputError
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.kind import as_set_up
 from friso.identification.kinds import KINDS
-from friso.identification.logs.joined import join_logs
-from friso.identification.logs.log import Log
+from friso.identification.logs.log import Log, join_logs
 from friso.identification.method import check_predictions, identify
 from friso.identification.readings.common import record
 from friso.identification.readings.course import Course
@@ -56,8 +55,8 @@ def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
         return Course(replace(log, signals={role: log[role] for role in ("position", "force")}))
 
     courses = [course(speed) for speed in speeds]
-    alone, together = KINDS["constant-speed"].claims, KINDS["constant-speed"].claims_together
-    moves = KINDS["moves"].claims
+    alone, together = KINDS["constant-speed"].claimed, KINDS["constant-speed"].claims_together
+    moves = KINDS["moves"].claimed
     assert alone is not None
     assert together is not None
     assert moves is not None
@@ -95,7 +94,7 @@ def test_a_body_within_its_bristles_goes_at_no_constant_speed() -> None:
     force = np.concatenate([size * np.abs(4 * (time[:4000] / 2 % 1) - 2) - size for size in (1.0, 2.0, 3.0)])
     position = force / 1e6 + 1e-9 * random.standard_normal(time.size)
     log = record("loops", DT, position=position, force=force)
-    claims = KINDS["constant-speed"].claims
+    claims = KINDS["constant-speed"].claimed
     assert claims is not None
     assert claims(Course(log)) is None
     assert not friction_velocity(log).both.coulomb.determined

@@ -15,10 +15,9 @@ from friso.identification.doubts import lost_inertia, slow_motion, stiffer_brist
 from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import bandwidth_of, inverse_model
-from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.output_error.to_keys import _range
+from friso.identification.output_error.to_keys import _range, drawn_from
 from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps

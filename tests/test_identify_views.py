@@ -16,7 +16,6 @@ from pages import Page
 from snapshots import Snapshots
 
 from friso.identification.combine import combined
-from friso.identification.errors import SimulationErrors, residual_of
 from friso.identification.estimate import NO_INTERVAL, Estimate
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.experiments.constant_speed import FrictionAtSpeeds
@@ -28,12 +27,12 @@ from friso.identification.inverse_model import inverse_model, motion
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.method import Experiment, Identification, Prediction
-from friso.identification.moves import IdentifiedMoves, SimulatedLog
+from friso.identification.moves import IdentifiedMoves, SimulatedLog, SimulationErrors, residual_of
 from friso.identification.output_error.coverage import coverage
 from friso.identification.output_error.fit import OutputErrorFit, first_values
+from friso.identification.output_error.identifiable import Profile
 from friso.identification.output_error.parameters import fit_parameters
 from friso.identification.output_error.problem import Simulated, loop_problem, tracking
-from friso.identification.output_error.profile import Profile
 from friso.identification.quality import Quality
 from friso.identification.readings.at_bearing import Between
 from friso.identification.readings.common import deflections, record

@@ -16,8 +16,15 @@ import friso
 from friso.errors import InputError, LogError
 from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
-from friso.identification.logs.checks import clipped_share, interpolated, samples_held, unwrapped
-from friso.identification.logs.delays import force_line, in_blocks, lag
+from friso.identification.logs.checks import (
+    clipped_share,
+    force_line,
+    in_blocks,
+    interpolated,
+    lag,
+    samples_held,
+    unwrapped,
+)
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, from_options

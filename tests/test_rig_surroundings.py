@@ -16,7 +16,7 @@ from scipy.stats import norm
 from friso.equations.rail import friction_factors, gaussian_field
 from friso.errors import InputError
 from friso.stage.rig import Floor
-from friso.virtual_rig.floor import floor_acceleration, variance_below
+from friso.virtual_rig.surroundings import floor_acceleration, variance_below
 
 SURE = 5.0
 """Standard errors within which an estimate has to lie: 1 in 1.7 million does not."""

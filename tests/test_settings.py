@@ -20,7 +20,7 @@ LITERALS = {
     "friso/equations": 28,
     "friso/frequency": 16,
     "friso/hunting": 12,
-    "friso/identification": 32,
+    "friso/identification": 31,
     "friso/interface": 4,
     "friso/leaf_springs": 13,
     "friso/platform": 11,

@@ -125,26 +125,6 @@ def _rows(flat: Mapping[str, Any], turn: Turn) -> Iterator[Conversion]:
         yield Conversion(gain.name, gain.symbol, ((gain.value, kind.unit(gain.unit)), *others))
 
 
-def _rate(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert a rate [1/s] to metres per minute for each millimetre of error."""
-    return [(value * 0.06, "(m/min)/mm")]
-
-
-def _time(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert a time [s] to milliseconds and to its corner frequency [Hz]."""
-    return [(value * 1e3, "ms"), (1 / (2 * pi * value), "Hz (corner)")]
-
-
-def _frequency(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert a frequency [Hz] to radians per second."""
-    return [(value * 2 * pi, "rad/s")]
-
-
-def _length(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert a length [m] to turns of the motor, if the travel is known."""
-    return [(value / turn.travel, "turn")] if turn.travel else []
-
-
 def _mass(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
     """Convert an inertia [kg or kg m^2] to current per acceleration, and to the motor's side.
 
@@ -194,9 +174,12 @@ BY_UNIT: Mapping[str, Convert] = {
     "N/(m*s)": _per("N/(m*s)", ("/(rad*s)", 1.0), ("/(turn*s)", 2 * pi)),
     "N": _force,
     "kg": _mass,
-    "m": _length,
-    "s": _time,
-    "1/s": _rate,
-    "Hz": _frequency,
+    "m": lambda value, turn, kind: [(value / turn.travel, "turn")] if turn.travel else [],
+    "s": lambda value, turn, kind: [(value * 1e3, "ms"), (1 / (2 * pi * value), "Hz (corner)")],
+    "1/s": lambda value, turn, kind: [(value * 0.06, "(m/min)/mm")],
+    "Hz": lambda value, turn, kind: [(value * 2 * pi, "rad/s")],
 }
-"""Converters of SI values to other units, by their unit on a linear axis."""
+"""Converters of SI values to other units, by their unit on a linear axis.
+
+A length becomes turns of the motor if the travel is known, a time also its corner frequency, and a rate the speed in
+metres per minute for each millimetre of error."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from friso.axis import AxisKind
 from friso.drives.questions import OpenQuestion, UserAnswers
 from friso.errors import InputError
 from friso.escapes import one_line
@@ -158,6 +159,21 @@ FORMATS: Registry[ParameterFormat] = Registry("friso.drives.formats", "FORMAT")
 def si(value: float, unit: str) -> str:
     """Write a number in SI with its unit, in the form of a stage file."""
     return f"{value:.15g} {unit}"
+
+
+def there_and_back(fastest: float, acceleration: float, unit: float, kind: AxisKind) -> dict[str, str]:
+    """Return the table [motion] of a move there and back that uses all of a drive's speed and acceleration.
+
+    `fastest` and `acceleration` are in the drive's unit per second or square second; its `unit` is in [m] or [rad].
+    """
+    back = max(5.0, 4 * fastest / acceleration)
+    return {
+        "kind": "there_and_back",
+        "acceleration": si(acceleration * unit, kind.unit("m/s^2")),
+        "acceleration_time": si(fastest / acceleration, "s"),
+        "return_at": si(back, "s"),
+        "duration": si(back + 15, "s"),
+    }
 
 
 def lacks(what: str, expected: str, example: str = "") -> InputError:

@@ -113,9 +113,8 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
         raise InputError("friction.model", quoted(model), f"one of {', '.join(sorted(FRICTION.classes))}")
     law: type[Section] = friction_law(model)
     names = [name for name in numeric_fields(law) if law.model_fields[name].is_required()]
-    meaning = dict.fromkeys(
-        names, "friction of the guide" + ("; or --set friction.model=none" if model == "lugre" else "")
-    )
+    instead = "; or --set friction.model=none" if model == "lugre" else ""
+    meaning = dict.fromkeys(names, f"friction of the guide{instead}")
     asked += _of_table("friction", law, names, meaning, kind)
     if not moved and "motion.kind" not in answers:
         names = ["acceleration", "acceleration_time"]
@@ -145,9 +144,5 @@ def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
         values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"
         width = max(len(question.option) for question in asked)
         lines = [f"{question.option:<{width}}  {question.meaning}" for question in asked]
-        raise InputError(
-            "",
-            f"{values} missing",
-            "\n            ".join(["set all of these:" if len(asked) > 1 else "set:", *lines]),
-            origin=origin,
-        )
+        expected = "\n            ".join(["set all of these:" if len(asked) > 1 else "set:", *lines])
+        raise InputError("", f"{values} missing", expected, origin=origin)

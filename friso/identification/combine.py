@@ -37,29 +37,23 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
             answer, agrees = _intersection(key, estimates_of_key)
         answers.append(answer)
         if not agrees:
-            sentences.append(
-                f"{key}: the experiments disagree, and the interval allows for it: {_texts(shown or estimates_of_key)}"
-            )
-        beyond = [
-            estimate
-            for estimate in estimates_of_key
-            if shown and not estimate.determined and (estimate.low > answer.high or estimate.high < answer.low)
-        ]
-        sentences += [f"{key}: {_text(answer)} is shown, but {_text(estimate)}" for estimate in beyond]
+            texts = _texts(shown or estimates_of_key)
+            sentences.append(f"{key}: the experiments disagree, and the interval allows for it: {texts}")
+        for estimate in estimates_of_key if shown else ():
+            if not estimate.determined and (estimate.low > answer.high or estimate.high < answer.low):
+                sentences.append(f"{key}: {_text(answer)} is shown, but {_text(estimate)}")
     return answers, sentences
 
 
 def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
     """Return the keys of all groups, and the correlations (keys, keys) of their combined values."""
     keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
-    precision = {
-        key: sum(_weight(estimate) for estimate in determined(estimates) if estimate.name == key) for key in keys
-    }
+    shown = determined(estimates)
+    precision = {key: sum(_weight(estimate) for estimate in shown if estimate.name == key) for key in keys}
     covariance = np.diag([1 / precision[key] for key in keys])
     for group, matrix in groups:
-        shares = np.array(
-            [_weight(estimate) ** 0.5 / precision[estimate.name] for estimate in group]
-        )  # a_i times the standard deviation
+        # weights times standard deviations
+        shares = np.array([_weight(estimate) ** 0.5 / precision[estimate.name] for estimate in group])
         places = [keys.index(estimate.name) for estimate in group]
         covariance[np.ix_(places, places)] += (matrix - np.eye(len(group))) * np.outer(shares, shares)
     size = np.sqrt(np.diag(covariance))
@@ -87,10 +81,7 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     Estimates disagree, for example, if friction was measured at several places. A scatter common to all is then added
     (`_between`). Two estimates hardly show a scatter, so the interval then spans both.
     """
-    values, weights = (
-        np.array(column)
-        for column in zip(*((estimate.value, _weight(estimate)) for estimate in estimates), strict=True)
-    )
+    values, weights = np.array([(estimate.value, _weight(estimate)) for estimate in estimates]).T
     mean, freedom = float(np.average(values, weights=weights)), len(values) - 1
     shared = float(np.average([estimate.systematic for estimate in estimates], weights=weights))
     squares = float(np.sum(weights * (values - mean) ** 2))
@@ -130,9 +121,7 @@ def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bo
 
     The second result is true if there is a common range.
     """
-    bounding = [
-        estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)
-    ] or estimates[:1]
+    bounding = [one for one in estimates if np.isfinite([one.low, one.high]).any()] or estimates[:1]
     low, high = max(estimate.low for estimate in bounding), min(estimate.high for estimate in bounding)
     agrees = low <= high
     if not agrees:

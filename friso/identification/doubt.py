@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import InverseModel
+from friso.identification.inverse_model import InverseModel, inverse_model
 from friso.identification.kinds import in_order
 from friso.identification.logs.log import Log
 from friso.identification.output_error.effects import (
@@ -72,6 +73,10 @@ class RecordCase:
     def unit(self) -> str:
         """Return the unit of the force."""
         return self.log.unit("force")
+
+    def modelled(self, log: Log, **options: Any) -> InverseModel:
+        """Return the inverse model of a log changed for an effect, with further `options` of `inverse_model`."""
+        return inverse_model(log, self.inverse.bandwidth, False, self.cart_share, **options)
 
 
 @dataclass(frozen=True)
@@ -209,9 +214,8 @@ class FitCase(FittedCase):
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
         """Return the case with a finding added, and its consequences for the fit applied."""
-        quality = replace(
-            self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
-        )
+        before = self.quality
+        quality = replace(before, findings=(*before.findings, finding), spoilt=before.spoilt or finding.spoils)
         return replace(self, fit=finding.fit or self.fit, inverse=finding.inverse or self.inverse, quality=quality)
 
 
@@ -326,14 +330,10 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
     """
     every = list(raised("cause", case))
     enough = doubt_settings.error_share_of_a_cause * case.inverse.error
-    better = sorted(
-        (finding for finding in every if finding.without and finding.without.error < enough),
-        key=lambda finding: finding.without.error if finding.without else np.inf,
-    )
-    most = doubt_settings.error_ratio_of_rival_causes * min(
-        (one.without.error for one in better if one.without), default=0.0
-    )
-    rivals = [one for one in better if one.without and one.without.error <= most]
+    errors = [(finding.without.error, finding) for finding in every if finding.without]
+    better = sorted((pair for pair in errors if pair[0] < enough), key=itemgetter(0))
+    most = doubt_settings.error_ratio_of_rival_causes * (better[0][0] if better else 0.0)
+    rivals = [finding for error, finding in better if error <= most]
     plain = [finding for finding in every if finding.without is None]
     return [*raised("fault", case), *rivals, *plain, *(() if rivals else raised("otherwise", case))]
 
@@ -391,14 +391,9 @@ def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[s
     its lower end divided by the highest ratio of static to Coulomb friction.
     """
     ratio = settings.highest_friction_ratio
+    ranges = {one.name: (one.low / ratio, one.high) for one in estimates if one.name == "friction.coulomb"}
     return {
-        one.name: Estimate.unknown(
-            one.name,
-            one.unit,
-            one.method,
-            reasons[one.name],
-            *((one.low / ratio, one.high) if one.name == "friction.coulomb" else ()),
-        )
+        one.name: one.withheld(reasons[one.name], *ranges.get(one.name, ()))
         for one in estimates
         if one.determined and one.name in reasons
     }

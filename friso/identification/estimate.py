@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,31 @@ class Estimate:
         stored.
         """
         return cls(name, unit, np.nan, float(low), float(high), method, reason)
+
+    def withheld(self, reason: str, low: float = -np.inf, high: float = np.inf) -> Estimate:
+        """Return the estimate without its value, for a `reason`.
+
+        `low` and `high`, in its `unit`, bound the remaining range (default: nothing is known).
+        """
+        return Estimate.unknown(self.name, self.unit, self.method, reason, low, high)
+
+    def if_positive(self, reason: str) -> Estimate:
+        """Return the estimate, or only its upper bound, with the `reason`, if its interval reaches down to 0."""
+        return self if self.low > 0 else self.withheld(reason, 0.0, max(self.high, 0.0) or np.inf)
+
+    def widened(self, further: float) -> Estimate:
+        """Return the estimate with its interval extended at both ends by `further`, in its `unit`."""
+        return replace(self, low=self.low - further, high=self.high + further)
+
+    def reaching(self, low: float, high: float) -> Estimate:
+        """Return the estimate with an interval that also covers the range from `low` to `high`, in its `unit`."""
+        return replace(self, low=min(self.low, low), high=max(self.high, high))
+
+    def scaled(self, factor: float) -> Estimate:
+        """Return the estimate times a `factor`, which may be negative."""
+        low, high = sorted((factor * self.low, factor * self.high))
+        systematic = abs(factor) * self.systematic
+        return replace(self, value=factor * self.value, low=low, high=high, systematic=systematic)
 
     @property
     def determined(self) -> bool:

@@ -22,6 +22,7 @@ from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
+from friso.identification.logs.checks import runs
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.readings.common import cart, noise_of, turns_of
 from friso.identification.settings import doubt_settings, identification_settings
@@ -112,6 +113,11 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
     return FilteredMotion(smooth, velocity, acceleration)
 
 
+def moved_in(log: Log, position: np.ndarray, bandwidth: float) -> FilteredMotion:
+    """Return a motion [m], sampled like a log, shape (n,), smoothed for moves of a `bandwidth` [Hz]."""
+    return motion(position, log.sample_time, identification_settings.smoothing_bandwidths * bandwidth)
+
+
 def bandwidth_of(log: Log) -> float:
     """Return the bandwidth [Hz] of the motion in a log, without reading across gaps.
 
@@ -131,9 +137,8 @@ def bandwidth_of(log: Log) -> float:
     share = np.cumsum((power - noise)[passband] * frequency[passband] ** (2 * derivatives))
     if not share.size or not share[-1] > 0:
         raise InputError(role, "nothing but noise", "a motion that stands out of it", "a larger or faster move")
-    return float(
-        frequency[passband][np.searchsorted(share, identification_settings.power_share_of_the_motion * share[-1])]
-    )
+    most = identification_settings.power_share_of_the_motion * share[-1]
+    return float(frequency[passband][np.searchsorted(share, most)])
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:
@@ -141,15 +146,8 @@ def directions(position: np.ndarray) -> tuple[bool, bool]:
 
     Noise does not count as motion.
     """
-    steps = np.diff(
-        position[
-            [
-                0,
-                *turns_of(position, identification_settings.deviations_of_standing_still * noise_of(position)),
-                len(position) - 1,
-            ]
-        ]
-    )
+    turns = turns_of(position, identification_settings.deviations_of_standing_still * noise_of(position))
+    steps = np.diff(position[[0, *turns, len(position) - 1]])
     travelled = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
     forward, back = travelled > identification_settings.way_share_of_a_direction * travelled.sum()
     return bool(forward), bool(back)
@@ -209,10 +207,8 @@ def inverse_model(
         for (name, unit), value, variance in zip(names, solution[:own], np.diag(covariance), strict=True)
     )
     residual, size = np.linalg.norm(force - fitted), float(np.linalg.norm(force))
-    power, little = (
-        float(force @ velocity),
-        identification_settings.power_share_of_friction * size * float(np.linalg.norm(velocity)),
-    )
+    power = float(force @ velocity)
+    little = identification_settings.power_share_of_friction * size * float(np.linalg.norm(velocity))
     poor = residual > doubt_settings.error_of_a_poor_model * size
     if estimates[0].high < 0 and (power < 0 or (not poor and power < little)):  # the motor feeds friction
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
@@ -220,9 +216,8 @@ def inverse_model(
         raise InputError("force", actual, expected, f'--scale force="{_other_sign(log)}"', log.name)
     numbers = dict(zip((*(name for name, _ in names), *extra), map(float, solution), strict=True))
     explained = columns[:, own:] @ solution[own:]
-    return InverseModel(
-        estimates, numbers, columns[:, :own], covariance, time, force - explained, fitted - explained, band
-    )
+    forces = force - explained, fitted - explained
+    return InverseModel(estimates, numbers, columns[:, :own], covariance, time, *forces, band)
 
 
 def _within_its_moves(
@@ -284,9 +279,8 @@ def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
     """
     if np.isfinite(variance):
         return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
-    return Estimate.unknown(
-        name, unit, METHOD, "the motion is in one direction only, which does not separate it from the others"
-    )
+    why = "the motion is in one direction only, which does not separate it from the others"
+    return Estimate.unknown(name, unit, METHOD, why)
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -294,10 +288,9 @@ def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
 
     `slow` marks slow rows, and `time` [s] has their instants.
     """
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     rests = np.zeros(len(slow), bool)
-    for first, behind in zip(ends[::2], ends[1::2], strict=True):
-        rests[first:behind] = time[behind - 1] - time[first] >= identification_settings.time_of_a_left_out_rest
+    for rest in runs(slow):
+        rests[rest] = np.ptp(time[rest]) >= identification_settings.time_of_a_left_out_rest
     return rests
 
 
@@ -323,11 +316,11 @@ def _rows(
     """
     if part.stop - part.start < 2 * identification_settings.samples_of_an_edge:
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
-    moved = motion(log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * band)
+    moved = moved_in(log, log["position"][part], band)
     v, a = moved.velocity, moved.acceleration
     carried_position = cart(log) if cart_share else None
     if carried_position is not None:
-        carried = motion(carried_position[part], log.sample_time, identification_settings.smoothing_bandwidths * band)
+        carried = moved_in(log, carried_position[part], band)
         v, a = carried.velocity, cart_share * carried.acceleration + (1 - cart_share) * a
     sign = np.sign(v)
     if by_direction:
@@ -338,17 +331,10 @@ def _rows(
     if averaged > 1:
         columns = uniform_filter1d(columns, averaged, axis=0)
     columns = np.hstack([columns, extra])
-    step = max(
-        1,
-        round(
-            identification_settings.decimation_pass
-            / (2 * identification_settings.decimation_bandwidths * band * log.sample_time)
-        ),
-    )
-    arrays = [
-        array[identification_settings.samples_of_an_edge :]
-        for array in (log.time[part], columns, log["force"][part], moved.position)
-    ]
+    rate = 2 * identification_settings.decimation_bandwidths * band
+    step = max(1, round(identification_settings.decimation_pass / (rate * log.sample_time)))
+    inside = slice(identification_settings.samples_of_an_edge, None)
+    arrays = [array[inside] for array in (log.time[part], columns, log["force"][part], moved.position)]
     time, position = (array[_first(len(array), step) :: step] for array in (arrays[0], arrays[3]))
     return time, _decimated(arrays[1], step), _decimated(arrays[2], step), position
 
@@ -357,13 +343,9 @@ def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
     """Keep every `step`th row, after a low-pass forward and back against aliasing."""
     if step == 1:
         return columns
-    sections = cheby1(
-        identification_settings.order_of_decimation,
-        identification_settings.ripple_of_decimation,
-        identification_settings.decimation_pass / step,
-        output="sos",
-    )
-    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * identification_settings.order_of_decimation)
+    order, ripple = identification_settings.order_of_decimation, identification_settings.ripple_of_decimation
+    sections = cheby1(order, ripple, identification_settings.decimation_pass / step, output="sos")
+    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * order)
     return low[_first(len(columns), step) :: step]
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
-from friso.identification.logs.joined import join_alike
-from friso.identification.logs.log import Log
+from friso.identification.logs.log import Log, join_alike
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import Course
 from friso.progress import Progress, silent
@@ -112,6 +111,34 @@ def left_out(stage: Stage, log: Log) -> list[str]:
     return [key for key in log.setup if key not in stage.flat() and not key.startswith(f"{CONTROLLER}.")]
 
 
+def of_one(
+    analyse: Callable[[Log, Prior, AnalysisSettings], Result],
+) -> Callable[[Sequence[Source], Prior, AnalysisSettings], Result]:
+    """Return the analysis of an experiment that consists of one log, from that of the log."""
+
+    def of_group(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Result:
+        (log,) = logs
+        assert isinstance(log, Log)
+        return analyse(log, prior, settings)
+
+    return of_group
+
+
+def nothing(result: Any, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Return no estimates, for experiments that determine no key of a stage."""
+    return ()
+
+
+def by_rows(result: Any, estimates: Sequence[Estimate], row: Callable[[Estimate], int]) -> Correlated:
+    """Return the estimates that have a value, with their part of the `correlation` of a result.
+
+    `row` gives the row of the correlation that belongs to an estimate.
+    """
+    certain = determined(estimates)
+    rows = [row(estimate) for estimate in certain]
+    return certain, result.correlation[np.ix_(rows, rows)]
+
+
 def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
     """Return the estimates that have a value, as independent of one another: correlations of 0."""
     certain = determined(estimates)
@@ -145,14 +172,14 @@ class ExperimentKind(Generic[Result]):
     logs are realisations of one experiment, `responses` if frequency responses from another instrument are accepted.
 
     `claims` returns why a log without a stated kind may be of this kind, or None; `claims_together` does so for several
-    logs together. A kind claims logs `instead_of` other kinds that would claim them too. `around` makes a stage with
-    assumed values for a log if none is given. `notes` are remarks on results for the engineer, with or without a stage;
-    `doubts` are sentences against trusting a result. `failed` returns true if the analysis failed, even if parts of the
-    result hold. Functions raise InputError for logs that cannot be used.
+    logs together, and for one if there are no `claims`. A kind claims logs `instead_of` other kinds that would claim
+    them too. `around` makes a stage with assumed values for a log if none is given. `notes` are remarks on results for
+    the engineer, with or without a stage; `doubts` are sentences against trusting a result. `failed` returns true if
+    the analysis failed, even if parts of the result hold. Functions raise InputError for logs that cannot be used.
     """
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
-    estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
+    estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]] = nothing
     correlated: Callable[[Result, Sequence[Estimate]], Correlated] = independent
     after: tuple[str, ...] = ()
     roles: tuple[str, ...] = ("position", "force")
@@ -170,6 +197,12 @@ class ExperimentKind(Generic[Result]):
     predictor: Predictor[Result] | None = None
     doubts: Callable[[Result], Sequence[str]] = lambda result: ()
     failed: Callable[[Result], bool] = lambda result: False
+
+    def claimed(self, course: Course) -> str | None:
+        """Return why a log without a stated kind may be of this kind; None if it may not."""
+        if self.claims is not None:
+            return self.claims(course)
+        return self.claims_together([course]) if self.claims_together is not None else None
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
         """Return the roles that a log needs, such as position, given the roles that it has.

@@ -16,9 +16,8 @@ KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiment
 
 def in_order(registry: Registry[Any] = KINDS) -> list[str]:
     """Return the names in a registry, each after all names in its `after`, else alphabetically."""
-    sorter = TopologicalSorter(
-        {name: [other for other in registry[name].after if other in registry] for name in registry}
-    )
+    before = {name: [other for other in registry[name].after if other in registry] for name in registry}
+    sorter = TopologicalSorter(before)
     sorter.prepare()
     names: list[str] = []
     while sorter.is_active():

@@ -99,23 +99,16 @@ def identify(
     doubts = _doubts(experiments)
     failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
     if stage is None or nothing_learnt(estimates, failed) or (base is None and not _shows_a_mass(estimates)):
-        return Identification(
-            None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings), doubts, failed
-        )
+        shown = (tuple(experiments), tuple(estimates), tuple(warnings))
+        return Identification(None, Correlations(), *shown, doubts, failed)
     warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
     doubts += words_of("stage", (fitted, estimates))
-    return Identification(
-        fitted,
-        _correlations(experiments, estimates, fits, fitted),
-        tuple(experiments),
-        tuple(estimates),
-        (*warnings, *fits.notes),
-        doubts,
-        failed,
-        origins(fitted, fits.estimates, fits.follows, None if base is None else made_up),
-    )
+    shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes))
+    sources = origins(fitted, fits.estimates, fits.follows, None if base is None else made_up)
+    correlated = _correlations(experiments, estimates, fits, fitted)
+    return Identification(fitted, correlated, *shown, doubts, failed, sources)
 
 
 def with_laws(
@@ -225,11 +218,10 @@ def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
     """Write, for each log, which keys of its [setup] the stage does not have."""
-    several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
     return [
-        f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
-        for name, keys in several.items()
-        if keys
+        f"{log.name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
+        for log in logs
+        if isinstance(log, Log) and (keys := left_out(stage, log))
     ]
 
 
@@ -284,18 +276,14 @@ def _correlations(
     A key whose value follows that of another key has the other key's correlations. Keys that are correlated with no
     other are left out.
     """
-    keys, matrix = correlations(
-        _every_estimate(experiments),
-        [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],
-    )
+    groups = [KINDS[one.kind].correlated(one.result, one.estimates) for one in experiments]
+    keys, matrix = correlations(_every_estimate(experiments), groups)
     uncertain = stage.uncertain()
-    leads = {
-        estimate.name: estimate.name for estimate in fits.estimates if estimate.name in keys and estimate in estimates
-    } | {**fits.follows}
+    own = [estimate.name for estimate in fits.estimates if estimate.name in keys and estimate in estimates]
+    leads = {**dict(zip(own, own, strict=True)), **fits.follows}
     leading = [key for key, lead in leads.items() if key in uncertain and lead in keys]
     places = [keys.index(leads[key]) for key in leading]
     part = matrix[np.ix_(places, places)]
     alone = np.abs(part - np.eye(len(leading))).max(axis=1, initial=0.0) == 0
-    return Correlations(tuple(leading), part).among(
-        [key for key, single in zip(leading, alone, strict=True) if not single]
-    )
+    together = [key for key, single in zip(leading, alone, strict=True) if not single]
+    return Correlations(tuple(leading), part).among(together)

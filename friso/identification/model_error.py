@@ -37,7 +37,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
     """
     quality = case.quality
     if quality.failed:
-        nothing = {one.name: Estimate.unknown(one.name, one.unit, one.method, NOT_DESCRIBED) for one in case.estimates}
+        nothing = {one.name: one.withheld(NOT_DESCRIBED) for one in case.estimates}
         case = case.with_answers(RaisedDoubt(answers=nothing))
     elif quality.rejected:
         estimates, correlation = of_inverse_model(case.inverse, case.flat, case.estimates)
@@ -78,13 +78,9 @@ def of_inverse_model(
     for estimate in estimates:
         name, scale = sources.get(estimate.name, ("", 1.0))
         if name and not (is_free(flat) and estimate.name.startswith("masses.")):
-            one = inverse.estimate(name)
-            low, high = sorted((scale * one.low, scale * one.high))
-            answers.append(
-                replace(one, name=estimate.name, unit=estimate.unit, value=scale * one.value, low=low, high=high)
-            )
+            answers.append(replace(inverse.estimate(name).scaled(scale), name=estimate.name, unit=estimate.unit))
         else:
-            answers.append(Estimate.unknown(estimate.name, estimate.unit, estimate.method, CONTRADICTED))
+            answers.append(estimate.withheld(CONTRADICTED))
     return tuple(answers), np.eye(sum(answer.determined for answer in answers))
 
 
@@ -106,7 +102,7 @@ def with_model_error(
     half = abs(scale) * inverse.half_width
     beyond = abs(estimate.value - scale * inverse.value) - half
     more = lacking * max(0.0, beyond) + max(0.0, lacking * alike * half - estimate.half_width)
-    return replace(estimate, low=estimate.low - more, high=estimate.high + more, systematic=estimate.systematic + more)
+    return replace(estimate.widened(more), systematic=estimate.systematic + more)
 
 
 def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
@@ -160,15 +156,13 @@ def _reaching(case: KeyCase) -> dict[str, Estimate]:
         for key, (name, scale) in inverse_sources(case.flat).items():
             one = answers.get(key, case.determined.get(key))
             if one is not None and name in finding.reaches:
-                low, high = sorted(scale * end for end in finding.reaches[name])
-                answers[key] = replace(one, low=min(one.low, low), high=max(one.high, high))
+                answers[key] = one.reaching(*sorted(scale * end for end in finding.reaches[name]))
     return answers
 
 
 def _wider(estimate: Estimate, much: bool) -> Estimate:
     """Return an estimate, its interval widened by a set factor if `much` is left unexplained."""
-    more = (doubt_settings.widening_where_much_is_left - 1) * estimate.half_width if much else 0.0
-    return replace(estimate, low=estimate.low - more, high=estimate.high + more)
+    return estimate.widened((doubt_settings.widening_where_much_is_left - 1) * estimate.half_width if much else 0.0)
 
 
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
@@ -189,5 +183,5 @@ def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) 
     """
     if not (estimate.determined and other.determined):
         return estimate
-    low, high = sorted((scale * (other.low + min(further, 0.0)), scale * (other.high + max(further, 0.0))))
-    return replace(estimate, low=min(estimate.low, low), high=max(estimate.high, high))
+    ends = (other.low + min(further, 0.0), other.high + max(further, 0.0))
+    return estimate.reaching(*sorted(scale * end for end in ends))

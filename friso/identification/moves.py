@@ -10,24 +10,29 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.doubt import FitCase, FittedCase, KeyCase, judged_fit, judged_keys, leading_effect, raised
-from friso.identification.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import InverseModel, directions, inverse_model, motion, unit_of
+from friso.identification.inverse_model import (
+    FilteredMotion,
+    InverseModel,
+    directions,
+    inverse_model,
+    moved_in,
+    unit_of,
+)
 from friso.identification.kind import FirstEstimates
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for
 from friso.identification.output_error.coverage import Coverage, coverage
-from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import IdentifiableFit, fit_identifiable
+from friso.identification.output_error.identifiable import IdentifiableFit, Profile, fit_identifiable
 from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
-from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
-from friso.identification.output_error.to_keys import estimates_of
+from friso.identification.output_error.to_keys import drawn_from, estimates_of
 from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
 from friso.identification.settings import identification_settings
+from friso.identification.spread import binned, correlation_length
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -105,10 +110,8 @@ def identify_moves(
     inverse = inverse_model(log, bandwidth, False, share)
     by_direction = inverse_model(log, inverse.bandwidth, True, share)
     tell(log.name, inverse.estimates)
-    follows, loop = _problems(log, part, flat, inverse, own_loop)
-    moved = motion(
-        log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth
-    )
+    moved = moved_in(log, log["position"][part], inverse.bandwidth)
+    follows, loop = _problems(log, part, flat, inverse, float(np.abs(moved.velocity).max()), own_loop)
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
@@ -220,19 +223,13 @@ def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> 
 
 
 def _problems(
-    log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
+    log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, speed: float, own_loop: bool
 ) -> tuple[Problem, Problem | None]:
     """Set up two fits: of the stage that follows the log, and of the stage in its own loop.
 
-    Both have all parameters of their equations. The second is None without `own_loop`.
+    Both have all parameters of their equations. The second is None without `own_loop`. `speed` [m/s] is the highest of
+    the log.
     """
-    speed = float(
-        np.abs(
-            motion(
-                log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth
-            ).velocity
-        ).max()
-    )
     levels = _levels(log, flat, inverse)
     position = log["position"][part]
     every = fit_parameters(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
@@ -265,3 +262,99 @@ def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[st
             levels[estimate.name] = value if value > 0 and not estimate.low <= 0 else max(estimate.high / 2, 1e-6)
             levels[estimate.name] = levels[estimate.name] if np.isfinite(levels[estimate.name]) else max(value, 1e-6)
     return levels
+
+
+@dataclass(frozen=True)
+class SimulationErrors:
+    """Relative errors of a simulated record: norm of the difference over norm of the measured.
+
+    Errors are given for position, velocity, acceleration and force; one filter gives velocity and acceleration of both
+    records. For a stage that follows the log's position, only the force has an error, its unexplained part; the others
+    are NaN.
+    """
+
+    position: float
+    velocity: float
+    acceleration: float
+    force: float
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Residual force of a fit [N] and its properties.
+
+    `rms` and `mean` are in newtons, `correlation_time` [s] is the time over which it stays correlated. `by_position`
+    and `by_velocity` are the fractions of the residual's power explained by its means over places along the rail, and
+    over speeds.
+    """
+
+    rms: float
+    mean: float
+    correlation_time: float
+    by_position: float
+    by_velocity: float
+
+    @property
+    def white(self) -> bool:
+        """Tell whether neighbouring samples are uncorrelated."""
+        return self.correlation_time == 0.0
+
+
+def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
+    """Compare a simulated record with the samples `part` of a log.
+
+    `bandwidth` [Hz] is the motion's.
+    """
+    measured = moved_in(log, log["position"][part], bandwidth)
+    modelled = moved_in(log, simulated.position, bandwidth)
+    disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
+    return SimulationErrors(
+        _relative(log["position"][part], simulated.position),
+        _relative(measured.velocity, modelled.velocity),
+        _relative(measured.acceleration, modelled.acceleration),
+        _relative(log["force"][part], simulated.force + disturbance),
+    )
+
+
+def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
+    """Return the force that guides a stage along a log, relative to the logged force.
+
+    `held` is the simulated record with this force, which the model leaves unexplained; `part` are the samples. The
+    result stands as the error of the force; errors of the motion are NaN.
+    """
+    share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
+    return SimulationErrors(np.nan, np.nan, np.nan, share)
+
+
+def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float) -> Residual:
+    """Describe the residual force [N], (n,), of a fit sampled every `sample_time` [s].
+
+    `moved` is the filtered motion of these samples.
+    """
+    alike = correlation_length(residual)
+    return Residual(
+        float(np.sqrt(np.mean(residual**2))),
+        float(residual.mean()),
+        0.0 if alike <= 1 else alike * sample_time,
+        _explained(residual, moved.position),
+        _explained(residual, moved.velocity),
+    )
+
+
+def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
+    """Return the norm of measured minus simulated values over the norm of the measured ones."""
+    return float(np.linalg.norm(measured - simulated) / np.linalg.norm(measured))
+
+
+def _explained(residual: np.ndarray, along: np.ndarray) -> float:
+    """Return the fraction of a residual's power that its means over bins of `along` explain.
+
+    `along`, shape (n,), is a position or a speed. The fraction that chance explains is subtracted.
+    """
+    bins = binned(along, identification_settings.bins_of_a_residual)
+    count = np.bincount(bins)
+    means = np.bincount(bins, residual) / np.maximum(count, 1)
+    power = float(np.mean(residual**2))
+    independent = len(residual) / correlation_length(residual)
+    share = float(np.sum(count * means**2)) / len(residual) / power if power else 0.0
+    return max(0.0, share - min(1.0, np.count_nonzero(count) / independent))

@@ -95,11 +95,9 @@ def quality_of(
     if fit.problem.closed and fit.explains(noise):
         return plain
     force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
-    beyond = (
-        inverse.error > doubt_settings.error_of_a_poor_model
-        and left < doubt_settings.error_of_an_unsettled_record * force
-    )
-    poor = inverse.error > doubt_settings.error_of_a_poor_model and not beyond
+    roughly = inverse.error > doubt_settings.error_of_a_poor_model
+    beyond = roughly and left < doubt_settings.error_of_an_unsettled_record * force
+    poor = roughly and not beyond
     reasons = causes(case) if plain.lacks_something or poor else []
     better = doubt_settings.error_share_of_a_clearly_better_model * force
     if beyond:
@@ -137,10 +135,8 @@ def _verdict(
     """
     why = "".join(f"; {cause.words}" for cause in reasons)
     if poor:
-        return (
-            f"A mass with friction leaves {percent(plain.inverse_error, 3)} of the force unexplained: "
-            f"{why.removeprefix('; ') or UNKNOWN}"
-        )
+        left = f"A mass with friction leaves {percent(plain.inverse_error, 3)} of the force unexplained"
+        return f"{left}: {why.removeprefix('; ') or UNKNOWN}"
     if rejected:
         return (
             f"The whole model contradicts the record: on the moves it leaves {percent(plain.whole_error, 3)} of the "

@@ -153,11 +153,8 @@ def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
     if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):
         return file
     if beside is not None:
-        newtons = beside.force
-        example = f'--scale force="NUMBER {newtons}/{unit}"'
-        raise InputError(
-            "force", f"a channel in {unit}, beside a stage", f"its factor to {newtons}", example, str(file.path)
-        )
+        expected, example = f"its factor to {beside.force}", f'--scale force="NUMBER {beside.force}/{unit}"'
+        raise InputError("force", f"a channel in {unit}, beside a stage", expected, example, str(file.path))
     return replace(file, source=file.source.per_unit_of_force())
 
 
@@ -265,14 +262,12 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     Raises InputError if no kind claims it, or several do.
     """
     course = Course(log)
-    claims_of = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}
-    reasons = {name: reason for name, claims in claims_of.items() if (reason := claims(course)) is not None}
+    reasons = {name: reason for name in KINDS if (reason := KINDS[name].claimed(course)) is not None}
     replaced = {other for name in reasons for other in KINDS[name].instead_of}
     reasons = {name: reason for name, reason in reasons.items() if name not in replaced}
     if len(reasons) == 1:
         return next(iter(reasons.items()))
     names = sorted(reasons or KINDS, key=lambda name: KINDS[name].around is None)
     expected = f"the kind of experiment: {', '.join(names)}"
-    raise LogError(
-        "--as", course.words, expected, f"--as {'standstill' if course.rests and not reasons else names[0]}", str(path)
-    )
+    likely = "standstill" if course.rests and not reasons else names[0]
+    raise LogError("--as", course.words, expected, f"--as {likely}", str(path))

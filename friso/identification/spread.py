@@ -87,11 +87,19 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
     count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
     window = min(max(window, 1), max(2, int(identification_settings.row_share_of_likeness * count)))
-    middle = scores.T @ scores
-    for lag in range(1, window):
-        shifted = scores[lag:].T @ scores[:-lag]
-        middle += (1 - lag / window) * (shifted + shifted.T)
-    return middle
+    return covariance_of_sum(scores, window)
+
+
+def covariance_of_sum(scores: np.ndarray, window: int) -> np.ndarray:
+    """Return the covariance of the sum of scores, (n, p), which are correlated over less than a `window` of rows.
+
+    The weight of a correlation falls linearly with the distance (Newey, West 1987, doi:10.2307/1913610).
+    """
+    total = scores.T @ scores
+    for lag in range(1, min(window, len(scores))):
+        cross = scores[lag:].T @ scores[:-lag]
+        total += (1 - lag / window) * (cross + cross.T)
+    return total
 
 
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from friso.axis import LINEAR
 from friso.equations.controllers.van_dijk import controller_table
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import InverseModel, motion
+from friso.identification.inverse_model import InverseModel, moved_in
 from friso.identification.logs.log import Log
 from friso.identification.settings import identification_settings
 from friso.stage import Stage
@@ -36,10 +36,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
     """
     mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
     viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / identification_settings.bend_of_made_up_bristles
-    parts = [
-        motion(log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * inverse.bandwidth)
-        for part in log.segments
-    ]
+    parts = [moved_in(log, log["position"][part], inverse.bandwidth) for part in log.segments]
     axis = log.axis
     top = max(float(np.abs(part.velocity).max()) for part in parts)
     brisk = max(float(np.abs(part.acceleration).max()) for part in parts)

@@ -61,12 +61,9 @@ def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
 def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
     """Divide the total mass among the stage's masses in the stage file's proportion."""
     masses = {f"masses.{name}": value for name, value in stage.masses if value is not None}
-    method, sizes = f"{total.method}, shared as in the stage file", ("value", "low", "high", "systematic")
+    method = f"{total.method}, shared as in the stage file"
     shares = {key: value / sum(masses.values()) for key, value in masses.items()}
-    return tuple(
-        replace(total, name=key, unit="kg", method=method, **{size: getattr(total, size) * share for size in sizes})
-        for key, share in shares.items()
-    )
+    return tuple(replace(total.scaled(share), name=key, unit="kg", method=method) for key, share in shares.items())
 
 
 def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
@@ -147,16 +144,13 @@ def _static_above(
     static = estimates.get(STATIC)
     if static is not None and not static.determined and centre[COULOMB] < static.high:
         estimates[STATIC] = replace(static, low=centre[COULOMB])
-        notes.append(
-            f"{STATIC}: no smaller than Coulomb friction, the stage file has {estimate_text(estimates[STATIC])}"
-        )
+        now = estimate_text(estimates[STATIC])
+        notes.append(f"{STATIC}: no smaller than Coulomb friction, the stage file has {now}")
         return {}
     leads, follows = (COULOMB, STATIC) if COULOMB in estimates else (STATIC, COULOMB)
     ratio, lead = flat[follows] / flat[leads], estimates[leads]
     remark = f" ({estimate_text(estimates[follows])} was found)" if follows in estimates else ""
-    estimates[follows] = replace(
-        lead, name=follows, value=lead.value * ratio, low=lead.low * ratio, high=lead.high * ratio
-    )
+    estimates[follows] = replace(lead.scaled(ratio), name=follows)
     why = f"Coulomb friction would be above static friction otherwise{remark}"
     notes.append(f"{follows}: moved along with {leads} to {estimate_text(estimates[follows])}, since {why}")
     return {follows: leads}

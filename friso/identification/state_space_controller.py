@@ -51,9 +51,8 @@ class StateSpace(RationalController):
             return TransferRoots(np.linalg.eigvals(a - b @ c / through), poles, through)
         moments = [float((c @ np.linalg.matrix_power(a, k) @ b)[0, 0]) for k in range(size)]
         scale = np.abs(c).max() * np.abs(b).max()
-        first = next(
-            (k for k, h in enumerate(moments) if abs(h) > 1e-12 * scale * max(1.0, np.abs(a).max()) ** k), None
-        )
+        least = 1e-12 * scale * max(1.0, np.abs(a).max()) ** np.arange(size)
+        first = next((k for k, h in enumerate(moments) if abs(h) > least[k]), None)
         if first is None:
             raise InputError("controller", "matrices by which no error makes a force", "a controller that acts")
         pencil = np.block([[a, b], [c, d]])
@@ -79,11 +78,9 @@ def _matrices(flat: Mapping[str, Any]) -> list[np.ndarray]:
     expected = {"a": (size, size), "b": (size, 1), "c": (1, size), "d": (1, 1)}
     for name, matrix in zip(NAMES, matrices, strict=True):
         if matrix.shape != expected[name] or not np.all(np.isfinite(matrix)):
-            rows, columns = expected[name]
-            shape = " x ".join(map(str, matrix.shape))
-            raise InputError(
-                f"controller.{name}", f"a matrix of {shape}", f"{rows} x {columns} numbers: one error, one force"
-            )
+            needed, shape = (" x ".join(map(str, sizes)) for sizes in (expected[name], matrix.shape))
+            actual = f"a matrix of {shape}"
+            raise InputError(f"controller.{name}", actual, f"{needed} numbers: one error, one force")
     return matrices
 
 
@@ -106,8 +103,7 @@ def _from_file(path: Path, names: list[str]) -> list[np.ndarray]:
     Raises InputError for a missing file or variable.
     """
     from friso.identification.logs.binary import is_hdf5
-    from friso.identification.logs.confined import content
-    from friso.identification.logs.libraries import content_by
+    from friso.identification.logs.confined import content, content_by
 
     if not path.is_file():
         raise InputError("controller.file", quoted(str(path)), "a MAT file with the matrices", '"controller.mat"')

@@ -15,9 +15,8 @@ from scipy.linalg import eigh
 from friso.leaf_springs import plate
 from friso.leaf_springs.beam_system import COORDINATES, LeafBeams
 from friso.leaf_springs.closed_forms import axial, body_mass
-from friso.leaf_springs.evaluation import Mode, peak_of
-from friso.leaf_springs.mechanism import Mechanism, along_motion
-from friso.leaf_springs.naming import mode_name
+from friso.leaf_springs.evaluation import Mode
+from friso.leaf_springs.mechanism import Mechanism
 from friso.leaf_springs.settings import settings
 
 KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
@@ -49,11 +48,9 @@ class Reduced:
         `stiffness` [N/m, N, N m] and `mass` [kg, kg m, kg m^2] are those of its nodes. The torsion of the beam is
         replaced by the torsion of a plate.
         """
-        size = len(stiffness)
+        size, twisted = len(stiffness), (slice(3, None, COORDINATES),) * 2
         stiffness, mass = stiffness.copy(), mass.copy()
-        stiffness[3::COORDINATES, 3::COORDINATES], mass[3::COORDINATES, 3::COORDINATES] = _torsion(
-            mechanism, size // COORDINATES
-        )
+        stiffness[twisted], mass[twisted] = _torsion(mechanism, size // COORDINATES)
         static, parts, squares = np.zeros((size, COORDINATES)), [], []
         static[-COORDINATES:] = np.eye(COORDINATES)
         for kind, number in KINDS:
@@ -66,14 +63,9 @@ class Reduced:
             parts.append(shapes)
             squares.append(values[:number])
         inner, moved = np.hstack(parts), mass @ static
-        return cls(
-            static.reshape(-1, COORDINATES, COORDINATES),
-            inner.reshape(-1, COORDINATES, inner.shape[1]),
-            np.concatenate(squares),
-            static.T @ stiffness @ static,
-            static.T @ moved,
-            inner.T @ moved,
-        )
+        shapes = (matrix.reshape(-1, COORDINATES, matrix.shape[1]) for matrix in (static, inner))
+        at_end = static.T @ stiffness @ static, static.T @ moved, inner.T @ moved
+        return cls(*shapes, np.concatenate(squares), *at_end)
 
 
 def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +75,7 @@ def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     equilibrium. Beams lack warping, which matters more for modes than for statics.
     """
     h = float(mechanism.length) / (nodes - 1)
-    rigidity = float(mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
+    rigidity = float(mechanism.torsional_rigidity)
     warping = rigidity / float(plate.warping_rate(mechanism.width, mechanism.poisson)) ** 2
     signs = np.array([[1, 1, -1, 1], [1, 1, -1, 1], [-1, -1, 1, -1], [1, 1, -1, 1]])
     lengths = np.outer([1, h, 1, h], [1, h, 1, h])
@@ -122,39 +114,17 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     squares, vectors = eigh(stiffness, mass)
     lowest = []
     for square, vector in zip(squares, vectors.T, strict=True):
-        if (
-            len(lowest) >= settings.reported_modes
-            and not vector[stage] @ body @ vector[stage] > settings.stage_energy_share
-        ):
+        moves = vector[stage] @ body @ vector[stage] > settings.stage_energy_share
+        if len(lowest) >= settings.reported_modes and not moves:
             continue
         amplitudes = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
         moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], amplitudes)
-        lowest.append(_mode(mechanism, np.sqrt(max(square, 0.0)) / (2 * np.pi), vector[stage], moved))
+        sign = 1.0 if moved.flat[np.argmax(np.abs(moved))] >= 0 else -1.0  # of the largest displacement of a leaf
+        frequency = np.sqrt(max(square, 0.0)) / (2 * np.pi)
+        lowest.append(Mode.of(mechanism, frequency, sign * vector[stage], sign * moved))
     drive = max(lowest, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
     return (replace(drive, name="drive"), *(mode for mode in lowest if mode is not drive))
-
-
-def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
-    """Build a mode from the motion of stage and leaves.
-
-    Its sign makes the largest displacement of a leaf positive.
-    """
-    actuator, sensor = (
-        float(along_motion(mechanism, point, stage[:, None])[0]) for point in (mechanism.actuation, mechanism.sensor)
-    )
-    sign = 1.0 if leaves.flat[np.argmax(np.abs(leaves))] >= 0 else -1.0
-    arm = np.subtract(mechanism.body.centre, (mechanism.length, 0.0, 0.0)).astype(float)
-    name = mode_name(stage, float(mechanism.body.mass), mechanism.body.inertia, arm, leaves, float(mechanism.leaf_mass))
-    return Mode(
-        name,
-        float(frequency),
-        sign * actuator,
-        sign * sensor,
-        peak_of(mechanism, actuator, sensor),
-        sign * stage,
-        sign * leaves,
-    )
 
 
 def end_motions(offsets: np.ndarray) -> np.ndarray:

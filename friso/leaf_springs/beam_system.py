@@ -82,9 +82,8 @@ class LeafBeams:
 
     def _stiffness(self, leaf: np.ndarray) -> np.ndarray:
         self._move(leaf)
-        self._solver.ComputeJacobianODE2RHS(
-            self._system, scalarFactor_ODE2=-1, scalarFactor_ODE2_t=0, scalarFactor_ODE1=0
-        )
+        factors = {"scalarFactor_ODE2": -1, "scalarFactor_ODE2_t": 0, "scalarFactor_ODE1": 0}
+        self._solver.ComputeJacobianODE2RHS(self._system, **factors)
         return np.array(self._solver.GetSystemJacobian())
 
 
@@ -165,24 +164,15 @@ def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
     """Add the nodes and elements of a leaf to a system of exudyn."""
     h = float(mechanism.length) / elements
     middles = h * (np.arange(elements // 2) + 0.5)
-    half = [
-        _section(mechanism, h, *pair)
-        for pair in zip(_curl(mechanism, h, middles), _twist(mechanism, h, middles), strict=True)
-    ]
+    compliances = zip(_curl(mechanism, h, middles), _twist(mechanism, h, middles), strict=True)
+    half = [_section(mechanism, h, *pair) for pair in compliances]
     nodes = [
         system.AddNode({"nodeType": "RigidBodyRxyz", "referenceCoordinates": [i * h, 0, 0, 0, 0, 0], "Vshow": False})
         for i in range(elements + 1)
     ]
+    beam = {"objectType": "BeamGeometricallyExact", "length": h, "Vshow": False}
     for i, section in enumerate(half[::-1] + half):
-        system.AddObject(
-            {
-                "objectType": "BeamGeometricallyExact",
-                "nodeNumbers": nodes[i : i + 2],
-                "length": h,
-                "sectionData": section,
-                "Vshow": False,
-            }
-        )
+        system.AddObject({**beam, "nodeNumbers": nodes[i : i + 2], "sectionData": section})
 
 
 def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
@@ -192,7 +182,7 @@ def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
     """
     weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
     shears = (edgewise_shear(mechanism), strong), (SHEAR * mechanism.shear * mechanism.area, weak)
-    torsion = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness) / twist
+    torsion = mechanism.torsional_rigidity / twist
     edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for shear, bending in shears)
     bulge = mechanism.area * h**2 / 6
     import exudyn
@@ -222,11 +212,8 @@ def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     Its mean over an element is weighted by the square of the moment in parallel motion.
     """
     s = _inside(h, middles)
-    return (
-        (plate.compliance_profile(s, mechanism.length, mechanism.width, mechanism.poisson) * s**2)
-        @ _WEIGHTS
-        / (s**2 @ _WEIGHTS)
-    )
+    compliance = plate.compliance_profile(s, *mechanism.plate_shape)
+    return (compliance * s**2) @ _WEIGHTS / (s**2 @ _WEIGHTS)
 
 
 def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
@@ -241,8 +228,6 @@ def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     stiffness along y vanish).
     """
     s, end = 2 * _inside(h, middles) / mechanism.length, 2 * middles / mechanism.length
-    even = (
-        plate.free_twist(s * mechanism.length / 2, mechanism.length, mechanism.width, mechanism.poisson) @ _WEIGHTS / 2
-    )
-    odd = (plate.cubic_twist(s, mechanism.length, mechanism.width, mechanism.poisson) * s**3) @ _WEIGHTS / 2
+    even = plate.free_twist(s * mechanism.length / 2, *mechanism.plate_shape) @ _WEIGHTS / 2
+    odd = (plate.cubic_twist(s, *mechanism.plate_shape) * s**3) @ _WEIGHTS / 2
     return plate.tilted(even, end**3 + end * (2 * h / mechanism.length) ** 2 / 2, end, odd.sum())

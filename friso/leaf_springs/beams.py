@@ -74,7 +74,7 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluat
     for z in deflections[1:]:
         held.append(_pushed(mechanism, leaves, held, z))
     stiffness = np.array([state.stiffness for state in held])
-    mean, largest = plate.stress_factors(mechanism.length, mechanism.width, mechanism.poisson)
+    mean, largest = plate.stress_factors(*mechanism.plate_shape)
     moment = np.max(np.abs(leaves.forces(held[-1].place.state(mechanism.offsets))[:, [0, -1], 4]))
     return Evaluation(
         model="beams",
@@ -125,10 +125,11 @@ def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
     s = (z - before.place.stage[1]) / step
     weights = (1 + s**2 * (2 * s - 3), s**2 * (3 - 2 * s), step * s * (s - 1) ** 2, step * s**2 * (s - 1))
     parts = (before.place, last.place, before.rate, last.rate)
-    return Configuration(
-        np.sum([weight * part.inner for weight, part in zip(weights, parts, strict=True)], axis=0),
-        np.sum([weight * part.stage for weight, part in zip(weights, parts, strict=True)], axis=0),
+    inner, stage = (
+        np.sum([weight * getattr(part, name) for weight, part in zip(weights, parts, strict=True)], axis=0)
+        for name in ("inner", "stage")
     )
+    return Configuration(inner, stage)
 
 
 def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) -> HeldEquilibrium:
@@ -137,12 +138,8 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
     Raises BeamFailure if the method does not converge.
     """
     z = place.stage[1]
-    close = (
-        settings.newton_energy_share
-        * (float(mechanism.thickness) / z) ** 2
-        * float(closed_forms.drive_stiffness(mechanism))
-        * z**2
-    )
+    relative = settings.newton_energy_share * (float(mechanism.thickness) / z) ** 2
+    close = relative * float(closed_forms.drive_stiffness(mechanism)) * z**2
     for _ in range(settings.step_newton_iterations):
         if not np.max(np.abs(place.inner[:, :, 2]), initial=abs(place.stage[2])) < settings.folding_angle:
             break
@@ -200,12 +197,8 @@ def _held(
     matrix = np.zeros((6, 6))
     matrix[PLANE, PLANE] = plane.stiffness
     matrix[ACROSS, ACROSS] = _across(mechanism, place.stage[2], stiffness, forces)
-    return HeldEquilibrium(
-        place.plus(solved.change),
-        Configuration((plane.follow @ rate).reshape(place.inner.shape), rate),
-        solved.force,
-        matrix,
-    )
+    change = Configuration((plane.follow @ rate).reshape(place.inner.shape), rate)
+    return HeldEquilibrium(place.plus(solved.change), change, solved.force, matrix)
 
 
 def _across(mechanism: Mechanism, turn: float, stiffness: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ def drive_stiffness(mechanism: Mechanism) -> Any:
     It is 12 E I/L^3 for each leaf, times the factor by which a plate is stiffer than a beam.
     """
     beam = 12 * mechanism.young * mechanism.bending / mechanism.length**3
-    return mechanism.leaves * beam * plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
+    return mechanism.leaves * beam * plate.stiffening(*mechanism.plate_shape)
 
 
 def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
@@ -48,17 +48,12 @@ def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
 
 def axial(mechanism: Mechanism) -> Any:
     """Return E A of a leaf [N], its stiffness against stretching, stiffened by its clamps."""
-    return mechanism.young * mechanism.area * plate.stretching(mechanism.length, mechanism.width, mechanism.poisson)
+    return mechanism.young * mechanism.area * plate.stretching(*mechanism.plate_shape)
 
 
 def edgewise_shear(mechanism: Mechanism) -> Any:
     """Return the shear stiffness of a leaf in its plane, 5/6 G A [N], stiffened by its clamps."""
-    return (
-        SHEAR
-        * mechanism.shear
-        * mechanism.area
-        * plate.edgewise_shear_factor(mechanism.length, mechanism.width, mechanism.poisson)
-    )
+    return SHEAR * mechanism.shear * mechanism.area * plate.edgewise_shear_factor(*mechanism.plate_shape)
 
 
 def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
@@ -68,7 +63,7 @@ def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     count as plates.
     """
     straight = mechanism.leaves * axial(mechanism) / mechanism.length
-    stiffened = plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
+    stiffened = plate.stiffening(*mechanism.plate_shape)
     return straight / (1 + 12 / 700 * (deflection / mechanism.thickness) ** 2 / stiffened)
 
 
@@ -79,12 +74,10 @@ def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     delta, also twists it: the torque is 4 delta (s/L)^3 per force, with s from its middle. The clamps, which forbid
     warping, reduce this twist.
     """
-    flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
-        mechanism
-    )
-    rigidity = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness)
-    twisted = deflection**2 * mechanism.length / (28 * rigidity) * _cubic_twist(mechanism)
-    return mechanism.leaves / (flat + twisted)
+    bent = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise)
+    sheared = mechanism.length / edgewise_shear(mechanism)
+    twisted = deflection**2 * mechanism.length / (28 * mechanism.torsional_rigidity) * _cubic_twist(mechanism)
+    return mechanism.leaves / (bent + sheared + twisted)
 
 
 def _cubic_twist(mechanism: Mechanism) -> Any:
@@ -102,7 +95,7 @@ def _cubic_twist(mechanism: Mechanism) -> Any:
 def max_stress(mechanism: Mechanism, deflection: Any) -> Any:
     """Return the largest bending stress [Pa] at the clamps; for a beam, 3 E t delta/L^2."""
     beam = 3 * mechanism.young * mechanism.thickness * deflection / mechanism.length**2
-    return beam * plate.stress_factors(mechanism.length, mechanism.width, mechanism.poisson)[1]
+    return beam * plate.stress_factors(*mechanism.plate_shape)[1]
 
 
 def shortening(mechanism: Mechanism, deflection: Any) -> Any:
@@ -115,14 +108,8 @@ def buckling_load(mechanism: Mechanism) -> Any:
 
     It is pi^2 E I/L^2 for each leaf, times the factor by which a plate is stiffer than a beam.
     """
-    return (
-        mechanism.leaves
-        * np.pi**2
-        * mechanism.young
-        * mechanism.bending
-        / mechanism.length**2
-        * _mode_stiffening(mechanism)
-    )
+    euler = mechanism.leaves * np.pi**2 * mechanism.young * mechanism.bending / mechanism.length**2
+    return euler * _mode_stiffening(mechanism)
 
 
 def leaf_bending(mechanism: Mechanism) -> Any:
@@ -130,12 +117,8 @@ def leaf_bending(mechanism: Mechanism) -> Any:
 
     It is 1.028 t/L^2 sqrt(E/rho), raised because a plate is stiffer than a beam.
     """
-    beam = (
-        CLAMPED**2
-        / (2 * np.pi * mechanism.length**2)
-        * np.sqrt(mechanism.young * mechanism.bending / (mechanism.density * mechanism.area))
-    )
-    return beam * np.sqrt(_mode_stiffening(mechanism))
+    speed = np.sqrt(mechanism.young * mechanism.bending / (mechanism.density * mechanism.area))
+    return CLAMPED**2 / (2 * np.pi * mechanism.length**2) * speed * np.sqrt(_mode_stiffening(mechanism))
 
 
 def _mode_stiffening(mechanism: Mechanism) -> Any:
@@ -144,7 +127,7 @@ def _mode_stiffening(mechanism: Mechanism) -> Any:
     The factor for parallel motion is used, whose moments change sign along the leaf. In a mode, moments of equal sign
     occur mainly far from the clamps and have little influence.
     """
-    return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
+    return plate.stiffening(*mechanism.plate_shape)
 
 
 def leaf_torsion(mechanism: Mechanism) -> Any:
@@ -167,23 +150,20 @@ def lateral_load(mechanism: Mechanism) -> Any:
 
     The force acts at the leaf ends, on all leaves together.
     """
-    twist = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness)
-    return mechanism.leaves * LATERAL * np.sqrt(mechanism.young * mechanism.bending * twist) / mechanism.length**2
+    rigidity = np.sqrt(mechanism.young * mechanism.bending * mechanism.torsional_rigidity)
+    return mechanism.leaves * LATERAL * rigidity / mechanism.length**2
 
 
 def stage_stiffness(mechanism: Mechanism) -> np.ndarray:
     """Return the stiffness of the undeflected stage at its reference point, shape (..., 6, 6)."""
-    odd, even = (
-        plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson, parity) for parity in (True, False)
-    )
+    odd, even = (plate.stiffening(*mechanism.plate_shape, parity) for parity in (True, False))
     bending = mechanism.young * mechanism.bending / mechanism.length
     edgewise = mechanism.young * mechanism.edgewise / mechanism.length
     sheared = 12 * edgewise / (edgewise_shear(mechanism) * mechanism.length)
     parallel, half = 12 * edgewise / mechanism.length**2 / (1 + sheared), mechanism.length / 2
     along = axial(mechanism) / mechanism.length
-    twist = plate.torsion_stiffness(
-        mechanism.length, mechanism.width, mechanism.thickness, mechanism.shear, mechanism.poisson
-    )
+    length, width, poisson = mechanism.plate_shape
+    twist = plate.torsion_stiffness(length, width, mechanism.thickness, mechanism.shear, poisson)
     spread = mechanism.offset_squares
     return _symmetric(
         mechanism,

@@ -27,9 +27,8 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
         stiffness, buckling = closed_forms.loaded_drive_stiffness(mechanism), closed_forms.buckling_load(mechanism)
     if np.ndim(stiffness) == 0 and mechanism.load >= buckling > 0:
         expected = f"less than the buckling load of the leaves, {float(buckling):.4g} N"
-        raise InputError(
-            "flexure.load", f"{float(mechanism.load):.4g} N", expected, f'load = "{float(buckling) / 3:.2g} N"'
-        )
+        example = f'load = "{float(buckling) / 3:.2g} N"'
+        raise InputError("flexure.load", f"{float(mechanism.load):.4g} N", expected, example)
     keys = {
         "joint.stiffness": stiffness,
         "parasitic.frequency": frequency,
@@ -55,11 +54,9 @@ class VisibleModes:
     def of(cls, mechanism: Mechanism) -> VisibleModes:
         """Compute the modes by closed forms, and decide which of them are visible."""
         frequency, shapes = closed_forms.modes(mechanism)
-        motion = along_motion(mechanism, mechanism.actuation, shapes) * along_motion(
-            mechanism, mechanism.sensor, shapes
-        )
+        pushed, measured = (along_motion(mechanism, at, shapes) for at in (mechanism.actuation, mechanism.sensor))
         internal = np.arange(7) != closed_forms.drive_mode(frequency, shapes)[..., None]
-        residue = np.where(internal, motion * np.asarray(mechanism.body.mass)[..., None], 0.0)
+        residue = np.where(internal, pushed * measured * np.asarray(mechanism.body.mass)[..., None], 0.0)
         least = settings.visible_peak * 2 * np.asarray(mechanism.damping_ratio)[..., None]
         return cls(frequency, residue, np.abs(residue) > least)
 
@@ -68,12 +65,12 @@ class VisibleModes:
 
         For a mechanism without any visible mode the frequency is infinite and the residue 0.
         """
-        picked = [
-            np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]
-            for quantity in (self.frequency, self.residue)
-        ]
-        visible = self.visible.any(axis=-1)
-        return np.where(visible, picked[0], np.inf)[()], np.where(visible, picked[1], 0.0)[()]
+        both = ((self.frequency, np.inf), (self.residue, 0.0))
+        visible, at = self.visible.any(axis=-1), mode[..., None]
+        frequency, residue = (
+            np.where(visible, np.take_along_axis(quantity, at, axis=-1)[..., 0], none)[()] for quantity, none in both
+        )
+        return frequency, residue
 
 
 def first_interfering(mechanism: Mechanism) -> Any:

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from friso.leaf_springs.plate import torsion_constant
+
 AXES = ("x", "y", "z")
 
 GRAVITY = 9.80665
@@ -85,12 +87,8 @@ class Mechanism:
         inertia = _triple(section, "inertia", cube_inertia(bare.body.mass))
         centre = _triple(section, "centre", bare.body.centre)
         actuation = _triple(section, "actuation", centre)
-        return replace(
-            bare,
-            body=MovingBody(bare.body.mass, inertia, centre),
-            actuation=actuation,
-            sensor=_triple(section, "sensor", actuation),
-        )
+        body, sensor = MovingBody(bare.body.mass, inertia, centre), _triple(section, "sensor", actuation)
+        return replace(bare, body=body, actuation=actuation, sensor=sensor)
 
     def member(self, number: int) -> Mechanism:
         """Return one mechanism, with plain numbers, out of many that are arrays, by its number."""
@@ -128,6 +126,16 @@ class Mechanism:
     def edgewise(self) -> Any:
         """Return the second moment of area of a leaf in its plane [m^4]."""
         return self.thickness * self.width**3 / 12
+
+    @property
+    def plate_shape(self) -> tuple[Any, Any, Any]:
+        """Return length [m], width [m] and Poisson's ratio of a leaf, of which its stiffness as a plate depends."""
+        return self.length, self.width, self.poisson
+
+    @property
+    def torsional_rigidity(self) -> Any:
+        """Return the rigidity of a leaf in torsion, G J [N m^2], where it is free to warp."""
+        return self.shear * torsion_constant(self.width, self.thickness)
 
     @property
     def leaf_mass(self) -> Any:

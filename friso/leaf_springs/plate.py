@@ -96,9 +96,8 @@ def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
     # compliance: integral of f'' m over that of m^2, times (1 - nu^2) for a beam
     share = poisson**2 / (1 - poisson**2)
     beam = length**3 / 12 if odd else length
-    reduction = sum(
-        weight * _moment_of(rate, length, odd) for rate, weight in zip(curl.rates, curl.weights, strict=True)
-    )
+    decays = zip(curl.rates, curl.weights, strict=True)
+    reduction = sum(weight * _moment_of(rate, length, odd) for rate, weight in decays)
     compliance = 1 + share * (1 - reduction / beam)
     return 1 + CONVERGED * (1 / ((1 - poisson**2) * compliance) - 1)
 

@@ -8,7 +8,7 @@ from friso.errors import InputError
 
 EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo")}
 """Packages of each extra that commands need, by the extra's name in pyproject.toml.
-`friso.identification.logs.libraries` lists packages of log formats."""
+`friso.identification.logs.confined` lists packages of log formats."""
 
 
 def install(extra: str) -> str:

@@ -127,11 +127,8 @@ def _check(flat: Mapping[str, Any], interval: float) -> None:
     Raises InputError for an interval that is no whole number of samples, for a delay of too many, and for a rail along
     which nothing of the friction law varies.
     """
-    if (
-        "rail.seed" in flat
-        and flat["friction.model"] != "none"
-        and not any(f"friction.{level}" in flat for level in LEVELS)
-    ):
+    varied = flat["friction.model"] == "none" or any(f"friction.{level}" in flat for level in LEVELS)
+    if "rail.seed" in flat and not varied:
         actual = f'a [rail], but friction "{flat["friction.model"]}" without a static or Coulomb level to vary along it'
         raise InputError("rail", actual, "no [rail], or a law with such a level", 'model = "lugre"')
     if whole_samples(flat) > settings.most_delay_samples:
@@ -139,10 +136,9 @@ def _check(flat: Mapping[str, Any], interval: float) -> None:
         raise InputError("drive.delay", actual, f"at most {settings.most_delay_samples} samples", 'delay = "100 us"')
     samples = interval / flat["drive.sample_time"]
     if samples < 1 - 1e-9 or abs(samples - round(samples)) > 1e-6:
-        expected = f"a whole number of samples of the drive, {flat['drive.sample_time']:g} s each"
-        raise InputError(
-            "interval", f"{interval:g} s", expected, f"{max(1, round(samples)) * flat['drive.sample_time']:g} s"
-        )
+        step = flat["drive.sample_time"]
+        expected = f"a whole number of samples of the drive, {step:g} s each"
+        raise InputError("interval", f"{interval:g} s", expected, f"{max(1, round(samples)) * step:g} s")
 
 
 def _recorded(

@@ -18,7 +18,17 @@ from dataclasses import replace
 from math import isclose
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.format import AsStage, AxisParameters, Beside, FlatStage, ParameterFormat, Parameters, lacks, si
+from friso.drives.format import (
+    AsStage,
+    AxisParameters,
+    Beside,
+    FlatStage,
+    ParameterFormat,
+    Parameters,
+    lacks,
+    si,
+    there_and_back,
+)
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
@@ -87,18 +97,8 @@ REPEATED = "#REPEATED"
 
 No variable has this name, since # begins a comment."""
 
-HELD = frozenset(
-    {
-        "kp",
-        "ki",
-        "kd",
-        "viscous_feedforward",
-        "acceleration_feedforward",
-        "force_limit",
-        "integral_limit",
-        "error_deadband",
-    }
-)
+_FEEDFORWARD, _LIMITS = ("viscous_feedforward", "acceleration_feedforward"), ("force_limit", "integral_limit")
+HELD = frozenset(("kp", "ki", "kd", *_FEEDFORWARD, *_LIMITS, "error_deadband"))
 HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforward", "error_deadband"))
 """Names in [controller] that the parameters hold. The velocity loop belongs to the drive."""
 
@@ -293,15 +293,8 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     if kind != LINEAR:
         tables["axis"] = {"kind": kind.name}
     if axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY"):
-        fastest, acceleration = axis.number("MAX_VELOCITY"), axis.number("MAX_ACCELERATION")
-        back = max(5.0, 4 * fastest / acceleration)
-        tables["motion"] = {
-            "kind": "there_and_back",
-            "acceleration": si(acceleration * unit, kind.unit("m/s^2")),
-            "acceleration_time": si(fastest / acceleration, "s"),
-            "return_at": si(back, "s"),
-            "duration": si(back + 15, "s"),
-        }
+        limits = axis.number("MAX_VELOCITY"), axis.number("MAX_ACCELERATION")
+        tables["motion"] = there_and_back(*limits, unit, kind)
     return AsStage(tables, (*left, *more, TARGET))
 
 
@@ -367,9 +360,8 @@ def _velocity(
         if axis.is_set(name)
     ]
     if VELOCITY not in answers:
-        left.append(
-            f"the scale of the output, since FF1 is about 1: one machine unit per second is assumed ({VELOCITY})"
-        )
+        scale_of_output = "the scale of the output, since FF1 is about 1"
+        left.append(f"{scale_of_output}: one machine unit per second is assumed ({VELOCITY})")
     return table, left
 
 
@@ -443,9 +435,8 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     units = LENGTHS if kind == LINEAR else ANGLES
     unit = units[answers.choice(UNIT, tuple(units))]
     if flat["controller.kind"] not in ("pid", "cascade"):
-        raise lacks(
-            f'kind = "{flat["controller.kind"]}"', 'kind = "pid" or kind = "cascade", which this component can be'
-        )
+        expected = 'kind = "pid" or kind = "cascade", which this component can be'
+        raise lacks(f'kind = "{flat["controller.kind"]}"', expected)
     get = lambda name, default=0.0: float(flat.get(f"controller.{name}", default))  # noqa: E731
     if flat["controller.kind"] == "cascade":
         return _of_cascade(flat, unit, answers.value(VELOCITY, VELOCITY_FIELD.on(kind)) / unit)

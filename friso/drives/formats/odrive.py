@@ -17,7 +17,16 @@ from typing import Any
 from friso.axis import LINEAR, AxisKind, axis_of
 from friso.drives.arithmetic import number_in
 from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
-from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
+from friso.drives.format import (
+    AsStage,
+    AxisParameters,
+    FlatStage,
+    ParameterFormat,
+    Parameters,
+    lacks,
+    si,
+    there_and_back,
+)
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import quoted
@@ -26,6 +35,7 @@ from friso.stage.filters import FEEDBACK
 from friso.stage.lists import row_keys
 
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
+LIMITS_OF_MOVES = f"{MOVE}.vel_limit", f"{MOVE}.accel_limit"
 GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
 RATE = 8000.0
 """Samples of the controller per second, in ODrive 3."""
@@ -58,39 +68,15 @@ SYMBOLS = {
 
 MOST_KEYS, LONGEST_KEY = 100_000, 200
 
-OTHERS = frozenset(
-    [
-        "control_mode",
-        "input_mode",
-        "vel_limit",
-        "vel_limit_tolerance",
-        "vel_ramp_rate",
-        "torque_ramp_rate",
-        "circular_setpoints",
-        "circular_setpoint_range",
-        "steps_per_circular_range",
-        "homing_speed",
-        "inertia",
-        "axis_to_mirror",
-        "mirror_ratio",
-        "torque_mirror_ratio",
-        "load_encoder_axis",
-        "input_filter_bandwidth",
-        "enable_vel_limit",
-        "enable_current_mode_vel_limit",
-        "enable_torque_mode_vel_limit",
-        "enable_gain_scheduling",
-        "gain_scheduling_width",
-        "enable_overspeed_error",
-        "vel_integrator_limit",
-        "mechanical_power_bandwidth",
-        "electrical_power_bandwidth",
-        "spinout_mechanical_power_threshold",
-        "spinout_electrical_power_threshold",
-        "anticogging",
-    ]
-)
-KNOWN = OTHERS.union(GAINS)
+_OTHERS = """
+control_mode input_mode vel_limit vel_limit_tolerance vel_ramp_rate torque_ramp_rate circular_setpoints
+circular_setpoint_range steps_per_circular_range homing_speed inertia axis_to_mirror mirror_ratio
+torque_mirror_ratio load_encoder_axis input_filter_bandwidth enable_vel_limit enable_current_mode_vel_limit
+enable_torque_mode_vel_limit enable_gain_scheduling gain_scheduling_width enable_overspeed_error
+vel_integrator_limit mechanical_power_bandwidth electrical_power_bandwidth spinout_mechanical_power_threshold
+spinout_electrical_power_threshold anticogging
+"""
+KNOWN = frozenset((*_OTHERS.split(), *GAINS))
 """Names in controller.config of the supported firmwares."""
 
 HELD = frozenset({"kv", "kp", "velocity_integral_time", "force_limit", "integral_limit"})
@@ -277,7 +263,7 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
     else:
         what = 'what one turn of the motor moves; an angle on a rotary axis, "360 deg" without a gear'
         asked.append(OpenQuestion(TRAVEL, what, '"10 mm"'))
-    moved = all(axis.is_set(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
+    moved = all(map(axis.is_set, LIMITS_OF_MOVES))
     return (*asked, *of_the_machine(answers, kind, moved))
 
 
@@ -345,19 +331,9 @@ def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Ma
 
     `travel` is how far one turn moves the load [m or rad].
     """
-    if not all(axis.is_set(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit")):
+    if not all(map(axis.is_set, LIMITS_OF_MOVES)):
         return {}
-    fastest, acceleration = (axis.number(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
-    back = max(5.0, 4 * fastest / acceleration)
-    return {
-        "motion": {
-            "kind": "there_and_back",
-            "acceleration": si(acceleration * travel, kind.unit("m/s^2")),
-            "acceleration_time": si(fastest / acceleration, "s"),
-            "return_at": si(back, "s"),
-            "duration": si(back + 15, "s"),
-        }
-    }
+    return {"motion": there_and_back(*map(axis.number, LIMITS_OF_MOVES), travel, kind)}
 
 
 def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:
@@ -367,9 +343,8 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     """
     left = ["the position is the estimate of a phase-locked loop too, which follows a steady motion without an error"]
     if IN_TURNS not in axis.values:
-        left.append(
-            f"the firmware, which no {IN_TURNS} tells: gains in turns and N m are assumed, as 0.5.1 to 0.5.6 has"
-        )
+        unknown = f"the firmware, which no {IN_TURNS} tells"
+        left.append(f"{unknown}: gains in turns and N m are assumed, as 0.5.1 to 0.5.6 has")
     if axis.flag(f"{CONFIG}.enable_gain_scheduling"):
         width = axis.number(f"{CONFIG}.gain_scheduling_width", 0.0)
         left.append(
@@ -383,9 +358,8 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     elif mode == POSITION_FILTER:
         left.append("the filter of the commanded position (input_filter_bandwidth)")
     elif mode != TRAJECTORY:
-        left.append(
-            f"input_mode = {mode:g}: how the drive comes to its position; none of its feedforward is taken over"
-        )
+        how = "how the drive comes to its position; none of its feedforward is taken over"
+        left.append(f"input_mode = {mode:g}: {how}")
     accelerates, brakes = (axis.number(f"{MOVE}.{name}", 0.0) for name in ("accel_limit", "decel_limit"))
     if accelerates and brakes and accelerates != brakes:
         left.append(f"decel_limit = {brakes:g} turn/s^2: friso's move brakes as it accelerates")
@@ -410,9 +384,8 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
     """Ask how far a turn moves the load; () if a transmission or an answer tells."""
     if TRAVEL in answers or travel_of(flat) is not None:
         return ()
-    return (
-        OpenQuestion(TRAVEL, "what one turn of the motor moves", '"10 mm"' if axis_of(flat) == LINEAR else '"360 deg"'),
-    )
+    example = '"10 mm"' if axis_of(flat) == LINEAR else '"360 deg"'
+    return (OpenQuestion(TRAVEL, "what one turn of the motor moves", example),)
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:

@@ -30,10 +30,8 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     ramps = force_ramps(case.log.per_unit_of_force(), case.fit.value(MASS))
     more = friction_beyond(case.determined, case.fit.stage, ramps)
     if more is not None:
-        static = case.determined["friction.static"].value
-        why = (
-            f"motions begin with {more:.3g} {case.unit} of friction, more than the {static:.3g} {case.unit} of the fit"
-        )
+        static, unit = case.determined["friction.static"].value, case.unit
+        why = f"motions begin with {more:.3g} {unit} of friction, more than the {static:.3g} {unit} of the fit"
         yield RaisedDoubt("", more - static, case.unit, refuses=dict.fromkeys(CURVE, why))
 
 

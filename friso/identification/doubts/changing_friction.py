@@ -47,20 +47,17 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         changes = changes_beside(inverse) if quality.rejected else _changes_of_fit(case.fit, case.velocity)
     if changes is None:
         return
-    fit, inverse = (
-        (None, inverse_reaching(inverse, changes)) if quality.rejected else (_reaching(case.fit, changes), None)
-    )
-    yield RaisedDoubt(fit=fit, inverse=inverse)
+    if quality.rejected:
+        yield RaisedDoubt(inverse=inverse_reaching(inverse, changes))
+    else:
+        yield RaisedDoubt(fit=_reaching(case.fit, changes))
     for what, size, cause in (
         ("Friction", changes.friction, "warming up?"),
         ("The constant force", changes.constant, "a drift of the force?"),
     ):
         if changes.sure and size > doubt_settings.friction_share_of_a_change * case.inverse.value("coulomb"):
-            words = (
-                f"{what} changes by {size:.2g} {case.unit} during the record ({cause}): intervals reach from its least "
-                "to its largest"
-            )
-            yield RaisedDoubt(words, size, case.unit)
+            words = f"{what} changes by {size:.2g} {case.unit} during the record ({cause})"
+            yield RaisedDoubt(f"{words}: intervals reach from its least to its largest", size, case.unit)
 
 
 def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
@@ -143,11 +140,11 @@ def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
 def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseModel:
     """Widen the inverse model's intervals by changes during the record and the shifts they cause."""
     over = {"coulomb": changes.friction_reach, "offset": changes.constant_reach}
-    answers = []
-    for estimate, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True):
-        further = moved + over.get(estimate.name, 0.0) if estimate.determined else 0.0
-        answers.append(replace(estimate, low=estimate.low - further, high=estimate.high + further))
-    return replace(inverse, estimates=tuple(answers))
+    answers = tuple(
+        one.widened(moved + over.get(one.name, 0.0)) if one.determined else one
+        for one, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True)
+    )
+    return replace(inverse, estimates=answers)
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

@@ -27,9 +27,8 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     if len(signals) < 2 * fewest:
         return
     left = least_squares(*_deviations(signals, stretch))[1]
-    shares = np.linspace(
-        min(doubt_settings.shares_of_a_part), max(doubt_settings.shares_of_a_part), doubt_settings.levels_of_a_part
-    )
+    ends = doubt_settings.shares_of_a_part
+    shares = np.linspace(min(ends), max(ends), doubt_settings.levels_of_a_part)
     best, where, ratio = doubt_settings.power_left_by_changing_gains * float(left @ left), "", 1.0
     for name, signal in course.items():
         for level in np.quantile(signal, shares):

@@ -33,17 +33,12 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     if not case.determined.keys() & {*BRISTLES} or fit.problem.closed or not {*fit.problem.names} >= NEEDED:
         return
     free, saved = np.isin(np.arange(len(fit.inner)), fit.free), _saved(fit)
+    until = settings.iterations_of_a_repetition, settings.cost_share_of_refinement
     for share in doubt_settings.falling_dampings:
         damping, start = share * np.sqrt(fit.value(STIFFNESS) * fit.value(MASS)), fit.inner.copy()
         start[fit.problem.names.index(DAMPING)] = np.log(damping)
         inputs = replace(fit.problem.inputs, force=fit.problem.inputs.force + damping * saved)
-        other = refine_fit(
-            [replace(fit.problem, inputs=inputs)],
-            start[None],
-            free[None],
-            settings.iterations_of_a_repetition,
-            settings.cost_share_of_refinement,
-        )
+        other = refine_fit([replace(fit.problem, inputs=inputs)], start[None], free, *until)
         if other.cost[0] < fit.cost:
             yield RaisedDoubt(refuses=dict.fromkeys(BRISTLES, WHY))
             return

@@ -7,7 +7,6 @@ from contextlib import suppress
 
 from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.inverse_model import inverse_model
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -18,7 +17,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     log = case.log
     with suppress(InputError):
         time = {"drift": log.time - log.time.mean()}
-        model = inverse_model(log, case.inverse.bandwidth, False, case.cart_share, extra=time)
+        model = case.modelled(log, extra=time)
         rate = f"{model.value('drift'):.2g} {case.unit}/s"
         words = f"a force drifting by {rate} accounts for most of it"
         yield RaisedDoubt(words, model.value("drift"), f"{case.unit}/s", model, spoils=True)

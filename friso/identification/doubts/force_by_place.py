@@ -9,7 +9,6 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.inverse_model import inverse_model
 from friso.identification.settings import doubt_settings
 
 
@@ -18,7 +17,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     places = _places(case.log["position"], len(case.inverse.measured))
     with suppress(InputError):
         if places:
-            model = inverse_model(case.log, case.inverse.bandwidth, False, case.cart_share, extra=places)
+            model = case.modelled(case.log, extra=places)
             size = float(np.ptp([0.0, *(model.value(name) for name in places)]))
             words = f"a force that varies with position, by {size:.2g} {case.unit}, accounts for most of it"
             yield RaisedDoubt(words, size, case.unit, model, spoils=True)

@@ -20,11 +20,8 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """
     force = case.log["force"][case.log.longest]
     digit, coulomb = digit_of(force), abs(case.inverse.value("coulomb"))
-    if (
-        digit < doubt_settings.friction_share_of_a_digit * coulomb
-        or np.median(np.abs(np.diff(force))) > 0
-        or digit == 0
-    ):
+    fine = digit == 0 or digit < doubt_settings.friction_share_of_a_digit * coulomb
+    if fine or np.median(np.abs(np.diff(force))) > 0:
         return
     words = (
         f"The force is logged in steps of {digit:.2g} {case.unit}, {percent(digit / coulomb)} of Coulomb friction: "

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
-from friso.identification.estimate import Estimate
 from friso.quantities import non_negative, positive
 from friso.stage import numeric_keys
 
@@ -28,11 +27,11 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     for key, one in case.determined.items():
         bound = bounds.get(key)
         if one.high < 0 and bound in (non_negative, positive):
-            answers[key] = Estimate.unknown(key, one.unit, one.method, NEGATIVE, 0.0)
+            answers[key] = one.withheld(NEGATIVE, 0.0)
         elif one.low < 0 and bound is non_negative:
             answers[key] = replace(one, value=max(one.value, 0.0), low=0.0)
         elif one.low <= 0 and bound is positive:
-            answers[key] = Estimate.unknown(key, one.unit, one.method, NOT_ABOVE_ZERO, 0.0, one.high)
+            answers[key] = one.withheld(NOT_ABOVE_ZERO, 0.0, one.high)
     if answers:
         yield RaisedDoubt(answers=answers)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -25,10 +24,7 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
         yield RaisedDoubt(size=inertia, unit=case.unit, refuses=dict.fromkeys(masses, why))
     elif masses and inertia > 0:
         share = (case.unexplained / inertia) ** 2
-        answers = {
-            key: replace(one, low=min(one.low, (1 - share) * one.value), high=max(one.high, (1 + share) * one.value))
-            for key, one in masses.items()
-        }
+        answers = {key: one.reaching((1 - share) * one.value, (1 + share) * one.value) for key, one in masses.items()}
         yield RaisedDoubt(size=inertia, unit=case.unit, answers=answers)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.inverse_model import InverseModel, inverse_model, least_squares, motion, unit_of
+from friso.identification.inverse_model import InverseModel, least_squares, moved_in, unit_of
 from friso.identification.logs.log import Log
-from friso.identification.settings import doubt_settings, identification_settings
+from friso.identification.settings import doubt_settings
 from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
@@ -50,10 +50,7 @@ def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
         return None
     accelerated = {ACCELERATION: columns[ACCELERATION]}
     with suppress(InputError):
-        alone, both = (
-            inverse_model(log, inverse.bandwidth, False, case.cart_share, extra=extra)
-            for extra in (accelerated, columns)
-        )
+        alone, both = (case.modelled(log, extra=extra) for extra in (accelerated, columns))
         if alone.value(ACCELERATION) < 0:
             lacking = max(both.value(ACCELERATION), both.value(DIRECTION)) < 0
             return both if lacking else alone, inverse.measured - alone.measured
@@ -91,9 +88,7 @@ def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
     columns = {name: np.zeros(len(log.time)) for name in (ACCELERATION, DIRECTION)}
     for part in log.segments:
         if part.stop - part.start > doubt_settings.samples_of_a_reference:
-            reference = motion(
-                log["reference"][part], log.sample_time, identification_settings.smoothing_bandwidths * bandwidth
-            )
+            reference = moved_in(log, log["reference"][part], bandwidth)
             columns[ACCELERATION][part] = reference.acceleration
             columns[DIRECTION][part] = np.sign(np.gradient(log["reference"][part]))
     return columns

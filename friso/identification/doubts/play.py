@@ -9,8 +9,9 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.inverse_model import motion
+from friso.identification.logs.checks import runs
 from friso.identification.output_error.parameters import MASS
-from friso.identification.readings.common import digit_of, runs
+from friso.identification.readings.common import digit_of
 from friso.identification.settings import doubt_settings, identification_settings
 from friso.quantities import percent
 
@@ -57,9 +58,8 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     widths = np.geomspace(low, high, 1 + round(np.log(high / low) / np.log(doubt_settings.ratio_of_plays)))
     slowings = np.repeat([0.0, friction / (doubt_settings.mass_share_of_a_loose_load * mass)], len(widths))
     both = np.tile(widths, 2)
-    for width, slowing, speed in zip(
-        both, slowings, loose_loads(moved.position, moved.velocity, step, both, slowings), strict=True
-    ):
+    speeds = loose_loads(moved.position, moved.velocity, step, both, slowings)
+    for width, slowing, speed in zip(both, slowings, speeds, strict=True):
         loose = runs(speed != moved.velocity)
         if sum(one.stop - one.start for one in loose) < doubt_settings.samples_of_a_crossing * len(loose):
             continue

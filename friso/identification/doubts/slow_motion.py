@@ -53,10 +53,7 @@ def _bounded(estimates: Sequence[Estimate], coulomb: Estimate, rise: float, why:
     bounded = replace(bounded, high=bounded.high + max(rise, 0.0))
     highest = settings.highest_friction_ratio * bounded.high
     static = [one for one in estimates if one.name == "friction.static" and not one.determined]
-    return {
-        coulomb.name: bounded,
-        **{one.name: replace(one, low=min(one.low, bounded.low), high=max(one.high, highest)) for one in static},
-    }
+    return {coulomb.name: bounded, **{one.name: one.reaching(bounded.low, highest) for one in static}}
 
 
 DOUBT = Doubt(

@@ -34,14 +34,8 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     tried = np.repeat(fit.inner[None], 1 + len(stiffer), axis=0)
     tried[1:, place] += stiffer
     free = np.isin(np.arange(len(fit.inner)), [number for number in fit.free if number != place])
-    refitted = refine_fit(
-        [fit.problem],
-        tried,
-        np.repeat(free[None], len(tried), axis=0),
-        settings.iterations_of_a_profile,
-        settings.cost_share_of_refinement,
-        slopes=fit.slopes,
-    )
+    until = settings.iterations_of_a_profile, settings.cost_share_of_refinement
+    refitted = refine_fit([fit.problem], tried, free, *until, slopes=fit.slopes)
     rng = np.random.default_rng(settings.seed_of_repetitions)
     beyond = [
         cost / mean_square(_own_log(case, inner, rng).residuals(inner[None]))[0]

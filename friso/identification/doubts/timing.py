@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.inverse_model import InverseModel, inverse_model
+from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.settings import doubt_settings
 
@@ -31,10 +31,8 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         return min(fits, key=lambda choice: fits[choice].error)
 
     period = 1 / (case.inverse.bandwidth * log.sample_time)
-    latest, widest = (
-        doubt_settings.motion_periods_of_a_shift * period,
-        doubt_settings.motion_periods_of_an_average * period / 2,
-    )
+    latest = doubt_settings.motion_periods_of_a_shift * period
+    widest = doubt_settings.motion_periods_of_an_average * period / 2
     lag, _ = best((sign * lag, 1) for lag in _doubling(latest) for sign in (1, -1))
     lag, _ = plain = best((lag + more, 1) for more in (-abs(lag) // 4, abs(lag) // 4) if more)
     _, width = best((lag, sign * (2 * half + 1)) for half in _doubling(widest) for sign in (1, -1))
@@ -59,7 +57,7 @@ def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
     `lag` and `width` are numbers of samples. A negative `width` averages the force instead.
     """
     moved = _force_moved(case.log, lag, max(-width, 1))
-    return inverse_model(moved, case.inverse.bandwidth, False, case.cart_share, averaged=max(width, 1))
+    return case.modelled(moved, averaged=max(width, 1))
 
 
 def _error_of_equal_averages(case: RecordCase, lag: int, width: int) -> float:
@@ -71,7 +69,7 @@ def _error_of_equal_averages(case: RecordCase, lag: int, width: int) -> float:
     if width >= 0:
         return np.inf
     moved = _force_moved(case.log, lag, -width)
-    return inverse_model(moved, case.inverse.bandwidth, False, case.cart_share, averaged=-width).error
+    return case.modelled(moved, averaged=-width).error
 
 
 def _force_moved(log: Log, lag: int, width: int) -> Log:

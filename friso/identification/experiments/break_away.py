@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kind import ExperimentKind, of_one
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import by_direction
 from friso.identification.readings.course import Course
@@ -45,12 +45,8 @@ def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
         force, rate = ramps.forces[chosen], ramps.rates[chosen]
         estimate = static_friction("friction.static", force, rate, late=high)
         ends = {"low": max(estimate.low - off, 0.0), "high": estimate.high + off}
-        estimate = replace(estimate, **ends, systematic=estimate.systematic + off)
-        return (
-            estimate
-            if estimate.determined
-            else replace(estimate, reason=" ".join([f"{estimate.reason}.", *notes]).rstrip("."))
-        )
+        reason = "" if estimate.determined else " ".join([f"{estimate.reason}.", *notes]).rstrip(".")
+        return replace(estimate, **ends, systematic=estimate.systematic + off, reason=reason)
 
     forward, backward = (static(mask) for _, mask in by_direction(ramps.directions))
     together = static(np.ones(len(ramps.forces), dtype=bool))
@@ -69,25 +65,12 @@ def _claims_together(courses: Sequence[Course]) -> str | None:
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
 
 
-def _partial(log: Log) -> bool:
-    """Tell whether a log alone has too few ramps to determine static friction."""
-    return len(static_from_ramps(log).ramps.times) < reading_settings.fewest_ramps
-
-
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
-    """Analyse a log of force ramps, with the moving mass from experiments or the stage file."""
-    (log,) = logs
-    assert isinstance(log, Log)
-    return static_from_ramps(log, sum(prior.masses(log)))
-
-
 KIND = ExperimentKind[BreakAway](
-    analyse=_analyse,
+    analyse=of_one(lambda log, prior, settings: static_from_ramps(log, sum(prior.masses(log)))),
     estimates=lambda result, stage: (replace(result.static, name="friction.static"),),
     after=("frequency", "moves"),
     foreign=("force",),
     per_unit=True,
-    partial=_partial,
-    claims=lambda course: _claims_together([course]),
+    partial=lambda log: len(static_from_ramps(log).ramps.times) < reading_settings.fewest_ramps,
     claims_together=_claims_together,
 )

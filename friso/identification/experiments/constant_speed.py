@@ -10,7 +10,7 @@ import numpy as np
 from friso.equations.bandwidth import bandwidth
 from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source, independent
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, independent, of_one
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import EXPONENT
 from friso.identification.readings.course import Course
@@ -29,10 +29,8 @@ class FrictionAtSpeeds:
     position: FrictionPosition
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
+def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
     """Analyse a log of constant speeds, with the loop's crossover, and with the assumed masses or that of the log."""
-    (log,) = logs
-    assert isinstance(log, Log)
     friction = friction_velocity(log, sum(prior.masses(log)) or None, _stated_exponent(prior))
     return FrictionAtSpeeds(friction, friction_position(log, friction.mass, bandwidth(prior.flat(log))))
 
@@ -85,21 +83,17 @@ def _claims_together(courses: Sequence[Course]) -> str | None:
     speeds = [course.speeds for course in courses]
     fitting = all(len(of_one) or course.one_way for of_one, course in zip(speeds, courses, strict=True))
     count = distinct(np.concatenate(speeds)) if fitting and any(map(len, speeds)) else 0
-    return (
-        f"most of the way goes at one of {count} constant speeds"
-        if count >= reading_settings.speeds_of_a_line
-        else None
-    )
+    enough = count >= reading_settings.speeds_of_a_line
+    return f"most of the way goes at one of {count} constant speeds" if enough else None
 
 
 KIND = ExperimentKind[FrictionAtSpeeds](
-    _analyse,
+    of_one(_analyse),
     _estimates,
     _correlated,
     after=("frequency", "moves"),
     foreign=("force",),
     per_unit=True,
     partial=_partial,
-    claims=lambda course: _claims_together([course]),
     claims_together=_claims_together,
 )

@@ -5,7 +5,6 @@ Thesis, Sec. 3.2.2 and 4.3.2, Fig. 24 to 27.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -13,12 +12,10 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.hunting import hunting
-from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, of_one
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel
 from friso.identification.settings import experiment_settings
-from friso.stage import Stage
 
 
 @dataclass(frozen=True)
@@ -83,19 +80,9 @@ def swings_of(log: Log) -> HuntingLog:
     cycles, above, below, sizes = cycles[first:], above[first:], below[first:], sizes[first:]
     periods = np.diff(time[ups[first:]])
     peaks = np.array([one.start + int(np.argmax(deviation[one])) for one in cycles])
-    return HuntingLog(
-        len(cycles),
-        float(periods.mean()),
-        float(periods.std(ddof=1)),
-        float(sizes.mean()),
-        float(sizes.std(ddof=1)),
-        float(above.mean()),
-        float(-below.mean()),
-        None,
-        time,
-        deviation,
-        peaks,
-    )
+    spread = (float(number) for values in (periods, sizes) for number in (values.mean(), values.std(ddof=1)))
+    sides = float(above.mean()), float(-below.mean())
+    return HuntingLog(len(cycles), *spread, *sides, None, time, deviation, peaks)
 
 
 def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
@@ -108,10 +95,8 @@ def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
     return side[last]
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> HuntingLog:
+def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> HuntingLog:
     """Analyse a log of hunting, and predict the cycle of the stage, if a stage file is given."""
-    (log,) = logs
-    assert isinstance(log, Log)
     shown = swings_of(log)
     if prior.stage is None or not prior.from_user:
         return shown
@@ -122,9 +107,4 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     return replace(shown, predicted=PredictedCycle(float(cycle.amplitude), float(cycle.period)))
 
 
-def _estimates(result: HuntingLog, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return no estimates, because a cycle depends on many keys at once."""
-    return ()
-
-
-KIND = ExperimentKind[HuntingLog](_analyse, _estimates, roles=("position",))
+KIND = ExperimentKind[HuntingLog](of_one(_analyse), roles=("position",))

@@ -10,7 +10,7 @@ from friso.errors import InputError
 from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source, of_one
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
@@ -40,13 +40,11 @@ ALIKE = (
 )
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
+def _analyse(whole: Log, prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
     """Analyse a log of moves, using results of other experiments.
 
     The machine's own loop is simulated if the user gave the stage and the log has a reference.
     """
-    (whole,) = logs
-    assert isinstance(whole, Log)
     if prior.from_user:
         check_roles(whole, ("force",))
     log = whole.excerpt(experiment_settings.samples_of_moves)
@@ -82,15 +80,14 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
-    long = [result.log for result in results if result.log.is_excerpt]
+    long, count = [result.log for result in results if result.log.is_excerpt], experiment_settings.samples_of_moves
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
         *([WITHOUT_CONTROLLER if stage is None else WITHOUT_REFERENCE] if followed else []),
         *(f"{result.log.name}: {OUT_OF_STEP}" for result in loops if not result.fit.problem.closed),
         *_play_that_looks_alike([result.estimates for result in results]),
         *(
-            f"{log.name}: of a log this long {experiment_settings.samples_of_moves} samples are used, {_span(log)}, "
-            "where it moves most"
+            f"{log.name}: of a log this long {count} samples are used, {_span(log)}, where it moves most"
             for log in long
         ),
     ]
@@ -139,7 +136,7 @@ def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
 
 
 KIND = ExperimentKind[IdentifiedMoves](
-    _analyse,
+    of_one(_analyse),
     _estimates,
     _correlated,
     after=("frequency", "steps"),

@@ -7,32 +7,20 @@ linear in all but q, once the motion is measured. Motion that is quick enough sh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from friso.errors import InputError
-from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, by_rows, of_one
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import bends
-from friso.identification.readings.at_bearing import (
-    DIRECT,
-    HELD,
-    BearingRecord,
-    Between,
-    LowPass,
-    at_bearing,
-    believed_between,
-    cutoff_of,
-    rate_of,
-    record_of,
-    why_unseen,
-)
+from friso.identification.readings import at_bearing as bearing
+from friso.identification.readings.at_bearing import DIRECT, BearingRecord, Between, LowPass
 from friso.identification.readings.common import (
     Mean,
     by_t,
@@ -119,10 +107,10 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     that friction falls with speed and that bristles of another law bend differently. With a large residual, or beside a
     spring to ground, nothing is determined. Raises InputError for missing channels.
     """
-    record = record_of(log, log.longest, between)
-    if why := why_unseen(record, experiment_settings.samples_of_presliding):
+    record = bearing.record_of(log, log.longest, between)
+    if why := bearing.why_unseen(record, experiment_settings.samples_of_presliding):
         return _nothing(why)
-    cutoff, looked_for = cutoff_of(record), between.delay is None
+    cutoff, looked_for = bearing.cutoff_of(record), between.delay is None
     tried = [
         (cutoff, looked_for),
         (experiment_settings.low_pass_of_a_check * cutoff, looked_for),
@@ -142,17 +130,15 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
         for key, *numbers in zip(KEYS, best.values, np.diag(best.covariance) ** 0.5, systematic, strict=True)
     )
     correlation = correlation_of(best.covariance, changes, even)
-    notes = (HELD,) if record.bent is None and between.joint else ()
+    notes = (bearing.HELD,) if record.bent is None and between.joint else ()
     curves = (best.time, best.position, best.force, best.model)
     return Presliding(mass, damping, stiffness, correlation, *curves, best.left, notes)
 
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
     """Low-pass and thin a record, as a fit of the force below `cutoff` [Hz] needs it."""
-    return record.seen(
-        experiment_settings.low_pass_of_the_motion * cutoff,
-        max(int(1 / (experiment_settings.samples_of_a_presliding_period * cutoff * record.interval)), 1),
-    )
+    every = int(1 / (experiment_settings.samples_of_a_presliding_period * cutoff * record.interval))
+    return record.seen(experiment_settings.low_pass_of_the_motion * cutoff, max(every, 1))
 
 
 def _nothing(why: str) -> Presliding:
@@ -183,17 +169,13 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     `error` is the standard error, to which `systematic` is added. The quantity is not determined if its interval
     reaches 0.
     """
-    estimate = by_t(
-        key, UNITS[key], Mean(value, error, reading_settings.blocks_of_a_mean - 1), METHOD, systematic, systematic
-    )
-    if estimate.low > 0:
-        return estimate
+    mean = Mean(value, error, reading_settings.blocks_of_a_mean - 1)
     why = (
         "the motion is too slow to show it"
         if key != STIFFNESS
         else "no force holds the bearing: does it stick? repeat it with a smaller force"
     )
-    return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(estimate.high, 0.0) or np.inf)
+    return by_t(key, UNITS[key], mean, METHOD, systematic, systematic).if_positive(why)
 
 
 def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
@@ -217,10 +199,8 @@ def _spring_acts(fit: _Fit, longest: float) -> bool:
         return False
     tried = np.geomspace(experiment_settings.bending_range[0], experiment_settings.bending_beside_a_spring, 40) / span
     spring = equation.low_pass(equation.body - equation.body.mean())
-    return (
-        min(equation.squares_left(bending, spring) for bending in tried)
-        < experiment_settings.share_left_by_a_spring * left
-    )
+    least = min(equation.squares_left(bending, spring) for bending in tried)
+    return least < experiment_settings.share_left_by_a_spring * left
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
@@ -231,12 +211,9 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     """
     equation = _equation(record, between, cutoff, mass, late)
     target, span = equation.target, float(np.ptp(equation.body))
-    best: Any = minimize_scalar(
-        lambda logarithm: equation.squares_left(float(np.exp(logarithm)) / span),
-        bounds=tuple(np.log(experiment_settings.bending_range)),
-        method="bounded",
-        options={"xatol": 1e-3},
-    )
+    limits = tuple(np.log(experiment_settings.bending_range))
+    squares = lambda logarithm: equation.squares_left(float(np.exp(logarithm)) / span)  # noqa: E731
+    best: Any = minimize_scalar(squares, bounds=limits, method="bounded", options={"xatol": 1e-3})
     bending = float(np.exp(best.x)) / span
     x = equation.columns(bending)
     solution = solve_normal_equations(x.T @ x, x.T @ target)
@@ -287,7 +264,7 @@ class _Equation:
         moves = np.diff(self.body)
         z = deflections(moves, np.full(len(moves), 1 / bending))
         path = np.concatenate(([0.0], np.cumsum(np.abs(moves))))
-        turned = map(self.low_pass, (rate_of(self.low_pass.time, z), z, np.exp(-bending * path)))
+        turned = map(self.low_pass, (bearing.rate_of(self.low_pass.time, z), z, np.exp(-bending * path)))
         return np.stack([self.inertia, *turned, *self.rest], axis=1)
 
     def squares_left(self, bending: float, *further: np.ndarray) -> float:
@@ -303,17 +280,16 @@ def _equation(record: BearingRecord, between: Between, cutoff: float, mass: floa
     of this effect that `between` does not describe is among the fixed columns.
     """
     time, low_pass = record.time, LowPass(record.time, cutoff)
-    body, force, inertia = at_bearing(record, between, mass)
-    target = force - between.viscous[0] * rate_of(time, body)
-    rest = [np.ones(len(time)), rate_of(time, rate_of(time, inertia)), *([rate_of(time, force)] if late else [])]
+    body, force, inertia = bearing.at_bearing(record, between, mass)
+    rate = partial(bearing.rate_of, time)
+    target = force - between.viscous[0] * rate(body)
+    rest = [np.ones(len(time)), rate(rate(inertia)), *([rate(force)] if late else [])]
     return _Equation(low_pass, body, low_pass(target), low_pass(inertia), tuple(map(low_pass, rest)))
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
+def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> Presliding:
     """Analyse a log of small motion, and subtract viscous friction from the damping if known."""
-    (log,) = logs
-    assert isinstance(log, Log)
-    between = believed_between(prior, log)
+    between = bearing.believed_between(prior, log)
     if VISCOUS in prior.estimates or prior.user_told(VISCOUS, log):
         return bristles_from_presliding(log, between)
     result = bristles_from_presliding(log, replace(between, viscous=(0.0, 0.0)))
@@ -325,20 +301,13 @@ def _at_most(total: Estimate) -> Estimate:
     if not total.determined:
         return total
     why = f"its sum with viscous friction, which is not known, is {total.low:.4g} to {total.high:.4g} {total.unit}"
-    return Estimate.unknown(total.name, total.unit, total.method, why, 0.0, total.high)
+    return total.withheld(why, 0.0, total.high)
 
 
 def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
     """Return estimates of the bristles and, if the stage's masses add up to it, the total mass."""
     masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
     return (result.stiffness, result.damping, *masses)
-
-
-def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the determined estimates with their correlation in the fit."""
-    certain = determined(estimates)
-    rows = [result.order(estimate.name) for estimate in certain]
-    return certain, result.correlation[np.ix_(rows, rows)]
 
 
 def _claims(course: Course) -> str | None:
@@ -353,9 +322,9 @@ def _claims(course: Course) -> str | None:
 
 
 KIND = ExperimentKind[Presliding](
-    _analyse,
+    of_one(_analyse),
     _estimates,
-    _correlated,
+    lambda result, estimates: by_rows(result, estimates, lambda estimate: result.order(estimate.name)),
     after=("constant-speed", "frequency", "moves"),
     claims=_claims,
     instead_of=("moves",),

@@ -9,29 +9,17 @@ bristles come from other experiments, see `presliding`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, by_rows, of_one
 from friso.identification.logs.log import Log
-from friso.identification.readings.at_bearing import (
-    HELD,
-    BearingRecord,
-    Between,
-    LowPass,
-    at_bearing,
-    believed_between,
-    cutoff_of,
-    rate_of,
-    record_of,
-    why_unseen,
-)
+from friso.identification.readings import at_bearing as bearing
+from friso.identification.readings.at_bearing import BearingRecord, Between, LowPass
 from friso.identification.readings.common import Mean, by_t, correlation_of, deflections, jackknife, stribeck_curve
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
@@ -117,14 +105,8 @@ class _Equation:
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
         """Return the derivatives of the residual by the fitted numbers, shape (m, 5)."""
-        residuals_here = self.model(p)
-        return np.stack(
-            [
-                (self.model(p + step) - residuals_here) / experiment_settings.step_of_sliding
-                for step in experiment_settings.step_of_sliding * np.eye(len(p))
-            ],
-            axis=1,
-        )
+        here, step = self.model(p), experiment_settings.step_of_sliding
+        return np.stack([(self.model(moved) - here) / step for moved in p + step * np.eye(len(p))], axis=1)
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
@@ -137,25 +119,21 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
     effect of the best-fitting delay, and the fraction of friction left unexplained; contact, mode and exponent are
     taken as exact. Raises InputError for missing channels.
     """
-    record = record_of(
-        log,
-        slice(
-            log.longest.start, min(log.longest.stop, log.longest.start + experiment_settings.samples_of_slow_sliding)
-        ),
-        between,
-    )
-    why = why_unseen(record, experiment_settings.fewest_samples_of_sliding) or (DELAY if between.delay is None else "")
+    first, stop = log.longest.start, log.longest.stop
+    part = slice(first, min(stop, first + experiment_settings.samples_of_slow_sliding))
+    record = bearing.record_of(log, part, between)
+    why = bearing.why_unseen(record, experiment_settings.fewest_samples_of_sliding)
+    why = why or (DELAY if between.delay is None else "")
     if why or contact is None:
         return _nothing(why or BRISTLES)
-    cutoff = cutoff_of(record)
+    cutoff = bearing.cutoff_of(record)
     cutoff = min(cutoff, experiment_settings.low_pass_below_a_mode * between.mode.frequency) if between.mode else cutoff
     sizes = _sizes(record, cutoff)
     equation = _equation(record, between, contact, cutoff, sizes)
     best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in experiment_settings.stribeck_starts])
     jacobian, residual = equation.derivatives(best), equation.residual(best)
-    lower = _fitted(
-        _equation(record, between, contact, experiment_settings.low_pass_of_a_check * cutoff, sizes), [best]
-    )
+    checked = _equation(record, between, contact, experiment_settings.low_pass_of_a_check * cutoff, sizes)
+    lower = _fitted(checked, [best])
     shifts = [lower - best, _parameter_change(np.column_stack([jacobian, equation.late]), residual)[:5]]
     for other in _off(between, contact):
         shifts.append(_parameter_change(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
@@ -164,7 +142,7 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
     estimates, correlation = _estimates(best[:3] + np.log(sizes[:3]), covariance, np.array(shifts)[:, :3], left)
     inside = equation.low_pass.inside
     curves = (record.time[inside], equation.low_pass(equation.velocity), equation.friction, equation.model(best), left)
-    held = [HELD] if record.bent is None and between.joint else []
+    held = [bearing.HELD] if record.bent is None and between.joint else []
     notes = (*held, *([] if between.mode else [RIGID]))
     return SlowSliding(_estimates_shown(estimates, left, curves[1]), correlation, *curves, contact.exponent, notes)
 
@@ -202,7 +180,7 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
     [m/s].
     """
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
-    return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
+    return np.array([level, level, float(low_pass(bearing.rate_of(record.time, record.body)).std()), level, level])
 
 
 def _equation(
@@ -213,10 +191,10 @@ def _equation(
     `contact` has mass and bristles, and `sizes`, shape (5,), the scales of the fitted numbers.
     """
     seen, low_pass = record.seen(experiment_settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
-    body, force, inertia = at_bearing(seen, between, contact.mass[0])
-    velocity = rate_of(record.time, body)
+    body, force, inertia = bearing.at_bearing(seen, between, contact.mass[0])
+    velocity = bearing.rate_of(record.time, body)
     friction = force - contact.mass[0] * inertia - between.viscous[0] * velocity
-    late = low_pass(rate_of(record.time, force))
+    late = low_pass(bearing.rate_of(record.time, force))
     return _Equation(low_pass, np.diff(body), velocity, low_pass(friction), late, contact, sizes)
 
 
@@ -228,26 +206,11 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
     least, most = experiment_settings.sliding_bounds
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
     scale = float(equation.friction.std())
-
-    def off(p: np.ndarray) -> np.ndarray:
-        return equation.residual(p) / scale
-
-    def derivatives(p: np.ndarray) -> np.ndarray:
-        return equation.derivatives(p) / scale
-
-    derived: Any = derivatives
     complete = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
-    fits: Any = [
-        least_squares(
-            off,
-            start,
-            jac=derived,
-            bounds=(low, high),
-            ftol=experiment_settings.tolerance_of_sliding,
-            xtol=experiment_settings.tolerance_of_sliding,
-        )
-        for start in complete
-    ]
+    off, slopes = (lambda p: equation.residual(p) / scale), (lambda p: equation.derivatives(p) / scale)
+    tolerance = experiment_settings.tolerance_of_sliding
+    options: Any = {"jac": slopes, "bounds": (low, high), "ftol": tolerance, "xtol": tolerance}
+    fits: Any = [least_squares(off, start, **options) for start in complete]
     return min(fits, key=lambda fit: fit.cost).x
 
 
@@ -286,17 +249,13 @@ def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):
         why = "no rise of friction towards rest shows"
-        return coulomb, *(
-            Estimate.unknown(estimate.name, estimate.unit, METHOD, why) for estimate in (static, stribeck)
-        )
+        return coulomb, static.withheld(why), stribeck.withheld(why)
     return estimates
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> SlowSliding:
+def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> SlowSliding:
     """Analyse a log with mass and bristles from other experiments."""
-    (log,) = logs
-    assert isinstance(log, Log)
-    return stribeck_from_slow_sliding(log, believed_between(prior, log), _bristles(prior, log))
+    return stribeck_from_slow_sliding(log, bearing.believed_between(prior, log), _bristles(prior, log))
 
 
 def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
@@ -314,16 +273,9 @@ def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
     return MassOnBristles(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
 
 
-def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the determined estimates with their correlation in the fit."""
-    certain = determined(estimates)
-    rows = [result.estimates.index(estimate) for estimate in certain]
-    return certain, result.correlation[np.ix_(rows, rows)]
-
-
 KIND = ExperimentKind[SlowSliding](
-    _analyse,
+    of_one(_analyse),
     lambda result, stage: result.estimates,
-    _correlated,
+    lambda result, estimates: by_rows(result, estimates, result.estimates.index),
     after=("constant-speed", "frequency", "moves", "presliding"),
 )

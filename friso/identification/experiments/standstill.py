@@ -10,12 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel
 from friso.identification.readings.course import Course
-from friso.stage import Stage
 
 
 @dataclass(frozen=True)
@@ -71,11 +69,6 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     return StandstillResult(rows, warnings)
 
 
-def _estimates(result: StandstillResult, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return no estimates, because standstill determines no key of a stage."""
-    return ()
-
-
 def _claims(course: Course) -> str | None:
     """Return why a log is of standstill, or None: its reference stands, and it has no force."""
     log = course.log
@@ -84,4 +77,4 @@ def _claims(course: Course) -> str | None:
     return "the reference stands still, and no force is logged"
 
 
-KIND = ExperimentKind[StandstillResult](_analyse, _estimates, roles=("position",), together=True, claims=_claims)
+KIND = ExperimentKind[StandstillResult](_analyse, roles=("position",), together=True, claims=_claims)

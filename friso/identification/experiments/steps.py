@@ -7,16 +7,16 @@ creeps.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kind import ExperimentKind, of_one
+from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import Mean, block_mean, by_t, cart, channel, deflection, low_pass, runs
+from friso.identification.readings.common import Mean, block_mean, by_segment, by_t, cart, channel, deflection, low_pass
 from friso.identification.readings.course import Course
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
@@ -75,11 +75,9 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
     position, force = channel(log, "position"), channel(log, "force")
     measured = deflection(log)
     deflected = position if measured is None else measured
-    smooth = [
-        np.concatenate([low_pass(x[s], log.sample_time, experiment_settings.low_pass_of_steps) for s in log.segments])
-        for x in (force, deflected)
-    ]
-    spans = [s for part in log.segments for s in _plateaus(log, part, experiment_settings.low_pass_of_steps)]
+    cutoff = experiment_settings.low_pass_of_steps
+    smooth = [by_segment(log, values, low_pass, cutoff) for values in (force, deflected)]
+    spans = [span for part in log.segments for span in _plateaus(log, part, cutoff)]
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
     settled = [_settled_window(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)
@@ -150,17 +148,15 @@ def _settled_window(
     """
     length = span.stop - span.start
     margin = min(length // 10, int(1 / (experiment_settings.low_pass_of_steps * log.sample_time)))
-    for allowed, share in product(
-        (experiment_settings.drift_of_a_settled_force, experiment_settings.drift_of_a_settled_place), STARTS
-    ):
+    range_of_force = float(np.subtract(*np.percentile(force, [95, 5])))
+    limits = experiment_settings.drift_of_a_settled_force, experiment_settings.drift_of_a_settled_place
+    for allowed, share in product(limits, STARTS):
         chosen = slice(span.start + int(share * length), span.stop - margin)
         if chosen.stop - chosen.start < 2 * reading_settings.blocks_of_a_mean:
             continue
         bent, creep = _drifting(position[chosen])
         beyond, drift = _drifting(force[chosen] - secant * position[chosen])
-        if creep <= allowed * scale and drift <= experiment_settings.drift_of_a_settled_force * float(
-            np.subtract(*np.percentile(force, [95, 5]))
-        ):
+        if creep <= allowed * scale and drift <= limits[0] * range_of_force:
             time = log.time[[chosen.start, chosen.stop - 1]]
             level = beyond.value + secant * bent.value
             return Window(time[0], time[1], bent.value, level, float(np.hypot(beyond.error, drift / 12**0.5)))
@@ -199,10 +195,7 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
     linear = reading_settings.linearity_of_sensors * abs(slope)
-    estimate = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
-    if estimate.low > 0:
-        return estimate
-    return Estimate.unknown(KEY, UNIT, method, SOFT, 0.0, estimate.high if estimate.high > 0 else np.inf)
+    return by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear).if_positive(SOFT)
 
 
 def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
@@ -241,13 +234,6 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
     return False, (f"{finding}; the deflection of the joint was measured nevertheless.",)
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:
-    """Analyse a log of position steps."""
-    (log,) = logs
-    assert isinstance(log, Log)
-    return stiffness_from_steps(log)
-
-
 def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
     """Return the estimate of the joint's stiffness; none for a stage without a joint."""
     return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
@@ -263,4 +249,6 @@ def _claims(course: Course) -> str | None:
     return "the position rests here and there, and the force follows from the place, as against a spring"
 
 
-KIND = ExperimentKind[StepStiffness](_analyse, _estimates, claims=_claims)
+KIND = ExperimentKind[StepStiffness](
+    of_one(lambda log, prior, settings: stiffness_from_steps(log)), _estimates, claims=_claims
+)

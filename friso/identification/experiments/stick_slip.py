@@ -6,18 +6,18 @@ peak the cart breaks away, and its velocity shows a spike.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, of_one
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import (
     Mean,
     by_direction,
+    by_segment,
     by_t,
     channel,
     correlated_mean,
@@ -25,12 +25,11 @@ from friso.identification.readings.common import (
     low_pass,
     on_bearing,
     rate,
+    solve_normal_equations,
 )
-from friso.identification.readings.loading import METHOD as LOADED
-from friso.identification.readings.loading import stiffness_of_loading
 from friso.identification.readings.rate_effect import static_friction
 from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.readings.slips import slips
+from friso.identification.readings.slips import Slip, slips
 from friso.identification.settings import experiment_settings
 from friso.intervals import COVERAGE
 from friso.stage import Stage
@@ -38,6 +37,9 @@ from friso.stage import Stage
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
 
 KEY = "friction.static"
+
+LOADED = "joint.stiffness", "N/m", "force over deflection while the cart sticks"
+"""Key, unit and method of the joint's stiffness from a log of slips."""
 
 
 @dataclass(frozen=True)
@@ -84,49 +86,31 @@ def static_from_stick_slip(
     `stroke` [m] of the joint do not count. Quantities that the record cannot show are unknown, with the reason. Raises
     InputError for missing channels or an unusable stiffness.
     """
-    deflected, pushed = (
-        _deflection(log, experiment_settings.low_pass_of_stick_slip),
-        _actuator(log, stage_mass, experiment_settings.low_pass_of_stick_slip),
-    )
-    pull, relative_error = _pull(log, stiffness, deflected, pushed)
+    cutoff, measured = experiment_settings.low_pass_of_stick_slip, deflection(log)
+    deflected = None if measured is None else by_segment(log, measured, low_pass, cutoff)
+    pull, relative_error = _pull(log, stiffness, deflected, _actuator(log, stage_mass, cutoff))
     body = on_bearing(log)
     cart_velocity = np.zeros_like(body)
     rows: list[tuple[float, ...]] = []
     shares, loads = [], []
     for part in log.segments:
-        breaks = slips(body[part], log.sample_time, experiment_settings.low_pass_of_stick_slip)
+        breaks = slips(body[part], log.sample_time, cutoff)
         cart_velocity[part] = breaks.speed
         shares.append(breaks.share)
-        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
-        for onset, start, rest, top, direction in marks:
-            at, force, before, rising, held = _peak(
-                direction * pull[part],
-                log.sample_time,
-                experiment_settings.low_pass_of_stick_slip,
-                (rest, onset, start, top),
-            )
+        for slip in breaks.starts:
+            onset, _, rest, top, direction = slip
+            at, force, before, rising, held = _peak(direction * pull[part], log.sample_time, cutoff, slip)
             at += part.start
             bent = np.nan if deflected is None else float(direction * deflected[at])
             unseen = _unseen(direction * breaks.speed[onset + 1 : top + 1]) * log.sample_time
-            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / experiment_settings.low_pass_of_stick_slip)
+            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / cutoff)
             place = (float(log.time[at]), float(body[at]), float(direction))
             held = held or abs(bent) > (1 - experiment_settings.stroke_share_at_a_stop) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    joint_stiffness = _stiffness(log, deflected, loads, experiment_settings.low_pass_of_stick_slip)
+    joint_stiffness = _stiffness(log, deflected, loads, cutoff)
     return _answer(table, pull, cart_velocity, relative_error, joint_stiffness, _why(shares))
-
-
-def _smooth(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
-    """Low-pass values of a log at a cut-off [Hz], segment by segment."""
-    return np.concatenate([low_pass(values[s], log.sample_time, cutoff) for s in log.segments])
-
-
-def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
-    """Return the low-passed deflection of the joint [m]; None if it is not measured."""
-    measured = deflection(log)
-    return None if measured is None else _smooth(log, measured, cutoff)
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
@@ -136,15 +120,15 @@ def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
     """
     if "force" not in log:
         return None
-    force = _smooth(log, channel(log, "force"), cutoff)
+    force = by_segment(log, channel(log, "force"), low_pass, cutoff)
     if not stage_mass:
         return force
-    return force - stage_mass * _rate(log, _rate(log, channel(log, "position"), cutoff), cutoff)
+    return force - stage_mass * _acceleration(log, cutoff)
 
 
-def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
-    """Differentiate values of a log, low-passed at a cut-off [Hz], segment by segment."""
-    return np.concatenate([rate(values[s], log.sample_time, cutoff) for s in log.segments])
+def _acceleration(log: Log, cutoff: float) -> np.ndarray:
+    """Return the acceleration of the position [m/s^2], shape (n,), low-passed at `cutoff` [Hz]."""
+    return by_segment(log, by_segment(log, channel(log, "position"), rate, cutoff), rate, cutoff)
 
 
 def _pull(
@@ -170,38 +154,64 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
     pushed = _actuator(log, 0.0, cutoff)
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"
-        return Estimate.unknown("joint.stiffness", "N/m", LOADED, reason)
-    bending = _rate(log, deflected, cutoff)
-    acceleration = _rate(log, _rate(log, channel(log, "position"), cutoff), cutoff)
-    return stiffness_of_loading(deflected, bending, acceleration, pushed, loads)
+        return Estimate.unknown(*LOADED, reason)
+    bending = by_segment(log, deflected, rate, cutoff)
+    return stiffness_of_loading(deflected, bending, _acceleration(log, cutoff), pushed, loads)
 
 
-def _peak(
-    pull: np.ndarray, sample_time: float, cutoff: float, marks: tuple[int, int, int, int]
-) -> tuple[int, float, float, float, bool]:
+def stiffness_of_loading(
+    deflection: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, force: np.ndarray, loads: list[slice]
+) -> Estimate:
+    """Estimate the stiffness [N/m] of a joint that is loaded between slips of the cart.
+
+    The deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the actuator's force [N] are
+    low-passed, shape (n,). `loads` are the samples between slips, in which the cart sticks and the joint is loaded.
+
+    Least squares fits a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
+    joint. The error is by the jackknife over loads. Creep of the cart does not matter. With fewer than three loads the
+    stiffness is unknown.
+    """
+    count = len(loads)
+    if count < reading_settings.fewest_loads:
+        return Estimate.unknown(*LOADED, f"{count} loads between slips: {reading_settings.fewest_loads} are needed")
+    signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, acceleration, force)]) for s in loads]
+    products = np.array([x @ x.T for x in signals])
+    if not products[:, 0, 0].sum() > 0:
+        return Estimate.unknown(*LOADED, "the deflection stays the same")
+    without = np.array([_spring(products.sum(axis=0) - product) for product in products])
+    error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
+    value = _spring(products.sum(axis=0))
+    linear, (key, unit, method) = reading_settings.linearity_of_sensors * abs(value), LOADED
+    estimate = by_t(key, unit, Mean(value, error, count - 1), method, linear, linear)
+    return estimate.if_positive("more deflection does not need more force")
+
+
+def _spring(products: np.ndarray) -> float:
+    """Fit the last of several signals by all others, and return the coefficient of the first.
+
+    `products`, shape (signals, signals), are the scalar products of the signals.
+    """
+    return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])
+
+
+def _peak(pull: np.ndarray, sample_time: float, cutoff: float, slip: Slip) -> tuple[int, float, float, float, bool]:
     """Find the peak of the force on the cart, `pull`, between the start of a slip and top speed.
 
-    `pull` [N] is positive in the direction of the slip. `marks` are samples: the beginning of the rest, the onset of
-    visible motion, the start of the slip, and top speed. Returns the peak's sample and height, the pull at the onset,
-    and the rate of the pull over the last third of the rest.
+    `pull` [N] is positive in the direction of the slip. Returns the peak's sample and height, the pull at the onset of
+    visible motion, and the rate of the pull over the last third of the rest.
 
     The last result is true if the pull had stopped rising. It then stayed within a hundredth of the peak for several
     times as long as its usual rate and the filter take.
     """
-    rest, onset, start, top = marks
+    onset, start, rest, top, _ = slip
     at = start + int(np.argmax(pull[start : top + 1]))
     begin = max(onset - max((onset - rest) // 3, 5), 0)
     rising = (pull[onset] - pull[begin]) / ((onset - begin) * sample_time)
     tenths = np.unique(np.linspace(rest, onset, 11).astype(int))
     usual = float(np.median(np.diff(pull[tenths]) / (np.diff(tenths) * sample_time)))
-    near = float((pull[rest : at + 1] > (1 - experiment_settings.share_near_a_peak) * pull[at]).sum()) * sample_time
-    held = (
-        near
-        > experiment_settings.duration_near_a_peak
-        * (experiment_settings.share_near_a_peak * abs(pull[at] / usual) + 1 / cutoff)
-        if usual > 0
-        else True
-    )
+    share, times = experiment_settings.share_near_a_peak, experiment_settings.duration_near_a_peak
+    near = float((pull[rest : at + 1] > (1 - share) * pull[at]).sum()) * sample_time
+    held = not usual > 0 or near > times * (share * abs(pull[at] / usual) + 1 / cutoff)
     return at, float(pull[at]), float(pull[onset]), float(rising), bool(held)
 
 
@@ -233,7 +243,7 @@ def _answer(
     `pull` [N] and `velocity` [m/s] are the cart's over time. `why` says why a direction may have no slips. Static
     friction has only a lower bound if, before most slips, the pull had stopped rising or the joint was at its stroke.
     """
-    times, places, directions, bent, forces, rates, speeds, held, late = table
+    _, _, directions, _, forces, rates, _, held, late = table
 
     def static(chosen: np.ndarray, words: str) -> Estimate:
         if not chosen.any():
@@ -247,33 +257,13 @@ def _answer(
     masks = dict(by_direction(directions))
     means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}
     forward, backward = (static(mask, f" {words}") for words, mask in masks.items())
-    every = (
-        _both(forward, backward)
-        if forward.determined or backward.determined
-        else static(np.ones(len(forces), dtype=bool), "")
-    )
+    shown = forward.determined or backward.determined
+    every = _both(forward, backward) if shown else static(np.ones(len(forces), dtype=bool), "")
     low, high = np.percentile(forces, [5, 95]) if len(forces) else (np.nan, np.nan)
     offset = _offset(means["forward"], means["backward"])
-    return StickSlip(
-        every,
-        forward,
-        backward,
-        means["forward"],
-        means["backward"],
-        (float(low), float(high)),
-        offset,
-        stiffness,
-        times,
-        places,
-        directions,
-        bent,
-        forces,
-        rates,
-        speeds,
-        pull,
-        velocity,
-        _notes(len(forces), offset),
-    )
+    spread, curves = (float(low), float(high)), (pull, velocity)
+    notes = _notes(len(forces), offset)
+    return StickSlip(every, forward, backward, *means.values(), spread, offset, stiffness, *table[:7], *curves, notes)
 
 
 def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
@@ -299,9 +289,8 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
     if len(forces) < 2:
         return Estimate.unknown(name, "N", method, f"{len(forces)} slips: {why}" if not len(forces) else "1 slip")
     mean = correlated_mean(forces)
-    return by_t(
-        name, "N", Mean(mean.value, float(np.hypot(mean.error, relative_error * mean.value)), mean.freedom), method
-    )
+    error = float(np.hypot(mean.error, relative_error * mean.value))
+    return by_t(name, "N", Mean(mean.value, error, mean.freedom), method)
 
 
 def _both(forward: Estimate, backward: Estimate) -> Estimate:
@@ -316,14 +305,11 @@ def _both(forward: Estimate, backward: Estimate) -> Estimate:
             return seen
         low = (forward.low + backward.low) / 2
         return Estimate.unknown(KEY, "N", seen.method, f"one direction alone shows it: {unseen.reason}", low)
-    middle = [
-        (forward.low + backward.low) / 2,
-        (forward.value + backward.value) / 2,
-        (forward.high + backward.high) / 2,
-    ]
-    systematic = (forward.systematic + backward.systematic) / 2
+    value, low, high, systematic = (
+        (getattr(forward, name) + getattr(backward, name)) / 2 for name in ("value", "low", "high", "systematic")
+    )
     method = f"mean of both directions: {forward.method}"
-    return Estimate(KEY, "N", middle[1], middle[0], middle[2], method, systematic=systematic)
+    return Estimate(KEY, "N", value, low, high, method, systematic=systematic)
 
 
 def _offset(forward: Estimate, backward: Estimate) -> Estimate:
@@ -331,10 +317,8 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
 
     The offset is not determined if the cart slips in one direction only.
     """
-    name, method = (
-        "offset of the force on the cart",
-        "half the difference of the break-away forces forward and backward",
-    )
+    name = "offset of the force on the cart"
+    method = "half the difference of the break-away forces forward and backward"
     if not (forward.determined and backward.determined):
         return Estimate.unknown(name, "N", method, "slips in one direction only")
     half = float(np.hypot(forward.half_width, backward.half_width)) / 2
@@ -342,10 +326,8 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
     return Estimate(name, "N", middle, middle - half, middle + half, method)
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StickSlip:
+def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> StickSlip:
     """Analyse a stick-slip log, with the joint's stiffness from the best available source."""
-    (log,) = logs
-    assert isinstance(log, Log)
     flat, (_, mass) = prior.flat(log), prior.masses(log)
     stroke, stiffness = flat.get("joint.stroke", np.inf), prior.estimates.get("joint.stiffness")
     result = static_from_stick_slip(log, stiffness or flat.get("joint.stiffness"), mass, stroke)
@@ -363,11 +345,10 @@ def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
     """Tell whether a stiffness is the joint's, not that of a limiter that holds it."""
     if stage is None or stage.joint is None or not stiffness.determined:
         return False
-    return bool(
-        stiffness.value < experiment_settings.stiffness_share_of_a_limiter * stage.flat()["joint.limiter_stiffness"]
-    )
+    limiter = stage.flat()["joint.limiter_stiffness"]
+    return bool(stiffness.value < experiment_settings.stiffness_share_of_a_limiter * limiter)
 
 
 KIND = ExperimentKind[StickSlip](
-    _analyse, _estimates, after=("frequency", "moves", "steps"), roles=("relative_position|position", "force")
+    of_one(_analyse), _estimates, after=("frequency", "moves", "steps"), roles=("relative_position|position", "force")
 )

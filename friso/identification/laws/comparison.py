@@ -16,8 +16,7 @@ from scipy.stats import t as student
 
 from friso.errors import InputError
 from friso.identification.kind import Prior
-from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
-from friso.identification.laws.fit import LawFit, LawProblem
+from friso.identification.laws.fit import DraggedRecord, LawFit, LawProblem, blocks, dragged_record
 from friso.identification.laws.settings import settings
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import believed_between
@@ -90,10 +89,8 @@ def _worse(differences: np.ndarray, level: float) -> bool:
     count, level = len(differences), level / 2  # of two tests
     chance = student.ppf(1 - level, count - 1) * differences.std(ddof=1) / np.sqrt(count) if count > 1 else np.inf
     more_often = binomtest(int((differences > 0).sum()), count, alternative="greater").pvalue < level
-    return bool(
-        differences.mean() > max(chance, settings.difference_of_worse_laws)
-        or (more_often and np.median(differences) > settings.difference_of_worse_laws)
-    )
+    least = settings.difference_of_worse_laws
+    return bool(differences.mean() > max(chance, least) or (more_often and np.median(differences) > least))
 
 
 def comparable() -> list[str]:

@@ -7,19 +7,22 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from friso.errors import InputError, LogError
-from friso.identification.logs import checks, delays
+from friso.identification.logs import checks
+from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import FORMATS
 from friso.identification.logs.gaps import check_gaps, told_by_mechanics
-from friso.identification.logs.integrated import NOTE, integrated, is_needed
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, option
+from friso.identification.logs.physics import MotionReading, is_ramp
 from friso.identification.logs.read import file_format
-from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
+from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of, wanted_of
 from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
 from friso.identification.logs.time_base import Track, resample_tracks, track
+from friso.identification.logs.units import unit_factor
 from friso.quantities import percent, quoted
 
 
@@ -95,9 +98,8 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
         time = instants(choice, clock, reading, notes)
         foreign = reading.mapping.sample_time is not None and choice.channel.values.size not in sizes
         if optional and (time is None or foreign):
-            notes.warnings.append(
-                f"{role}: {choice.channel.name} left out: its length differs, or it has no time stamps"
-            )
+            name = choice.channel.name
+            notes.warnings.append(f"{role}: {name} left out: its length differs, or it has no time stamps")
             continue
         if time is None:
             raise no_time(choice.channel, reading)
@@ -109,13 +111,8 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
             notes.warnings.append(f"{role}: {error.actual} left out; to use it: {error.example}")
             continue
         if time.size != values.size:
-            raise LogError(
-                role,
-                f"{values.size} values for {time.size} time stamps",
-                "one value per time stamp",
-                "",
-                reading.origin,
-            )
+            actual = f"{values.size} values for {time.size} time stamps"
+            raise LogError(role, actual, "one value per time stamp", "", reading.origin)
         tracks[role] = _track(role, choice, time, values, notes)
     notes.read += _clocks(clock, reading)
     notes.warnings += _contradicted(chosen, reading, notes)
@@ -146,11 +143,8 @@ def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Note
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
     """Write lines that say where the sample times of the log come from."""
-    if reading.mapping.sample_time is not None:
-        return [
-            f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
-            "used"
-        ]
+    if (specified := reading.mapping.sample_time) is not None:
+        return [f"time: one sample every {specified:.9g} s, as specified; the times in the file are not used"]
     if clock is not None:
         return [f"time: {clock.channel.name} ({clock.channel.source}), {clock.reason}"]
     columns = [c for c in reading.table.channels if c.unit and (role_of(c.name) or ("",))[0] == "time"]
@@ -165,15 +159,11 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
+    name, slower = f"{role}: {choice.channel.name}", "it is sampled {} times slower"
     if (n := checks.samples_held(values)) > 1:
-        notes.warnings.append(
-            f"{role}: {choice.channel.name} holds each value for {n} samples: it is sampled {n} times slower"
-        )
+        notes.warnings.append(f"{name} holds each value for {n} samples: {slower.format(n)}")
     elif role not in ("reference", "disturbance") and (n := checks.interpolated(values)) > 1:
-        notes.warnings.append(
-            f"{role}: {choice.channel.name} runs in straight lines of {n} samples: it is sampled {n} times slower and "
-            "interpolated"
-        )
+        notes.warnings.append(f"{name} runs in straight lines of {n} samples: {slower.format(n)} and interpolated")
     return channel_track
 
 
@@ -190,10 +180,8 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
         raise LogError("time", f"{base.period:g} s between samples", expected, '--unit TIME="ms"')
     for role in {*needed, "position", "force"} & set(signals):
         if checks.constant(role, signals[role]):
-            value = quoted(float(signals[role][0]))
-            raise LogError(
-                role, f"a constant signal, {value} throughout", "a signal that changes", f'--map {role}="CHANNEL"'
-            )
+            actual = f"a constant signal, {quoted(float(signals[role][0]))} throughout"
+            raise LogError(role, actual, "a signal that changes", f'--map {role}="CHANNEL"')
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
@@ -208,16 +196,15 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
             lines.append(f"{role}: constant throughout")
         share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
         if share > settings.share_of_clipped_samples:
-            lines.append(
-                f"{role}: {percent(share, 3)} of the samples lie on flat tops at its extremes: saturated or clipped"
-            )
+            on_tops = f"{percent(share, 3)} of the samples lie on flat tops at its extremes"
+            lines.append(f"{role}: {on_tops}: saturated or clipped")
     position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
     same_kind = ("position" in notes.units) == ("velocity" in notes.units)
     if position is not None and velocity is not None and same_kind:
         lines.append(checks.velocity_warning(position, velocity, period, parts))
-        lines.append(delays.velocity_line(position, velocity, period, parts))
+        lines.append(checks.velocity_line(position, velocity, period, parts))
     if position is not None and force is not None:
-        lines.append(delays.force_line(position, force, period, parts))
+        lines.append(checks.force_line(position, force, period, parts))
     return [line for line in lines if line]
 
 
@@ -225,7 +212,7 @@ def _lost(base: Track) -> list[str]:
     """Write how many samples were lost and interpolated, as a list of one line; [] if none were."""
     if not base.bridged.any():
         return []
-    places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)
+    places = len(checks.runs(base.bridged))
     where = "1 place" if places == 1 else f"{places} places"
     return [
         f"{np.count_nonzero(base.bridged)} of {base.bridged.size} samples lost, in {where}, interpolated by a cubic "
@@ -246,3 +233,55 @@ def _instant(base: Track, number: int) -> str:
     """Write the time of a sample [s], by its number; rounding errors about 0 become 0."""
     time = float(base.time[number])
     return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"
+
+
+NOTE = (
+    "position: the integral of the velocity, since no channel holds one; where the log begins counts as 0, after a gap "
+    "as well, an offset of the velocity becomes a drift, and the first micrometres of a motion are not resolved"
+)
+"""Remark in the log on a position that is the integral of the velocity."""
+
+LENGTHS = ("m", "rad")
+"""Units of a position."""
+
+
+def is_needed(
+    table: ChannelTable, proposal: Proposal, needed: Sequence[str], best: MotionReading | None = None
+) -> bool:
+    """Tell whether a needed position must be computed as the integral of the velocity.
+
+    This is never so if a channel has, or competes for, the role of position. Otherwise the `best` reading by mechanics
+    decides, if there is one. Without it, there must be a velocity, which the user assigned, or beside which no other
+    channel could be a position.
+    """
+    velocity = proposal.chosen.get("velocity")
+    if "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:
+        return False
+    if best is not None:
+        return best.kind == "velocity"
+    if velocity is None:
+        return False
+    taken = {id(choice.channel) for choice in proposal.chosen.values()}
+    others = [channel for channel in table.channels if id(channel) not in taken]
+    return velocity.by_user or not any(map(_may_be_a_position, others))
+
+
+def _may_be_a_position(channel: Channel) -> bool:
+    """Tell whether a channel may be a position.
+
+    Such a channel has no role yet, changes, and has a fitting unit or none.
+    """
+    finite = channel.values[np.isfinite(channel.values)]
+    if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None or is_ramp(channel):
+        return False
+    if wanted_of(channel.name, channel.unit):
+        return False
+    return not channel.unit or any(unit_factor(channel.unit, unit) is not None for unit in LENGTHS)
+
+
+def integrated(velocity: np.ndarray, sample_time: float, segments: Sequence[slice]) -> np.ndarray:
+    """Integrate a velocity [m/s], (n,), over each segment by the trapezoidal rule [m]."""
+    position = np.zeros(len(velocity))
+    for part in segments:
+        position[part] = cumulative_trapezoid(velocity[part], dx=sample_time, initial=0.0)
+    return position

@@ -1,13 +1,18 @@
-"""Read binary logs in a separate process, in which a damaged or hostile file can crash only its own reader."""
+"""Read binary logs in a separate process, in which a damaged or hostile file can crash only its own reader.
+
+Some formats need optional libraries.
+"""
 
 from __future__ import annotations
 
 import io
+import math
 import os
 import pickle
 import signal
 import subprocess
 import sys
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from threading import Timer
@@ -15,7 +20,9 @@ from typing import Any
 
 from friso.errors import LogError
 from friso.identification.logs import binary
+from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.settings import settings
+from friso.platform.extras import install, is_installed
 from friso.platform.system import LIMITS_MEMORY
 
 CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
@@ -95,3 +102,37 @@ class _PlainUnpickler(pickle.Unpickler):
 def broken(kind: str, why: str, path: Path) -> LogError:
     """Return the error for a file that cannot be read."""
     return LogError("log", f"a {kind} file that cannot be read ({why})", f"a complete {kind} file", "", str(path))
+
+
+def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
+    """Read the contents of a log in the format `kind`, which needs an optional library.
+
+    Raises LogError, which says how to install a missing library.
+    """
+    if not is_installed(library):
+        actual = f"a {kind} file, and the library {library} is not installed"
+        raise LogError("log", actual, "the library", install(kind.lower()), str(path))
+    return content(kind, path)
+
+
+def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
+    """Write a line for each channel that has fewer samples than the (truncated) file states.
+
+    `stated` has the stated number for each channel, or None. Returns [] if no channel is shorter.
+    """
+    return [
+        f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
+        for channel, count in zip(channels, stated, strict=True)
+        if count is not None and channel.values.size < count < math.inf
+    ]
+
+
+def filled_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
+    """Make a table of the channels with samples.
+
+    Raises LogError if no channel has samples.
+    """
+    filled = tuple(channel for channel in channels if channel.values.size)
+    if not filled:
+        raise LogError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))
+    return ChannelTable(filled, {}, (f"format: {kind}", f"{len(filled)} channels", *notes))

@@ -64,14 +64,10 @@ class GapsError(LogError):
             return
         sentences = [f"{gap.key}: {gap.expected}; given: {gap.actual}" for gap in self.gaps]
         origins = dict.fromkeys(gap.origin for gap in self.gaps)
-        lines = [
-            sentence if len(origins) == 1 else f"{gap.origin}: {sentence}"
-            for gap, sentence in zip(self.gaps, sentences, strict=True)
-        ]
-        super().__init__(
-            "", f"a log that leaves {len(lines)} things open", "".join(f"\n    {line}" for line in lines),
-            " ".join(self.options), ", ".join(origins),
-        )  # fmt: skip
+        if len(origins) > 1:
+            sentences = [f"{gap.origin}: {sentence}" for gap, sentence in zip(self.gaps, sentences, strict=True)]
+        actual, expected = f"a log that leaves {len(sentences)} things open", "".join(map("\n    {}".format, sentences))
+        super().__init__("", actual, expected, " ".join(self.options), ", ".join(origins))
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -129,7 +125,7 @@ def check_gaps(
     for role, channels in proposal.rivals.items():
         if role in OPTIONAL and role not in needed:
             continue
-        names = " and ".join(quoted(channel.name) for channel in channels)
+        names = _named(channels)
         likely, why = _by_mechanics(role, readings, channels) or _of_alike(role, channels[0], channels)
         example = option("--map", role, likely.name) if likely else ""
         expected = "one channel" + (guess(likely.name) if likely else "")
@@ -265,15 +261,19 @@ def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Ch
         return said[0], f"; the name of {quoted(said[0].name)} says that it was measured"
     last = [one for one in alike if all(leads(other, one) for other in alike if other is not one)]
     (most, noisiest), (next_most, _) = sorted(((_noise(c), c) for c in alike), key=lambda pair: -pair[0])[:2]
-    others = " and ".join(quoted(channel.name) for channel in alike if channel is not noisiest)
+    others = _named(channel for channel in alike if channel is not noisiest)
     held = any(samples_held(channel.values) > 1 for channel in alike)
     if last and (held or most < 2 * next_most or noisiest is last[0]):
-        ahead = " and ".join(quoted(channel.name) for channel in alike if channel is not last[0])
+        ahead = _named(channel for channel in alike if channel is not last[0])
         return last[0], f"; {ahead} goes ahead of {quoted(last[0].name)}, as a reference does"
     if last or most < 2 * next_most or held:
-        names = " and ".join(quoted(channel.name) for channel in alike)
-        return None, f"; {names} are alike: one of them may be a reference"
+        return None, f"; {_named(alike)} are alike: one of them may be a reference"
     return noisiest, f"; {quoted(noisiest.name)} is like {others} with more noise, as what is measured has"
+
+
+def _named(channels: Iterable[Channel]) -> str:
+    """Return the names of channels in a sentence."""
+    return " and ".join(quoted(channel.name) for channel in channels)
 
 
 def _are_alike(one: Channel, other: Channel) -> bool:

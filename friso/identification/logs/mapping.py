@@ -23,7 +23,7 @@ from friso.stage.files import parsed, text_of
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)
 """Names to which a channel can be mapped."""
-TABLES = ("roles", "units", "scales", "setup")
+TABLES, SINGLE = ("roles", "units", "scales", "setup"), ("sample_time", "experiment", "axis")
 _INTERVALS = Bound("1 ns to 1 h", lambda value: (value >= 1e-9) & (value <= 3600))
 _SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
 
@@ -53,15 +53,9 @@ class Mapping:
     def over(self, older: Mapping) -> Mapping:
         """Return this mapping, completed by statements of an older one."""
         rest = older.beside(self)
-        return Mapping(
-            {**rest.roles, **self.roles},
-            {**rest.units, **self.units},
-            {**rest.scales, **self.scales},
-            rest.sample_time if self.sample_time is None else self.sample_time,
-            rest.experiment if self.experiment is None else self.experiment,
-            rest.axis if self.axis is None else self.axis,
-            {**rest.setup, **self.setup},
-        )
+        tables = {name: {**getattr(rest, name), **getattr(self, name)} for name in TABLES}
+        own = {name: value for name in SINGLE if (value := getattr(self, name)) is not None}
+        return replace(rest, **tables, **own)
 
     def beside(self, newer: Mapping) -> Mapping:
         """Return the statements of this mapping that a newer one does not replace.
@@ -77,15 +71,13 @@ class Mapping:
             roles.pop("time", None)
         other = {role for role, name in newer.roles.items() if self.roles.get(role, name) != name}
         other |= {role for role, name in self.roles.items() if role not in newer.roles and name in used}
-        return Mapping(
-            roles,
-            {name: unit for name, unit in self.units.items() if name not in newer.units},
-            {role: scale for role, scale in self.scales.items() if role not in {*newer.scales, *other}},
-            self.sample_time if newer.sample_time is None and not timed else None,
-            self.experiment if newer.experiment is None else None,
-            self.axis if newer.axis is None else None,
-            {key: text for key, text in self.setup.items() if key not in newer.setup},
+        units, setup = (
+            {key: text for key, text in getattr(self, name).items() if key not in getattr(newer, name)}
+            for name in ("units", "setup")
         )
+        scales = {role: scale for role, scale in self.scales.items() if role not in {*newer.scales, *other}}
+        gone = {name: None for name in SINGLE if getattr(newer, name) is not None or (name == "sample_time" and timed)}
+        return replace(self, roles=roles, units=units, scales=scales, setup=setup, **gone)
 
     def replaced_by(self, newer: Mapping) -> str:
         """Return which roles and units of this mapping a newer one contradicts, in words; "" for none."""
@@ -182,10 +174,8 @@ def sidecar(log: Path, folder: Path | None = None) -> Path:
     if folder is None:
         return log.parent / f"{log.name}{SUFFIX}"
     own = hashlib.sha256(os.fsencode(os.path.abspath(log))).hexdigest()[:8]
-    return (
-        folder
-        / f"{log.name.encode(errors='ignore')[: settings.bytes_of_a_log_name].decode(errors='ignore')}.{own}{SUFFIX}"
-    )
+    name = log.name.encode(errors="ignore")[: settings.bytes_of_a_log_name].decode(errors="ignore")
+    return folder / f"{name}.{own}{SUFFIX}"
 
 
 def mapping_text(mapping: Mapping) -> str:
@@ -193,10 +183,8 @@ def mapping_text(mapping: Mapping) -> str:
     lines = ["# How this log was read by `friso identify`: reused next time, options override it."]
     if mapping.sample_time is not None:
         lines.append(f'sample_time = "{mapping.sample_time!r} s"')
-    if mapping.experiment is not None:
-        lines.append(f"experiment = {as_toml(mapping.experiment)}")
-    if mapping.axis is not None:
-        lines.append(f"axis = {as_toml(mapping.axis)}")
+    stated = {"experiment": mapping.experiment, "axis": mapping.axis}
+    lines += [f"{name} = {as_toml(text)}" for name, text in stated.items() if text is not None]
     for name in TABLES:
         table = getattr(mapping, name)
         rows = [f"{as_toml(key)} = {as_toml(value)}" for key, value in table.items()]
@@ -246,9 +234,7 @@ def _parsed(place: Path) -> Mapping:
             raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time, axis", "", str(place))
     texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
     try:
-        options = from_options(
-            dt=document.get("sample_time"), experiment=document.get("experiment"), axis=document.get("axis")
-        )
+        options = from_options(dt=document.get("sample_time"), **{name: document.get(name) for name in SINGLE[1:]})
         for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):
             for key in texts[group]:
                 if key not in allowed:

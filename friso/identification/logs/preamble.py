@@ -50,12 +50,9 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
     for line, (stated, value) in pairs.items():
         name, unit = split_heading(stated)
         key = re.sub(r"[\W\d_]+", "", name.lower())
-        amount = (
-            _AMOUNT.fullmatch(value) if key in RATES | STEPS and len(value) < settings.characters_of_an_amount else None
-        )
-        if amount is None:
-            continue
-        if _GROUPED.fullmatch(amount["number"]):
+        asked = key in RATES | STEPS and len(value) < settings.characters_of_an_amount
+        amount = _AMOUNT.fullmatch(value) if asked else None
+        if amount is None or _GROUPED.fullmatch(amount["number"]):
             continue
         number = float(amount["number"].replace(",", "."))
         seconds = _seconds(number, amount["unit"].strip("[]()") or unit)
@@ -85,10 +82,8 @@ def _pair(line: str) -> tuple[str, str] | None:
     line = line.lstrip(_BEFORE)
     if (separator := _SEPARATOR.search(line)) is None:
         return None
-    key, value = (
-        line[: separator.start()].rstrip().removesuffix('"').rstrip(),
-        line[separator.end() :].strip().rstrip(_BEHIND),
-    )
+    key = line[: separator.start()].rstrip().removesuffix('"').rstrip()
+    value = line[separator.end() :].strip().rstrip(_BEHIND)
     return (key, value) if key and value and '"' not in key else None
 
 

@@ -208,10 +208,8 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
     Of several channels whose names imply a role, the channel whose name has no other word gets it. Raises LogError for
     an assigned channel that does not exist, or that is assigned to two roles.
     """
-    chosen = {
-        role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
-        for role, name in assigned.items()
-    }
+    channels = {role: find(table, name, role, origin) for role, name in assigned.items()}
+    chosen = {role: AssignedRole(role, channel, "as specified", True) for role, channel in channels.items()}
     for role, name in assigned.items():
         others = [other for other in assigned if other != role and chosen[other].channel is chosen[role].channel]
         if others:

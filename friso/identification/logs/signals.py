@@ -80,9 +80,8 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
     units = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
     for name, unit in mapping.units.items():
         if not is_unit(unit):
-            raise LogError(
-                "unit", quoted(unit), "a unit such as mm, um, rad, V, A or counts", option("--unit", name, "mm"), origin
-            )
+            expected = "a unit such as mm, um, rad, V, A or counts"
+            raise LogError("unit", quoted(unit), expected, option("--unit", name, "mm"), origin)
     channels = [replace(channel, unit=units.get(id(channel), channel.unit)) for channel in table.channels]
     if not times:  # times come from the table's columns
         channels = [replace(channel, time=None) for channel in channels]
@@ -111,10 +110,9 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
         value, implied = _scaled(role, scale, unit, reading)
         line = f"{scale}" + ("" if unit else f", its values taken to be in {implied} as the scale implies")
     elif _taken_as_si(choice, reading):
-        value, line = 1.0, f"no unit in the file: assumed to be in {reading.unit(role)}"
-        notes.warnings.append(
-            f"{role}: {channel.name} has no unit (this format has none): assumed to be in {reading.unit(role)}"
-        )
+        assumed = f"assumed to be in {reading.unit(role)}"
+        value, line = 1.0, f"no unit in the file: {assumed}"
+        notes.warnings.append(f"{role}: {channel.name} has no unit (this format has none): {assumed}")
     else:
         value, si = in_si(unit, reading.unit(role))
         line = f"in {unit}" if unit else "without a unit"
@@ -243,11 +241,8 @@ def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading,
     channel = choice.channel
     if reading.mapping.sample_time is not None:
         return reading.mapping.sample_time * np.arange(channel.values.size)
-    if (
-        clock is not None
-        and (clock.by_user or channel.time is None)
-        and clock.channel.values.size == channel.values.size
-    ):
+    fits = clock is not None and clock.channel.values.size == channel.values.size
+    if clock is not None and fits and (clock.by_user or channel.time is None):
         return clock.channel.values * _seconds(clock, reading, notes)
     return channel.time
 

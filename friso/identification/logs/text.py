@@ -33,9 +33,8 @@ def read_text(path: Path) -> ChannelTable:
     frame = read_frame(path, form)
     names = unique(list(form.names) or [f"column {i + 1}" for i in range(form.columns)])
     heading = preamble(form.above, names, form.delimiter)
-    units = [
-        unit or heading.units.get(name, "") for unit, name in zip(form.units or [""] * len(names), names, strict=True)
-    ]
+    stated = form.units or [""] * len(names)
+    units = [unit or heading.units.get(name, "") for unit, name in zip(stated, names, strict=True)]
     notes, columns = list(heading.read), []
     _no_short_rows(path, form, frame)
     blank = frame.isna().all(axis=1).to_numpy()
@@ -54,11 +53,8 @@ def read_text(path: Path) -> ChannelTable:
     channels = with_times(_same_ends(path, form, columns, frame))
     if heading.interval is not None and all(channel.time is None for channel in channels):
         channels = tuple(replace(c, time=heading.interval * np.arange(c.values.size)) for c in channels)
-    return ChannelTable(
-        channels,
-        heading.scalars,
-        (f"format: text, {form.in_words}", f"{len(frame)} rows, {len(columns)} columns", *notes),
-    )
+    read = (f"format: text, {form.in_words}", f"{len(frame)} rows, {len(columns)} columns", *notes)
+    return ChannelTable(channels, heading.scalars, read)
 
 
 def _such_as(cells: Any) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from friso.errors import LogError
-from friso.identification.logs.checks import repeated_stamps
+from friso.identification.logs.checks import repeated_stamps, runs
 from friso.identification.logs.settings import settings
 from friso.quantities import percent
 
@@ -49,10 +49,8 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     long = gaps(steps)
     period = usual_step(steps)
     lost = np.round(steps / period) - 1
-    scatter = min(
-        max(settings.scatter_of_even_stamps, settings.deviations_of_a_gap * float(np.std(steps[~long])) / period),
-        settings.error_of_a_whole_gap,
-    )
+    usual_scatter = settings.deviations_of_a_gap * float(np.std(steps[~long])) / period
+    scatter = min(max(settings.scatter_of_even_stamps, usual_scatter), settings.error_of_a_whole_gap)
     whole = np.abs(steps / period - 1 - lost) <= scatter  # otherwise the clock was reset
     bridged = long & whole & (lost >= 1) & (lost <= settings.samples_bridged)
     even = np.abs(steps / period - 1 - lost).max() <= settings.scatter_of_even_stamps
@@ -81,14 +79,12 @@ def gaps(steps: np.ndarray) -> np.ndarray:
     gap.
     """
     usual = float(np.median(steps))
-    if steps.size >= settings.steps_averaged:
-        usual = (
-            float(np.median(np.convolve(steps, np.ones(settings.steps_averaged), "valid"))) / settings.steps_averaged
-        )
-    beside = np.pad(np.minimum(steps, settings.sample_times_of_a_gap * usual), 1, constant_values=usual)
-    return (steps > settings.sample_times_of_a_gap * usual) & (
-        beside[:-2] + steps + beside[2:] > (settings.sample_times_of_a_gap + 2) * usual
-    )
+    averaged, longest = settings.steps_averaged, settings.sample_times_of_a_gap
+    if steps.size >= averaged:
+        usual = float(np.median(np.convolve(steps, np.ones(averaged), "valid"))) / averaged
+    beside = np.pad(np.minimum(steps, longest * usual), 1, constant_values=usual)
+    late = beside[:-2] + steps + beside[2:] > (longest + 2) * usual
+    return (steps > longest * usual) & late
 
 
 def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -137,9 +133,8 @@ def _evened(name: str, raw: Track) -> Track:
     time = about + raw.period * order
     scatter = float(np.sum((raw.time - time) ** 2))
     jitter = np.sqrt(scatter / time.size) / raw.period
-    raw.read.append(
-        f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps even to {percent(jitter)} of a step"
-    )
+    sampled = f"{time.size} samples at {1 / raw.period:.6g} Hz"
+    raw.read.append(f"{name}: {sampled}, time stamps even to {percent(jitter)} of a step")
     rounded = _rounded(raw, time) if jitter > settings.scatter_of_even_stamps else 0.0
     if rounded:
         raw.read.append(f"{name}: time stamps are rounded to {rounded * 1e3:.4g} ms: taken as uniform")
@@ -203,33 +198,27 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
         values[name] = _at(base, single, single.values)
         bridged |= _at(base, single, single.bridged) > 0
         if not _coincident(base, single):
-            read.append(
-                f"{name}: interpolated linearly from {1 / single.period:.6g} Hz onto the {1 / base.period:.6g} Hz "
-                f"instants of {base_name}"
-            )
+            instants = f"the {1 / base.period:.6g} Hz instants of {base_name}"
+            read.append(f"{name}: interpolated linearly from {1 / single.period:.6g} Hz onto {instants}")
         if single.period < base.period / settings.sample_times_of_a_gap:
             warnings.append(
                 f"{name}: sampled at {1 / single.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
                 "anti-aliasing filter"
             )
     covered = np.all([np.isfinite(value) for value in values.values()], axis=0)
-    segments = [run for part in base.segments for run in _runs(covered, part)]
+    segments = [
+        slice(part.start + run.start, part.start + run.stop) for part in base.segments for run in runs(covered[part])
+    ]
     short = [run for run in segments if run.stop - run.start < settings.samples_of_a_segment]
     segments = [run for run in segments if run.stop - run.start >= settings.samples_of_a_segment]
     if not segments:
         spans = ", ".join(f"{name} {trace.time[0]:.6g} s to {trace.time[-1]:.6g} s" for name, trace in tracks.items())
-        raise LogError(
-            "log",
-            f"no {settings.samples_of_a_segment} consecutive samples that all channels share: {spans}",
-            "a common span",
-            "",
-        )
+        consecutive = f"no {settings.samples_of_a_segment} consecutive samples that all channels share"
+        raise LogError("log", f"{consecutive}: {spans}", "a common span", "")
     if short:
         read.append(f"{len(short)} segments shorter than {settings.samples_of_a_segment} samples left out")
-    parts, start = [], 0
-    for run in segments:
-        parts.append(slice(start, start + run.stop - run.start))
-        start = parts[-1].stop
+    ends = np.cumsum([0, *(run.stop - run.start for run in segments)]).tolist()
+    parts = [slice(start, stop) for start, stop in pairwise(ends)]
     pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
     track = Track(base.time[pick], base.values[pick], base.period, parts, bridged[pick], read, warnings)
     return track, {name: value[pick] for name, value in values.items()}
@@ -258,12 +247,3 @@ def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
         a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))
         resampled[a:b] = np.interp(base.time[a:b], time, values[part])
     return resampled
-
-
-def _runs(covered: np.ndarray, part: slice) -> list[slice]:
-    """Return the stretches of the segment `part` in which all samples are covered.
-
-    `covered`, shape (n,), marks the samples that all tracks have.
-    """
-    edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
-    return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

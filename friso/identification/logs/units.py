@@ -120,22 +120,7 @@ def of_decibels(text: str) -> str | None:
     return None if match is None else match[1].strip()
 
 
-_KINDS = (
-    "s",
-    "Hz",
-    *dict.fromkeys(ROLES.values()),
-    "rad",
-    "rad/s",
-    "rad/s^2",
-    "A",
-    "V",
-    "N*m",
-    "N/V",
-    *RESPONSES,
-    "V/m",
-    "N/m",
-    "K",
-)
+_KINDS = ("s", "Hz", *OTHERS, "A", "V", "N/V", *RESPONSES, "V/m", "N/m", "K")
 
 
 def split_heading(heading: str) -> tuple[str, str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.inverse_model import FilteredMotion
+from friso.identification.logs.checks import runs
 from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import turns_of
 
@@ -52,10 +53,8 @@ class Coverage:
         The bend must stand out of the noise of the position over several samples of several starts, because one start
         may be chance.
         """
-        passes = [
-            np.sum((distance > settings.deviations_of_a_bend * self.resolution) & (distance < length))
-            for distance in self.starts
-        ]
+        least = settings.deviations_of_a_bend * self.resolution
+        passes = [np.sum((distance > least) & (distance < length)) for distance in self.starts]
         return bool(sum(count >= settings.samples_of_a_bend for count in passes) >= settings.starts_with_a_bend)
 
 
@@ -75,16 +74,11 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
     calm = (mass * np.abs(moved.acceleration) < settings.friction_share_of_inertia * coulomb) & (
         np.abs(moved.velocity) > slowest
     )
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], calm, [False]]).astype(int)))
-    stretches = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= length]
-    speeds = [_speeds(np.abs(moved.velocity[a:b]), length) for a, b in stretches]
+    stretches = [stretch for stretch in runs(calm) if stretch.stop - stretch.start >= length]
+    speeds = [_speeds(np.abs(moved.velocity[stretch]), length) for stretch in stretches]
     steady = np.sort(np.concatenate(speeds)) if speeds else np.zeros(0)
-    return Coverage(
-        steady,
-        _starts(position, moved, mass / coulomb, settings.deviations_of_a_bend * resolution),
-        resolution,
-        slowest,
-    )
+    starts = _starts(position, moved, mass / coulomb, settings.deviations_of_a_bend * resolution)
+    return Coverage(steady, starts, resolution, slowest)
 
 
 def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:

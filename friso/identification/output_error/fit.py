@@ -12,9 +12,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from friso.engine.driven import Inputs
-from friso.identification.output_error.parameters import FitParameter, keys_of
+from friso.identification.output_error.parameters import FitParameter, stages
 from friso.identification.output_error.problem import Problem
-from friso.identification.output_error.refine import bounds_of, refine_fit
+from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.settings import settings
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
@@ -84,9 +84,7 @@ class OutputErrorFit:
     @property
     def stage(self) -> dict[str, Any]:
         """Return the fitted stage as flat keys such as friction.static, with SI values."""
-        parameters = zip(self.problem.parameters, self.inner, strict=True)
-        values = {parameter.name: parameter.outer(inner) for parameter, inner in parameters}
-        return {**self.problem.flat, **keys_of(self.problem.flat, values)}
+        return stages(self.problem.flat, self.problem.parameters, self.inner)
 
     @property
     def deviation(self) -> np.ndarray:
@@ -175,7 +173,7 @@ def _fit(
     enough = settings.cost_share_of_refinement
     for number, (parts, most, iterations) in enumerate(rounds):
         tried, part = tried[:most], share_of(progress, number, 3)
-        refined = refine_fit(parts, tried, np.tile(mask, (len(tried), 1)), iterations, enough, part)
+        refined = refine_fit(parts, tried, mask, iterations, enough, part)
         tried = refined.inner[np.argsort(refined.cost)]
     return polished(problem, tuple(free), tried[0], share_of(progress, 2, 3))
 
@@ -188,17 +186,13 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     friction would hide which of the others is best. In the other half they start near the inverse model's values,
     because a first fit of them alone to stick-slip motion can end anywhere.
     """
-    low, high = bounds_of(problem)
+    low, high = problem.bounds
     core = np.array([parameter.core for parameter in problem.parameters])
     logarithmic = np.array([parameter.logarithmic for parameter in problem.parameters])
-    centre, half = (
-        first_values(problem.parameters),
-        np.where(logarithmic, settings.logarithm_of_core_starts, settings.range_share_of_core_starts * (high - low)),
-    )
-    low, high = (
-        np.where(core, np.maximum(centre - half, low), low),
-        np.where(core, np.minimum(centre + half, high), high),
-    )
+    centre, spread = first_values(problem.parameters), settings.range_share_of_core_starts * (high - low)
+    half = np.where(logarithmic, settings.logarithm_of_core_starts, spread)
+    low = np.where(core, np.maximum(centre - half, low), low)
+    high = np.where(core, np.minimum(centre + half, high), high)
     shares = qmc.Sobol(len(first), rng=settings.seed_of_starts).random(settings.starts_of_a_fit)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
     half = len(starts) // 2  # of a Sobol sequence, either half is spread evenly, but not every second point
@@ -212,7 +206,7 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
     The result has the shape (starts, parameters). Starts spread several times as wide as the fit's covariance, because
     the closed loop of a hunting stage has other optima.
     """
-    low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
+    low, high = (end[list(fit.free)] for end in fit.problem.bounds)
     deviation = fit.deviation
     usable = np.isfinite(deviation) & (deviation > 0)
     correlation = np.eye(len(fit.free))
@@ -254,10 +248,9 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
     count, most = len(problem.target), int(settings.samples_of_all_starts / starts)
     if count <= most or problem.closed:
         return [slice(0, min(count, most))]
-    firsts = np.linspace(
-        0, count - most // settings.stretches_of_a_screening, settings.stretches_of_a_screening
-    ).astype(int)
-    return [slice(int(first), int(first) + most // settings.stretches_of_a_screening) for first in firsts]
+    length = most // settings.stretches_of_a_screening
+    firsts = np.linspace(0, count - length, settings.stretches_of_a_screening).astype(int)
+    return [slice(int(first), int(first) + length) for first in firsts]
 
 
 def polished(
@@ -274,10 +267,8 @@ def polished(
     for the other inputs that the log allows (`problem.unsettled`).
     """
     mask = np.isin(np.arange(len(inner)), free)
-    best = refine_fit(
-        [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress,
-        slopes=slopes,
-    ).inner[0]  # fmt: skip
+    until = settings.iterations_of_a_fit, settings.cost_share_of_a_fit
+    best = refine_fit([problem], inner[None], mask, *until, progress, slopes=slopes).inner[0]
     rest, fitted = problem.linearised(best, mask)
     covariance = spread_along(problem, fitted, rest)
     moved = [_moved_by(inputs, problem, best, fitted, rest) for inputs in problem.unsettled]
@@ -328,6 +319,14 @@ def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.nda
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():
         return np.zeros(slopes.shape[1])
+    return shift_against(change, slopes)
+
+
+def shift_against(change: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Return the shift of fitted numbers, (p,), that best undoes a change of the residual [N], (n,).
+
+    `slopes`, (n, p), are derivatives of the residual by the numbers.
+    """
     size = np.linalg.norm(slopes, axis=0)
     size = np.where(size > 0, size, 1.0)
     return -np.linalg.lstsq(slopes / size, change, rcond=settings.smallest_singular_value)[0] / size

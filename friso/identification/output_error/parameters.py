@@ -65,11 +65,8 @@ def stribeck_up_to(flat: Mapping[str, Any]) -> float:
 
     On a rotary axis it is in rad/s, at a medium radius of bearings.
     """
-    return (
-        settings.highest_stribeck_velocity
-        if axis_of(flat) == LINEAR
-        else settings.highest_stribeck_velocity / float(np.sqrt(np.prod(settings.bearing_radii)))
-    )
+    radius = 1.0 if axis_of(flat) == LINEAR else float(np.sqrt(np.prod(settings.bearing_radii)))
+    return settings.highest_stribeck_velocity / radius
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
@@ -160,9 +157,14 @@ def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float
 
 
 def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
-    """Turn fitted numbers, shape (runs, parameters), into stages as flat keys with SI values."""
-    values = {parameter.name: parameter.outer(column) for parameter, column in zip(parameters, inner.T, strict=True)}
-    return {**flat, **keys_of(flat, values)}
+    """Turn fitted numbers, (runs, parameters) or (parameters,), into stages as flat keys with SI values."""
+    return {**flat, **keys_at(flat, parameters, inner)}
+
+
+def keys_at(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
+    """Turn fitted numbers, (runs, parameters) or (parameters,), into SI values of keys of the stage file."""
+    columns = zip(parameters, inner.T, strict=True)
+    return keys_of(flat, {parameter.name: parameter.outer(column) for parameter, column in columns})
 
 
 def keys_of(flat: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

@@ -79,6 +79,16 @@ class Problem:
         return [parameter.name for parameter in self.parameters]
 
     @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ends of the ranges of the fitted numbers, each of shape (parameters,)."""
+        low, high = np.array([(one.inner(one.low), one.inner(one.high)) for one in self.parameters]).T
+        return low, high
+
+    def parameter(self, name: str) -> FitParameter:
+        """Return a parameter by its name."""
+        return self.parameters[self.names.index(name)]
+
+    @property
     def kernel(self) -> Kernel:
         """Return the compiled equations of the stage."""
         return kernel(self.form)
@@ -169,11 +179,7 @@ class Problem:
         """
         numbers = np.flatnonzero(free)
         ahead = np.array([self._step(inner, int(i)) for i in numbers])
-        ranges = [
-            (self.parameters[i].inner(self.parameters[i].low), self.parameters[i].inner(self.parameters[i].high))
-            for i in numbers
-        ]
-        low, high = np.array(ranges).T
+        low, high = (end[numbers] for end in self.bounds)
         within = (inner[numbers] - ahead >= low) & (inner[numbers] - ahead <= high)
         steps = np.concatenate([ahead, np.where(within, -ahead, ahead)])
         moved = np.tile(inner, (len(steps), 1))
@@ -184,11 +190,10 @@ class Problem:
 
     def _step(self, inner: np.ndarray, i: int) -> float:
         """Return the step of number `i` by which derivatives are taken, towards its range's middle."""
-        parameter = self.parameters[i]
-        size = output_error_settings.derivative_step * (
-            1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low)
-        )
-        return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
+        low, high = (end[i] for end in self.bounds)
+        share = 1.0 if self.parameters[i].logarithmic else 0.01 * (high - low)
+        size = output_error_settings.derivative_step * share
+        return size if inner[i] < (low + high) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
         """Return the states in which runs begin: position and velocity of the log's beginning.
@@ -258,16 +263,10 @@ def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Seq
     samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled else 0
     count = part.stop - part.start
     extra = log["disturbance"][part] if "disturbance" in log else np.zeros(count)
-    return Problem(
-        flat,
-        Driven(structure(flat), samples),
-        Inputs(log["reference"][part], extra, log.sample_time),
-        log["force"][part] - extra,
-        tuple(parameters),
-        True,
-        _start(log, part),
-        _after_start(count, log.sample_time) * log.measured(part),
-    )
+    inputs = Inputs(log["reference"][part], extra, log.sample_time)
+    start, counted = _start(log, part), _after_start(count, log.sample_time) * log.measured(part)
+    target, form = log["force"][part] - extra, Driven(structure(flat), samples)
+    return Problem(flat, form, inputs, target, tuple(parameters), True, start, counted)
 
 
 def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
@@ -295,10 +294,8 @@ def tracking(
     """
     omega = 2 * np.pi * min(bandwidth, output_error_settings.bandwidth_of_holding)
     settling, step = output_error_settings.time_constants_of_settling / omega, log.sample_time
-    cutoffs = [
-        identification_settings.smoothing_bandwidths * times * bandwidth
-        for times in output_error_settings.smoothing_steps
-    ]
+    highest = identification_settings.smoothing_bandwidths
+    cutoffs = [highest * times * bandwidth for times in output_error_settings.smoothing_steps]
     smooth, *sharper = (motion(log["position"][part], step, cutoff).position for cutoff in cutoffs)
     # the force is held from each sample to the next
     held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < output_error_settings.sample_time_tolerance
@@ -313,19 +310,14 @@ def tracking(
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
     held |= proportional_derivative(mass * omega**2, 2 * mass * omega)
     return Problem(
-        held,
-        Driven(structure(held)),
-        inputs,
-        np.zeros(part.stop - part.start),
-        tuple(parameters),
-        False,
-        _start(log, part),
-        counted * log.measured(part),
-        (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper[0])),
-        tuple(sharper),
-        tuple(2 * mass * omega * _shaking(log, part, cutoff) for cutoff in cutoffs),
-        log.is_integrated,
-        tuple(cutoffs),
+        *(held, Driven(structure(held)), inputs, np.zeros(part.stop - part.start), tuple(parameters), False),
+        start=_start(log, part),
+        counted=counted * log.measured(part),
+        unsettled=(replace(inputs, held=not inputs.held), replace(inputs, reference=sharper[0])),
+        sharper=tuple(sharper),
+        shaking=tuple(2 * mass * omega * _shaking(log, part, cutoff) for cutoff in cutoffs),
+        accumulates=log.is_integrated,
+        cutoffs=tuple(cutoffs),
     )
 
 
@@ -368,14 +360,13 @@ def _after_start(count: int, sample_time: float) -> np.ndarray:
 
     The first samples depend on the initial state of the loop, which a log shows only roughly.
     """
-    first = round(
-        min(output_error_settings.time_of_a_start / sample_time, output_error_settings.record_share_of_a_start * count)
-    )
+    most = output_error_settings.record_share_of_a_start * count
+    first = round(min(output_error_settings.time_of_a_start / sample_time, most))
     return np.where(np.arange(count) < first, 0.0, 1.0)
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:
     """Return initial position [m] and velocity [m/s], by a parabola through the first samples."""
-    time = np.arange(output_error_settings.samples_of_first_velocity) * log.sample_time
-    slope = np.polyfit(time, log["position"][part][: output_error_settings.samples_of_first_velocity], 2)[1]
+    count = output_error_settings.samples_of_first_velocity
+    slope = np.polyfit(np.arange(count) * log.sample_time, log["position"][part][:count], 2)[1]
     return float(log["position"][part.start]), float(slope)

@@ -23,13 +23,6 @@ class Refined:
     cost: np.ndarray
 
 
-def bounds_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of the ranges of the fitted numbers, each of shape (parameters,)."""
-    low = np.array([parameter.inner(parameter.low) for parameter in problem.parameters])
-    high = np.array([parameter.inner(parameter.high) for parameter in problem.parameters])
-    return low, high
-
-
 def refine_fit(
     pieces: Sequence[Problem],
     starts: np.ndarray,
@@ -42,8 +35,8 @@ def refine_fit(
 ) -> Refined:
     """Fit all `pieces` of a problem from several starts at once (Levenberg, Marquardt).
 
-    The starts have the shape (starts, parameters); `free`, of equal shape, marks the numbers to fit. A fit ends when
-    its sum of squares falls by less than the fraction `enough`.
+    The starts have the shape (starts, parameters); `free`, of equal shape or (parameters,), marks the numbers to fit. A
+    fit ends when its sum of squares falls by less than the fraction `enough`.
 
     For every start several dampings are tried side by side, which costs less than derivatives. After a step the
     derivatives are updated from the change of the residual (Broyden 1965, doi:10.1090/S0025-5718-1965-0198670-6). They
@@ -51,7 +44,7 @@ def refine_fit(
     derivatives near the starts, if they are known. A fit that would not fall to the mean square `aim` at the pace of
     its last iteration is abandoned. Only derivatives computed at its own numbers end or abandon a fit.
     """
-    low, high = bounds_of(pieces[0])
+    (low, high), free = pieces[0].bounds, np.broadcast_to(free, starts.shape)
     margin = settings.range_share_inside * (high - low)
     low, high = low + margin, high - margin
     inner = np.clip(starts, low, high)
@@ -131,9 +124,8 @@ def _best_steps(
     step = trials[best] - inner
     linear = rest + (slopes @ step[:, :, None])[:, :, 0]
     weights = _weights(step, squares)
-    return _Steps(
-        trials[best], rests[best], costs[best], dampings[best], mean_square(linear), rests[best] - linear, weights
-    )
+    reached = (array[best] for array in (trials, rests, costs, dampings))
+    return _Steps(*reached, mean_square(linear), rests[best] - linear, weights)
 
 
 def _weights(steps: np.ndarray, squares: np.ndarray) -> np.ndarray:

@@ -36,8 +36,8 @@ def as_far_off_as_repeated(
     for number in range(settings.repetitions_of_a_fit):
         progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
         like = simulated_log(once.problem, once.inner, log, part, bandwidth, noise, rng)
-        allowed = settings.iterations_of_a_repetition, settings.cost_share_of_refinement
-        again.append(refine_fit([like], once.inner[None], free[None], *allowed, slopes=once.slopes))
+        until = settings.iterations_of_a_repetition, settings.cost_share_of_refinement
+        again.append(refine_fit([like], once.inner[None], free, *until, slopes=once.slopes))
     off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
     off = off * float(student.ppf(CONFIDENCE, settings.repetitions_of_a_fit)) / COVERAGE
     usual = float(np.mean([fit.cost[0] for fit in again]))
@@ -61,13 +61,7 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
 
 
 def simulated_log(
-    problem: Problem,
-    inner: np.ndarray,
-    log: Log,
-    part: slice,
-    bandwidth: float,
-    noise: float,
-    rng: np.random.Generator,
+    problem: Problem, inner: np.ndarray, log: Log, part: slice, bandwidth: float, noise: float, rng: np.random.Generator
 ) -> Problem:
     """Return the problem of fitting a simulated log of a machine with the fitted numbers `inner`.
 

@@ -1,17 +1,17 @@
-"""Convert fitted numbers to keys of the stage file, with their intervals or remaining ranges."""
+"""Convert fitted numbers to keys of the stage file with intervals or ranges, and draw machines from these."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import IdentifiableFit, why_not_shown
-from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, keys_of
-from friso.identification.output_error.profile import Profile
+from friso.identification.output_error.identifiable import IdentifiableFit, Profile, why_not_shown
+from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, FitParameter, keys_at
+from friso.identification.output_error.settings import settings
 from friso.identification.output_error.settings import settings as output_error_settings
 from friso.identification.readings.settings import settings as reading_settings
 from friso.intervals import COVERAGE
@@ -34,13 +34,10 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     keys, slopes = _slopes(fit)
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
-    shares = [
-        output_error_settings.static_error_of_following
-        if key == "friction.static" and not fit.problem.closed
-        else reading_settings.linearity_of_sensors
-        for key in keys
-    ]
-    linear = np.array(shares) * np.abs([values[key] for key in keys]) / COVERAGE
+    shares = np.full(len(keys), reading_settings.linearity_of_sensors)
+    if "friction.static" in keys and not fit.problem.closed:
+        shares[keys.index("friction.static")] = output_error_settings.static_error_of_following
+    linear = shares * np.abs([values[key] for key in keys]) / COVERAGE
     of_logarithm = {parameter.name for parameter in parameters if parameter.logarithmic}
     logarithmic = np.isin([_OWNERS.get(key, key) for key in keys], [*of_logarithm])
     spread_of_keys = np.sqrt(np.diag(covariance))
@@ -121,10 +118,8 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
 
 def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
     """Return the keys of the stage file with the SI values that follow from fitted numbers."""
-    values = {
-        parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
-    }
-    return {key: float(value) for key, value in keys_of(fit.problem.flat, values).items()}
+    values = keys_at(fit.problem.flat, fit.problem.parameters, inner)
+    return {key: float(value) for key, value in values.items()}
 
 
 def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
@@ -160,3 +155,60 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
         softer, stiffer = (np.sqrt(end / fit.problem.flat[stiffness.name]) for end in (stiffness.low, stiffness.high))
         return float(parameter.low * softer), float(parameter.high * stiffer)
     return parameter.low, parameter.high
+
+
+def drawn_from(
+    estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
+) -> np.ndarray:
+    """Sample machines at random from what a record leaves open, as rows of fitted numbers.
+
+    A fitted number is a parameter's value or its logarithm. The result has the shape (machines, parameters). `inner`,
+    shape (parameters,), has the numbers of the fit. Quantities with a value are sampled by their intervals and
+    `correlation`. Quantities with a range only are uniform in it, or in its logarithm; a parameter without an estimate
+    is sampled from its whole range of the fit.
+    """
+    rng = np.random.default_rng(settings.seed_of_draws)
+    determined = [estimate for estimate in estimates if estimate.determined]
+    sizes, ways = np.linalg.eigh(correlation)
+    steps = (
+        rng.standard_normal((settings.machines_drawn, len(determined))) @ (ways * np.sqrt(np.clip(sizes, 0.0, None))).T
+    )
+    values = {
+        estimate.name: np.clip(estimate.value + step * estimate.half_width / COVERAGE, estimate.low, estimate.high)
+        for estimate, step in zip(determined, steps.T, strict=True)
+    }
+    for estimate in estimates:
+        if not estimate.determined and np.isfinite([estimate.low, estimate.high]).all():
+            range_left = FitParameter(estimate.name, "", np.nan, estimate.low, estimate.high, estimate.low > 0)
+            values[estimate.name] = _evenly(range_left, rng)
+    rows = np.tile(inner, (settings.machines_drawn, 1))
+    for number, parameter in enumerate(parameters):
+        drawn = _of_parameter(parameter.name, values)
+        drawn = _evenly(parameter, rng) if drawn is None else np.clip(drawn, parameter.low, parameter.high)
+        rows[:, number] = parameter.inner(drawn)
+    return rows
+
+
+def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
+    """Sample values evenly from the whole range of a parameter in the fit, shape (machines,).
+
+    The values are in SI units, and even in the logarithm for a logarithmic parameter.
+    """
+    ends = parameter.inner(parameter.low), parameter.inner(parameter.high)
+    return parameter.outer(rng.uniform(*ends, settings.machines_drawn))
+
+
+def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Return a fit parameter of sampled machines, (machines,), by their keys; None without them.
+
+    `values` has arrays by key, and `name` is the parameter.
+    """
+    if name in (MASS, SHARE):
+        masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
+        if not masses or (name == SHARE and len(masses) < 2):
+            return None
+        return sum(masses[1:], masses[0]) if name == MASS else masses[0] / (masses[0] + masses[1])
+    if name == RATIO:
+        both = [values.get(f"friction.{key}") for key in ("static", "coulomb")]
+        return None if both[0] is None or both[1] is None else both[0] / both[1]
+    return values.get(name)

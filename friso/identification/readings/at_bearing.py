@@ -159,9 +159,8 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
     Raises InputError for missing channels.
     """
     position, force = channel(log, "position")[part], channel(log, "force")[part]
-    return BearingRecord(
-        log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force
-    )
+    bent = _bent(log, part, position, float(force.std()) / between.contact)
+    return BearingRecord(log.time[part], position, bent, force)
 
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
@@ -181,10 +180,8 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
     cutoff = max(highest, settings.periods_of_a_record / (len(record.time) * record.interval))
     motion = float(low_pass(record.position, record.interval, cutoff).std())
     noise = robust(np.diff(record.position, 2)) / 6**0.5
-    if not motion > max(
-        settings.deviations_of_seen_motion * noise,
-        settings.rounding_of_a_position * float(np.abs(record.position).max()),
-    ):
+    rounding = settings.rounding_of_a_position * float(np.abs(record.position).max())
+    if not motion > max(settings.deviations_of_seen_motion * noise, rounding):
         return f"the motion, {motion:.2g} m RMS, does not stand out from the noise"
     return ""
 
@@ -196,10 +193,8 @@ def cutoff_of(record: BearingRecord) -> float:
     into the record.
     """
     highest = motion_bandwidth(record.body, record.interval)
-    return max(
-        min(highest, settings.sampled_frequency / (2 * record.interval)),
-        settings.periods_of_a_record / (len(record.time) * record.interval),
-    )
+    lowest = settings.periods_of_a_record / (len(record.time) * record.interval)
+    return max(min(highest, settings.sampled_frequency / (2 * record.interval)), lowest)
 
 
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -235,16 +230,9 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
     size = low_pass(bent, log.sample_time, cutoff).std()
     noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
     noise *= robust(np.diff(bent, 2)) / 6**0.5
-    return (
-        bent
-        if size
-        > max(
-            settings.deviations_of_bending * noise,
-            settings.deflection_share_of_bending * position.std(),
-            settings.contact_ratio_of_bending * gives,
-        )
-        else None
-    )
+    of_motion, of_contact = settings.deflection_share_of_bending, settings.contact_ratio_of_bending
+    least = max(settings.deviations_of_bending * noise, of_motion * position.std(), of_contact * gives)
+    return bent if size > least else None
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
@@ -259,10 +247,9 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
 
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
     """Compute the acceleration [m/s^2] of a mode's mass from the acceleration of its base."""
-    omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / settings.points_per_sample
-    fine = CubicSpline(time, acceleration)(
-        np.linspace(time[0], time[-1], (len(time) - 1) * settings.points_per_sample + 1)
-    )
+    omega, points = 2 * np.pi * mode.frequency, settings.points_per_sample
+    step = float(time[1] - time[0]) / points
+    fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * points + 1))
     damping = 2 * mode.damping_ratio * omega
     b, a = bilinear([damping, omega**2], [1.0, damping, omega**2], 1 / step)
-    return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][:: settings.points_per_sample]
+    return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][::points]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -122,25 +122,25 @@ def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
     return np.gradient(low_pass(values, sample_time, cutoff), sample_time)
 
 
+def by_segment(
+    log: Log, values: np.ndarray, treated: Callable[[np.ndarray, float, float], np.ndarray], cutoff: float
+) -> np.ndarray:
+    """Return values of a log, (n,), `treated` below `cutoff` [Hz] segment by segment, by `low_pass` or `rate`."""
+    return np.concatenate([treated(values[part], log.sample_time, cutoff) for part in log.segments])
+
+
 def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
     """Return the highest frequency [Hz] at which a position, (n,), stands out of its noise.
 
     The noise is taken to be white. Returns 0 if the position stands out nowhere.
     """
-    rates, density = welch(
-        np.diff(position, 2),
-        1 / sample_time,
-        nperseg=min(len(position) // settings.blocks_of_a_mean, 2 * settings.lines_of_a_spectrum),
-    )
+    pieces = min(len(position) // settings.blocks_of_a_mean, 2 * settings.lines_of_a_spectrum)
+    rates, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=pieces)
     white = np.sin(np.pi * rates * sample_time) ** 4
     top = slice(-int(np.ceil(settings.spectrum_share_of_noise * len(rates))), None)
     noise = white * float(np.median(density[top] / white[top]))
-    return float(
-        rates[
-            density
-            > np.maximum(settings.power_of_clear_motion * noise, settings.power_of_strong_motion * density.max())
-        ].max(initial=0.0)
-    )
+    least = np.maximum(settings.power_of_clear_motion * noise, settings.power_of_strong_motion * density.max())
+    return float(rates[density > least].max(initial=0.0))
 
 
 def robust(values: np.ndarray) -> float:
@@ -215,12 +215,6 @@ def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
     return np.array(turns, dtype=int)
 
 
-def runs(mask: np.ndarray) -> list[slice]:
-    """Return the stretches over which a mask, shape (n,), is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 @dataclass(frozen=True)
 class Mean:
     """A mean, its standard error, and the degrees of freedom of the standard error."""
@@ -249,11 +243,8 @@ def correlated_mean(values: np.ndarray) -> Mean:
     count = len(values)
     off = values - values.mean()
     power = float(off @ off)
-    share = (
-        min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9)
-        if power > 0 and count >= settings.blocks_of_a_mean
-        else 0.0
-    )
+    enough = power > 0 and count >= settings.blocks_of_a_mean
+    share = min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9) if enough else 0.0
     independent = max(count * (1 - share) / (1 + share), 2.0)
     error = float(values.std(ddof=1) / np.sqrt(independent))
     return Mean(float(values.mean()), error, max(round(independent) - 1, 1))
@@ -289,15 +280,12 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     The target, shape (n,), is fitted by columns, shape (n, p).
     """
-    parts = zip(
-        np.array_split(columns, settings.blocks_of_a_mean),
-        np.array_split(target, settings.blocks_of_a_mean),
-        strict=True,
-    )
+    blocks = settings.blocks_of_a_mean
+    parts = zip(np.array_split(columns, blocks), np.array_split(target, blocks), strict=True)
     square, product = columns.T @ columns, columns.T @ target
     without = np.array([solve_normal_equations(square - x.T @ x, product - x.T @ y) for x, y in parts])
     off = without - without.mean(axis=0)
-    return off.T @ off * (settings.blocks_of_a_mean - 1) / settings.blocks_of_a_mean
+    return off.T @ off * (blocks - 1) / blocks
 
 
 def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from friso.errors import InputError
+from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import bends
-from friso.identification.readings.common import runs
 from friso.identification.readings.friction_velocity import distinct
 from friso.identification.readings.passes import Pass, passes
 from friso.identification.readings.ramps import force_ramps
@@ -142,10 +142,8 @@ class Course:
             values = self.log["force"][edges[0] : edges[1]]
             return float(values.mean()) / force if values.size else 0.0
 
-        return (
-            abs(mean(0.2, 0.3) - 0.25) < settings.force_share_off_a_line
-            and abs(mean(-0.2, -0.1)) < settings.force_share_before_a_ramp
-        )
+        on_line = abs(mean(0.2, 0.3) - 0.25) < settings.force_share_off_a_line
+        return on_line and abs(mean(-0.2, -0.1)) < settings.force_share_before_a_ramp
 
     @property
     def one_way(self) -> bool:
@@ -168,12 +166,8 @@ class Course:
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
         size = max(int(settings.log_share_of_a_rest * len(position)), 2)
-        still = maximum_filter1d(position, size) - minimum_filter1d(
-            position, size
-        ) < settings.travel_share_of_a_rest * np.ptp(position)
-        later = [
-            slice((rest.start + rest.stop) // 2, rest.stop) for rest in runs(still) if rest.stop - rest.start > size
-        ]
+        rests = [rest for rest in runs(_still(position, size)) if rest.stop - rest.start > size]
+        later = [slice((rest.start + rest.stop) // 2, rest.stop) for rest in rests]
         places, forces = (np.array([values[rest].mean() for rest in later]) for values in (position, force))
         return _on_a_spring(places, forces)
 
@@ -206,17 +200,14 @@ def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
     if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
         return False
     order = np.argsort(places)
-    alike = np.split(
-        order, np.flatnonzero(np.diff(places[order]) > 2 * settings.travel_share_of_a_rest * np.ptp(places)) + 1
-    )
+    near = 2 * settings.travel_share_of_a_rest * np.ptp(places)
+    alike = np.split(order, np.flatnonzero(np.diff(places[order]) > near) + 1)
     upward = np.diff(places, prepend=np.nan)
     sides = [(forces[here[upward[here] > 0]], forces[here[upward[here] < 0]]) for here in alike]
     apart = [abs(float(np.median(up) - np.median(down))) for up, down in sides if len(up) and len(down)]
-    if (
-        len(alike) < settings.places_of_a_spring
-        or len(apart) < settings.returns_to_a_place
-        or max(apart) > settings.hysteresis_of_a_spring * np.ptp(forces)
-    ):
+    if len(alike) < settings.places_of_a_spring or len(apart) < settings.returns_to_a_place:
+        return False
+    if max(apart) > settings.hysteresis_of_a_spring * np.ptp(forces):
         return False
     return float(np.corrcoef(places, forces)[0, 1]) > np.sqrt(settings.variance_share_of_a_spring)
 
@@ -242,9 +233,13 @@ def _rest(position: np.ndarray, samples: int) -> float:
     A period has `samples` samples. The fraction is 0 for a sine, which moves by 2.4 % of its travel about its turning
     points.
     """
-    size = max(samples // 10, 2)
+    return float(np.mean(_still(position, max(samples // 10, 2))))
+
+
+def _still(position: np.ndarray, size: int) -> np.ndarray:
+    """Tell at which samples, (n,), a position [m] hardly moves, within windows of a `size`."""
     moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)
-    return float(np.mean(moved < settings.travel_share_of_a_rest * np.ptp(position)))
+    return moved < settings.travel_share_of_a_rest * np.ptp(position)
 
 
 def _turns(period: np.ndarray) -> int:

@@ -94,11 +94,10 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
     repeatability = _repeatability(maps, pairs)
     separated, verdict = _verdict(maps, repeatability, crossover)
     short = len(stretches) - len(long)
-    warnings = (
-        [f"{short} passes go less than a fifth of the longest one's way: friction along the rail leaves them out."]
-        if short
-        else []
-    )
+    warnings = []
+    if short:
+        less = f"{short} passes go less than a fifth of the longest one's way"
+        warnings.append(f"{less}: friction along the rail leaves them out.")
     if not mass:
         warnings.append("No mass is given: the force contains that of inertia.")
     return FrictionPosition(maps, repeatability, pairs, separated, verdict, tuple(warnings))
@@ -124,17 +123,14 @@ def _map(
     mapped[inside] = np.interp(inside, covered, mapped[covered])  # fill places without samples
     row = mapped[inside]
     mean = by_t("friction force along the rail", "N", block_mean(row), "mean over position by blocks")
-    flat = row - np.polyval(np.polyfit(inside, row, 1), inside)
-    return PassMap(
-        stretch.velocity,
-        places,
-        mapped,
-        mean,
-        float(row.std()),
-        _correlation_length(flat, step),
-        _harmonics(flat, step, abs(stretch.velocity)),
-        stretch.steady,
-    )
+    flat = _flat(row, inside)
+    varies = float(row.std()), _correlation_length(flat, step), _harmonics(flat, step, abs(stretch.velocity))
+    return PassMap(stretch.velocity, places, mapped, mean, *varies, stretch.steady)
+
+
+def _flat(row: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return a row of forces [N] without their trend over the places, both of shape (n,)."""
+    return row - np.polyval(np.polyfit(places, row, 1), places)
 
 
 def _length(fields: np.ndarray) -> np.ndarray:
@@ -201,8 +197,7 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
         shorter = min(np.isfinite(first.force).sum(), np.isfinite(second.force).sum())
         if common.sum() >= max(0.5 * shorter, 20):
             x = np.arange(common.sum())
-            rows = [np.sign(m.velocity) * m.force[common] for m in (first, second)]
-            rows = [r - np.polyval(np.polyfit(x, r, 1), x) for r in rows]
+            rows = [_flat(np.sign(m.velocity) * m.force[common], x) for m in (first, second)]
             sizes = float(np.sqrt(np.sum(rows[0] ** 2) * np.sum(rows[1] ** 2)))
             pairs.append((i, j, float(rows[0] @ rows[1]) / sizes if sizes > 0 else 0.0))
     return tuple(pairs)
@@ -210,9 +205,8 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
 
 def _no_repeatability(reason: str) -> Estimate:
     """Return an undetermined repeatability; the estimate states the `reason`."""
-    return Estimate.unknown(
-        "repeatability", "1", "correlation of the force over position between passes", reason, -1, 1
-    )
+    method = "correlation of the force over position between passes"
+    return Estimate.unknown("repeatability", "1", method, reason, -1, 1)
 
 
 def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float], ...]) -> Estimate:
@@ -255,7 +249,8 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
     It is not if a pass is unsteady, if passes over equal places differ, or if their repeatability is not determined.
     Neither is it if the force varies faster than the loop's `crossover` [Hz].
     """
-    reasons = []
+    interval = f"95 % interval {repeatability.low:.2f} to {repeatability.high:.2f}"
+    reasons, correlation = [], f"correlation {repeatability.value:.2f}, {interval}"
     rough = [m for m in maps if not m.steady]
     if rough:
         speeds = ", ".join(_spreads(rough))
@@ -263,10 +258,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
     if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
     elif repeatability.value < settings.correlation_of_passes:
-        reasons.append(
-            f"repeated passes over the same places differ (correlation {repeatability.value:.2f}, 95 % interval "
-            f"{repeatability.low:.2f} to {repeatability.high:.2f})"
-        )
+        reasons.append(f"repeated passes over the same places differ ({correlation})")
     quick = [m for m in maps if crossover and any(h.frequency > crossover for h in m.harmonics[:1])]
     if quick:
         fastest = max(m.harmonics[0].frequency for m in quick)
@@ -274,7 +266,5 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
     varies = ", ".join(f"{_from_to(spreads)} N at {speed} mm/s" for speed, spreads in _spreads(maps).items())
     if reasons:
         return False, f"Dynamic friction cannot be determined: {'; '.join(reasons)}. The force varies by {varies}."
-    return True, (
-        f"The force repeats from pass to pass (correlation {repeatability.value:.2f}, 95 % interval "
-        f"{repeatability.low:.2f} to {repeatability.high:.2f}): it is friction along the rail, and varies by {varies}."
-    )
+    repeats = f"The force repeats from pass to pass ({correlation})"
+    return True, f"{repeats}: it is friction along the rail, and varies by {varies}."

@@ -116,12 +116,9 @@ def _row(stretch: Pass, mass: float, error: float) -> tuple[float, float, float,
     Inertia, `mass` [kg] times the remaining acceleration, is subtracted, and counts with the `error` [kg] of the mass.
     The relative swing is the standard deviation of the velocity over the velocity.
     """
-    return (
-        stretch.velocity,
-        stretch.force.value - mass * stretch.acceleration,
-        float(np.hypot(t_value(stretch.force.freedom) * stretch.force.error, error * stretch.acceleration)),
-        stretch.swing / abs(stretch.velocity),
-    )
+    force, velocity = stretch.force, stretch.velocity
+    half = float(np.hypot(t_value(force.freedom) * force.error, error * stretch.acceleration))
+    return velocity, force.value - mass * stretch.acceleration, half, stretch.swing / abs(velocity)
 
 
 def _together(
@@ -207,8 +204,7 @@ def _nothing(reason: str) -> Direction:
     """Return undetermined friction for a direction; each estimate states the `reason`."""
     units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
     unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
-    coulomb, viscous, static, velocity, exponent = unknown
-    return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
+    return Direction(*unknown, np.empty((0, 0)))
 
 
 def _direction(
@@ -228,14 +224,15 @@ def _direction(
         return _one_speed(speeds, friction, method, spent)
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
-    names = (("friction.coulomb", "N"), ("friction.viscous", "N s/m"))
-    coulomb, viscous = (_fitted(*name, i, solution, covariance, freedom, method) for i, name in enumerate(names))
+    level, slope = map(Mean, map(float, solution), np.sqrt(np.diag(covariance)).tolist(), [freedom] * 2)
+    coulomb = by_t("friction.coulomb", "N", level, method)
+    viscous = by_t("friction.viscous", "N s/m", slope, method)
     low, high = speeds.min() * 1e3, speeds.max() * 1e3
     if coulomb.determined and coulomb.low <= 0:
         ends = "with none, within its error" if coulomb.high > 0 else "below zero, as that of no bearing does"
         reason = f"a straight line from {low:.3g} to {high:.3g} mm/s ends at rest {ends}"
         nothing, most = _nothing(reason), max(coulomb.high, 0.0)
-        coulomb = Estimate.unknown(coulomb.name, "N", method, reason, 0.0, most)
+        coulomb = coulomb.withheld(reason, 0.0, most)
         return replace(nothing, coulomb=coulomb, viscous=viscous if most else nothing.viscous)
     if distinct(speeds) < settings.speeds_of_a_line:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
@@ -280,16 +277,8 @@ def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Directi
 
     By a Stribeck effect, a straight line through the forces then has too high an intercept and too low a slope.
     """
-    high = Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high)
-    low = Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low)
+    high, low = coulomb.withheld(reason, high=coulomb.high), viscous.withheld(reason, low=viscous.low)
     return replace(_nothing(reason), coulomb=high, viscous=low)
-
-
-def _fitted(
-    name: str, unit: str, place: int, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
-) -> Estimate:
-    """Make the estimate of one number of a linear fit, at index `place` of its `solution`."""
-    return by_t(name, unit, Mean(float(solution[place]), float(covariance[place, place] ** 0.5), freedom), method)
 
 
 def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:

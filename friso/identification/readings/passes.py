@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import detrend
 
+from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import Mean, block_mean, channel, low_pass, on_bearing, rate, robust, runs
+from friso.identification.readings.common import Mean, block_mean, channel, low_pass, on_bearing, rate, robust
 from friso.identification.readings.settings import settings
 
 
@@ -31,9 +32,9 @@ class Pass:
     @property
     def steady(self) -> bool:
         """Tell whether the velocity hardly swings, neither slowly nor fast."""
-        return self.swing <= settings.swing_of_a_steady_pass * abs(
-            self.velocity
-        ) and self.quick_swing <= settings.quick_swing_of_a_steady_pass * abs(self.velocity)
+        speed = abs(self.velocity)
+        quick = self.quick_swing > settings.quick_swing_of_a_steady_pass * speed
+        return self.swing <= settings.swing_of_a_steady_pass * speed and not quick
 
 
 def passes(log: Log) -> tuple[Pass, ...]:
@@ -115,12 +116,8 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
     noise, top = 5 * robust(np.gradient(smooth, sample_time)), float(speed.max())
     gentle = settings.acceleration_of_a_constant_speed * float(np.percentile(acceleration, 99.5))
     moving = speed > max(settings.speed_share_of_creeping * top, 8 * robust(velocity - smooth))
-    even = moving & (
-        acceleration
-        <= np.maximum(
-            np.minimum(gentle, settings.change_of_a_kept_velocity * settings.low_pass_of_passes * speed), noise
-        )
-    )
+    kept_velocity = settings.change_of_a_kept_velocity * settings.low_pass_of_passes * speed
+    even = moving & (acceleration <= np.maximum(np.minimum(gentle, kept_velocity), noise))
     swinging = moving & (speed > settings.speed_share_of_settling * top) & (acceleration <= max(gentle, noise))
     kept = _trimmed(even, sample_time, 0.0)
     others = _trimmed(swinging, sample_time, 0.0)
@@ -134,10 +131,8 @@ def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
     Both ends are cut by the filter's settling time, and the start by a further fraction, `share`, for the axis to
     settle.
     """
-    edge, least = (
-        int(1 / (settings.low_pass_of_passes * sample_time)),
-        max(int(settings.time_of_a_pass / sample_time), settings.samples_of_a_pass),
-    )
+    edge = int(1 / (settings.low_pass_of_passes * sample_time))
+    least = max(int(settings.time_of_a_pass / sample_time), settings.samples_of_a_pass)
     stretches = []
     for run in runs(mask):
         begin, end = run.start + edge + int(share * (run.stop - run.start)), run.stop - edge
@@ -177,9 +172,8 @@ def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> floa
     window = np.hanning(len(position))
     lines = np.abs(np.fft.rfft(detrend(position) * window)) ** 2 * 2 / (len(position) * np.sum(window**2))
     frequency = np.fft.rfftfreq(len(position), sample_time)
-    above = frequency > settings.low_pass_of_passes + 2 / (
-        len(position) * sample_time
-    )  # separate the lines by half a main lobe of the window
+    lobe = 2 / (len(position) * sample_time)  # half a main lobe of the window, to separate the lines
+    above = frequency > settings.low_pass_of_passes + lobe
     if not above.any():
         return 0.0
     power = np.where(above & (lines > settings.power_of_a_clear_line * np.median(lines[above])), lines, 0.0)

@@ -73,19 +73,11 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
     forces leave all exponents possible.
     """
     speeds = forces.speeds
-    velocities = np.geomspace(
-        speeds.min() / reading_settings.ratio_below_the_slowest,
-        speeds.max() * reading_settings.ratio_above_the_fastest,
-        reading_settings.grid_of_velocities,
-    )
-    shapes, left = (
-        np.linspace(
-            output_error_settings.stribeck_exponents[0],
-            output_error_settings.stribeck_exponents[1],
-            reading_settings.grid_of_exponents,
-        ),
-        len(speeds) - 5 - forces.both,
-    )
+    low = speeds.min() / reading_settings.ratio_below_the_slowest
+    high = speeds.max() * reading_settings.ratio_above_the_fastest
+    velocities = np.geomspace(low, high, reading_settings.grid_of_velocities)
+    shapes = np.linspace(*output_error_settings.stribeck_exponents, reading_settings.grid_of_exponents)
+    left = len(speeds) - 5 - forces.both
     apart = left < 1
     left += apart
     if left < 1:
@@ -99,11 +91,9 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
         if not refuted:
             grid, left = stated, left + (not apart)
     free = len(grid.shapes) > 1 and not apart
-    usual = (
-        _Grid(forces, velocities, np.array([reading_settings.usual_exponent]), False).around(left + free)
-        if free
-        else grid
-    )
+    usual = grid
+    if free:
+        usual = _Grid(forces, velocities, np.array([reading_settings.usual_exponent]), False).around(left + free)
     if not (_better(plain, grid.least, 2 + free, left) or _better(plain, usual.least, 2, left + free)):
         return None
     return grid.curve(left, refuted, (velocities[0], velocities[-1]))
@@ -115,10 +105,10 @@ def _better(plain: float, least: float, more: int, left: int) -> bool:
     `plain` and `least` are the sums of squares of line and curve. The curve has `more` parameters than the line, and
     leaves `left` degrees of freedom.
     """
-    return least < plain and (
-        least == 0
-        or bool(fisher.sf((plain - least) / more * left / least, more, left) < reading_settings.chance_of_a_curve)
-    )
+    if not 0 < least < plain:
+        return least < plain
+    chance = fisher.sf((plain - least) / more * left / least, more, left)
+    return bool(chance < reading_settings.chance_of_a_curve)
 
 
 class _Grid:
@@ -158,21 +148,13 @@ class _Grid:
         """
         grid = self
         for _ in range(reading_settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
-            inside, ends = grid.room(left) >= 0, []
+            inside, ends, margin = grid.room(left) >= 0, [], reading_settings.margin_of_the_grid
             for points, here in ((grid.velocities, inside.any(axis=1)), (grid.shapes, inside.any(axis=0))):
                 at = np.flatnonzero(here)
-                ends += [
-                    points[max(at[0] - reading_settings.margin_of_the_grid, 0)],
-                    points[min(at[-1] + reading_settings.margin_of_the_grid, len(points) - 1)],
-                ]
-            shapes = (
-                np.linspace(ends[2], ends[3], reading_settings.grid_of_exponents)
-                if len(grid.shapes) > 1
-                else grid.shapes
-            )
-            grid = _Grid(
-                grid.forces, np.geomspace(ends[0], ends[1], reading_settings.grid_of_velocities), shapes, grid.apart
-            )
+                ends += [points[max(at[0] - margin, 0)], points[min(at[-1] + margin, len(points) - 1)]]
+            several = np.linspace(ends[2], ends[3], reading_settings.grid_of_exponents)
+            velocities = np.geomspace(ends[0], ends[1], reading_settings.grid_of_velocities)
+            grid = _Grid(grid.forces, velocities, several if len(grid.shapes) > 1 else grid.shapes, grid.apart)
         return grid
 
     def room(self, left: int) -> np.ndarray:

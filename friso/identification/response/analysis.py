@@ -1,9 +1,17 @@
-"""Analyse frequency responses of one machine: lines, modes, two masses, effect of friction."""
+"""Analyse frequency responses of one machine: lines, modes, two masses, effect of friction, and limit cases.
+
+The limit cases of a stage (thesis, Table 1 and Fig. 7) are named in the words of `friso.frequency`. A cart that is
+"stuck" makes friction a spring: a stiffness line at low frequency, and with a free joint the mode of the stage on it. A
+cart that is "sliding" shows the mass line of cart and stage, and with a free joint an antiresonance and a resonance,
+above which the mass line of the stage alone follows. A touched limiter is recognised by its frequencies.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -12,19 +20,23 @@ from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import external
-from friso.identification.response.arbitrary import local_polynomial
 from friso.identification.response.closed_loop import feedback
-from friso.identification.response.departure import Departure, Drag, departure, friction_from_departure
-from friso.identification.response.limit_cases import Visible, visible
-from friso.identification.response.mass_line import StraightLine, mass_lines
+from friso.identification.response.departure import (
+    Departure,
+    Drag,
+    Explanation,
+    departure,
+    explained,
+    friction_from_departure,
+)
+from friso.identification.response.estimators import local_polynomial, multisine
+from friso.identification.response.mass_line import KINDS, StraightLine, mass_lines, straight_lines
 from friso.identification.response.modes import Modes, fit_modes
 from friso.identification.response.one_mass import needs_two
 from friso.identification.response.period import find_periods
-from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
 from friso.identification.response.response import Channels, FrequencyResponse
 from friso.identification.response.settings import settings
-from friso.identification.response.simulated import Explanation, explained
 from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
 
 FrequencyRange = tuple[float, float]
@@ -58,6 +70,36 @@ class Bench:
     warnings: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Realisations:
+    """Logs of one experiment, each a realisation of its excitation.
+
+    `period` [s] is the approximate period of the excitation; None means that it is searched.
+    """
+
+    logs: Sequence[Log]
+    period: float | None
+
+    @cached_property
+    def records(self) -> dict[str, list[ResponseRecord]]:
+        """Return a record for each log, by output: the driven mass, and the other mass if measured in all.
+
+        Returns {} without logs.
+        """
+        outputs = ["position", "cart_position"][: 1 + all("cart_position" in log for log in self.logs)]
+        return {output: [_record(log, output) for log in self.logs] for output in outputs if self.logs}
+
+    def responses(self, which: slice = slice(None)) -> list[FrequencyResponse]:
+        """Estimate the response of each output from the logs `which`."""
+        first = self.logs[which][0]
+        return [_response(records[which], first, output, self.period) for output, records in self.records.items()]
+
+    def single(self, number: int, band: FrequencyRange) -> TwoMass:
+        """Fit the two-mass model to one log, by its number, within a band [Hz]."""
+        driven, *other = self.responses(slice(number, number + 1))
+        return fit_two_mass(driven, other[0] if other else None, band)
+
+
 def analyse(
     logs: Sequence[Log],
     band: FrequencyRange | None = None,
@@ -70,30 +112,29 @@ def analyse(
     of friction); `period` [s] is the approximate period of the excitation (default: searched). Raises InputError if no
     response can be estimated.
     """
-    records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
+    runs = Realisations(logs, period)
+    positions = runs.records.get("position", [])
     if measured is not None:
         driven, other = as_measured(measured), None
     else:
-        driven, other = _clear([_response(of_output, logs[0], output, period) for output, of_output in records.items()])
-    warnings = [text for record in records.get("position", []) if record.reference is None for text in feedback(record)]
-    first = band or (
-        float(max(driven.frequency[0], driven.frequency[-1] * settings.frequency_above_friction)),
-        _top(driven),
-    )
+        driven, other = _clear(runs.responses())
+    warnings = [text for record in positions if record.reference is None for text in feedback(record)]
+    lowest, highest = float(driven.frequency[0]), float(driven.frequency[-1])
+    first = band or (max(lowest, highest * settings.frequency_above_friction), _top(driven))
     model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
     if model and band is None and _below(model, first):
         model = _attempt([], "two masses", fit_two_mass, driven, other, None) or model
     departs = _attempt(warnings, "departure", departure, driven, model.predict) if model else None
     used = band or _above(driven, departs)
     if model and len(logs) > 1:
-        model = _attempt(warnings, "two masses", _of_all, records, logs, driven, other, used, period)
+        model = _attempt(warnings, "two masses", _of_all, runs, driven, other, used)
     if model and band is None and other is None and _below(model, used):
         low = model["antiresonance frequency"].value
         seen = "no antiresonance in" if np.isnan(low) else f"an antiresonance at {low:.3g} Hz, below"
         warnings.append(f"no two masses: {seen} the band of the model, {used[0]:.3g} to {used[1]:.3g} Hz")
         model = None
     upper = driven.between(*used)
-    drag, explanation = _friction(warnings, records.get("position", []), driven, departs, model, period)
+    drag, explanation = _friction(warnings, positions, driven, departs, model, period)
     if model and not needs_two(model, driven, other):
         warnings.append("no two masses: one mass, with viscous friction and a spring to ground, explains the response")
         model = None
@@ -103,29 +144,23 @@ def analyse(
         tuple(logs), driven, other, used,
         _attempt(warnings, "mass lines", mass_lines, upper) or (), modes, model,
         _attempt(warnings, "limit cases", visible, upper, modes), departs, drag, explanation,
-        _left_out(warnings, records, logs, used, period), tuple(dict.fromkeys([*driven.warnings, *warnings])),
+        _left_out(warnings, runs, used), tuple(dict.fromkeys([*driven.warnings, *warnings])),
     )  # fmt: skip
-
-
-def _outputs(logs: Sequence[Log]) -> list[str]:
-    """List the outputs in all logs: the driven mass, and the other mass if measured in all.
-
-    Returns [] without logs.
-    """
-    if not logs:
-        return []
-    return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
     """Convert a response from another instrument; scatter between lines gives its accuracy."""
     output, _, unit = measured.unit.partition("/")
-    unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
-    return FrequencyResponse(
-        measured.frequency, measured.response, np.zeros(lines), unknown, unknown, np.full(lines, 2.0), "measured",
-        Channels("force", unit or "1", "position", output or "1"), measured.coherence,
-        ("the file gives no deviations: the scatter between neighbouring lines stands for them",),
-    )  # fmt: skip
+    return FrequencyResponse.undivided(
+        measured.frequency,
+        measured.response,
+        np.zeros(len(measured.frequency)),
+        2.0,
+        kind="measured",
+        channels=Channels("force", unit or "1", "position", output or "1"),
+        coherence=measured.coherence,
+        warnings=("the file gives no deviations: the scatter between neighbouring lines stands for them",),
+    )
 
 
 def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
@@ -205,31 +240,13 @@ def _top(driven: FrequencyResponse) -> float:
 
 
 def _of_all(
-    records: dict[str, list[ResponseRecord]],
-    logs: Sequence[Log],
-    driven: FrequencyResponse,
-    other: FrequencyResponse | None,
-    band: FrequencyRange,
-    period: float | None,
+    runs: Realisations, driven: FrequencyResponse, other: FrequencyResponse | None, band: FrequencyRange
 ) -> TwoMass:
     """Fit the two-mass model to all realisations, and widen intervals to their scatter.
 
     The scatter is that of fits to single realisations.
     """
-    apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
-    return widened(fit_two_mass(driven, other, band), apart)
-
-
-def _single(
-    records: dict[str, list[ResponseRecord]],
-    logs: Sequence[Log],
-    which: int,
-    band: FrequencyRange,
-    period: float | None,
-) -> TwoMass:
-    """Fit the two-mass model to a single realisation, the one with the index `which` in `logs`."""
-    responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
-    return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
+    return widened(fit_two_mass(driven, other, band), [runs.single(i, band) for i in range(len(runs.logs))])
 
 
 def _friction(
@@ -273,30 +290,106 @@ def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
 
 
 def _left_out(
-    warnings: list[str],
-    records: dict[str, list[ResponseRecord]],
-    logs: Sequence[Log],
-    band: FrequencyRange,
-    period: float | None,
+    warnings: list[str], runs: Realisations, band: FrequencyRange
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
     """Return, for each log, the relative errors with which the model of another log predicts it.
 
     The result is empty for a single log. A log is left out if no model fits the other one; `warnings` get the reason.
     """
-    if len(logs) < 2:
-        return ()
     rows = []
-    for i, log in enumerate(logs):
-        model = _attempt(warnings, "two masses", _single, records, logs, (i + 1) % len(logs), band, period)
+    for i, log in enumerate(runs.logs if len(runs.logs) > 1 else ()):
+        model = _attempt(warnings, "two masses", runs.single, (i + 1) % len(runs.logs), band)
         if model is not None:
-            rows.append((log.name, _errors(model, log, band, period, len(records) > 1)))
+            rows.append((log.name, _errors(model, log, band, runs.period, len(runs.records) > 1)))
     return tuple(rows)
 
 
 def _errors(model: TwoMass, log: Log, band: FrequencyRange, period: float | None, both: bool) -> tuple[float, ...]:
     """Return the relative prediction errors of the driven mass and, with `both`, of the other."""
-    outputs = [("position", True), *([("cart_position", False)] if both else [])]
     return tuple(
-        relative_error(lambda f, c=collocated: model.predict(f, c), _record(log, output), band, period)
-        for output, collocated in outputs
+        relative_error(lambda f, c=output == "position": model.predict(f, c), _record(log, output), band, period)
+        for output in ("position", "cart_position")[: 1 + both]
     )
+
+
+@dataclass(frozen=True)
+class Visible:
+    """Features of a response of a stage on a cart.
+
+    Fields are the straight lines by rising frequency, modes (None: too few lines, or no fit), the `case` of the cart
+    ("stuck", "sliding", or "" if undecided), and a description in words.
+    """
+
+    case: str
+    lines: tuple[StraightLine, ...]
+    modes: Modes | None
+    words: tuple[str, ...]
+
+
+def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
+    """Find the lines and modes of a force-to-position response.
+
+    `modes` are fitted if None.
+    """
+    sign = _sign(response)
+    lines = [line for slope in KINDS for line in straight_lines(response, slope, sign)]
+    ordered = tuple(sorted(lines, key=lambda line: line.low))
+    if modes is None and len(response.frequency) >= 12:
+        modes = fit_modes(response)
+    pairs = _resonances(modes)
+    case = _case(ordered, pairs)
+    resonances = (f"{name} at {value:.4g} Hz" for name, value in pairs.items())
+    return Visible(case, ordered, modes, (*map(_words, ordered), *resonances, _verdict(case, pairs)))
+
+
+def _sign(response: FrequencyResponse) -> float | None:
+    """Return the sign of the widest straight line of a response; None if it has no such line.
+
+    Stiffness, damping and mass lines count. The sign is -1 if the output opposes the input.
+    """
+    lines = [line for slope in KINDS for line in straight_lines(response, slope, None, 1)]
+    return max(lines, key=lambda line: line.octaves).sign if lines else None
+
+
+def _resonances(modes: Modes | None) -> Mapping[str, float]:
+    """Return the frequencies [Hz] of resonances and antiresonances by name, ascending.
+
+    Returns {} if there are no modes.
+    """
+    if modes is None:
+        return {}
+    frequencies = sorted((one for one in modes.estimates if one.unit == "Hz"), key=lambda one: one.value)
+    return {one.name.removesuffix(" frequency"): one.value for one in frequencies}
+
+
+def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
+    """Tell by the lowest straight line whether the cart is "stuck" or "sliding".
+
+    A stiffness line means a stuck cart, a mass or damping line a sliding cart. A line above the first antiresonance, or
+    the first resonance if there is none, says nothing about the cart. Without another line the result is "".
+    """
+    kind = "antiresonance" if any(name.startswith("antiresonance") for name in pairs) else "resonance"
+    first = min((value for name, value in pairs.items() if name.startswith(kind)), default=np.inf)
+    below = [line for line in lines if line.low < first]
+    if not below:
+        return ""
+    return "stuck" if below[0].kind == "stiffness line" else "sliding"
+
+
+def _words(line: StraightLine) -> str:
+    """Return in words which straight line it is, with its value and its range of frequency."""
+    value = line.value
+    text = f"{value.value:.4g} {value.unit} ({value.low:.4g} to {value.high:.4g})"
+    return f"{line.kind} from {line.low:.3g} to {line.high:.3g} Hz: {text}"
+
+
+def _verdict(case: str, pairs: Mapping[str, float]) -> str:
+    """Return in words whether the cart is stuck or sliding, and with which modes of the joint."""
+    kinds = [name.split()[0] for name in pairs]
+    pair = any(a == "antiresonance" and b == "resonance" for a, b in pairwise(kinds))
+    if case == "sliding":
+        return "cart sliding: " + ("free joint, antiresonance and resonance" if pair else "no joint mode is seen")
+    if case == "stuck":
+        spring = "friction or joint as a spring, then a mode" if "resonance" in kinds else "spring alone"
+        return f"cart stuck: {spring}"
+    return "no straight line below the modes: the cart may be stuck or sliding"

@@ -1,4 +1,4 @@
-"""Detect closed loops in records, and compute the measured open loop and its crossovers."""
+"""Detect closed loops in records, and find the crossovers of a measured open loop."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift
-from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
 from friso.quantities import percent
 
@@ -61,19 +61,16 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
     With `direct`, the present sample of the output is no past. Returns the probability (F-test) that the output's past
     does not help, and the fraction of the input's unpredicted part that it explains.
     """
-    target = driven[settings.past_of_the_input :]
-    past = [driven[settings.past_of_the_input - lag : -lag] for lag in range(1, settings.past_of_the_input + 1)]
-    first = int(direct)
-    other = [
-        answer[settings.past_of_the_input - lag : len(answer) - lag]
-        for lag in range(first, settings.past_of_the_output + first)
-    ]
+    own, others, first = settings.past_of_the_input, settings.past_of_the_output, int(direct)
+    target = driven[own:]
+    past = [driven[own - lag : -lag] for lag in range(1, own + 1)]
+    other = [answer[own - lag : len(answer) - lag] for lag in range(first, others + first)]
     before, after = (_residual_power(target, columns) for columns in (past, past + other))
-    free = len(target) - settings.past_of_the_input - settings.past_of_the_output - 1
+    free = len(target) - own - others - 1
     if not after > 0:
         return 1.0, 0.0
-    statistic = (before - after) / settings.past_of_the_output / (after / free)
-    return float(stats.f.sf(statistic, settings.past_of_the_output, free)), float(1 - after / before)
+    statistic = (before - after) / others / (after / free)
+    return float(stats.f.sf(statistic, others, free)), float(1 - after / before)
 
 
 def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
@@ -82,30 +79,6 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
     matrix /= np.linalg.norm(matrix, axis=0)
     residual = target - matrix @ np.linalg.lstsq(matrix, target, rcond=1e-13)[0]
     return float(residual @ residual)
-
-
-def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """Describe where estimates without and with the reference differ beyond their deviations.
-
-    Both responses must have the same spectral lines. The result is empty if they agree.
-    """
-    _same_lines(direct, indirect)
-    weight = 1 / (direct.deviation**2 + indirect.deviation**2)
-    off = np.array_split(weight * (direct.response - indirect.response), settings.bands_of_a_bias)
-    sums = [
-        2 * abs(np.sum(part)) ** 2 / np.sum(scale)
-        for part, scale in zip(off, np.array_split(weight, settings.bands_of_a_bias), strict=True)
-    ]
-    chance = float(stats.chi2.sf(np.sum(sums), 2 * settings.bands_of_a_bias))
-    if chance > 1e-3:
-        return ()
-    return (f"direct and indirect estimates differ (chance {chance:.1g}): the direct one is biased by the loop",)
-
-
-def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> FrequencyResponse:
-    """Return the open loop L = C G, from plant G and controller C (lines,) [input per output]."""
-    loop = plant.times(np.asarray(controller), "loop", plant.channels.input_unit)
-    return FrequencyResponse(**{**vars(loop), "channels": Channels("error", "1", "loop", "1")})
 
 
 def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
@@ -128,18 +101,10 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
             groups.append([])
         groups[-1].append((centre - half, centre, centre + half))
     passages = [passage for group in groups for passage in ([_merged_passage(group)] if len(group) % 2 else group)]
-    method, crossed = "where the open loop passes 0 dB", []
-    for number, (low, centre, high) in enumerate(np.exp(passages).reshape(-1, 3).tolist(), 1):
-        crossed.append(Estimate(f"crossover {number}", "Hz", centre, low, high, method))
-    return tuple(crossed)
+    method, crossed = "where the open loop passes 0 dB", enumerate(np.exp(passages).reshape(-1, 3).tolist(), 1)
+    return tuple(Estimate(f"crossover {n}", "Hz", centre, low, high, method) for n, (low, centre, high) in crossed)
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
     """Merge passages through 1 into one: the middle one's frequency, and the range of all."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
-
-
-def _same_lines(first: FrequencyResponse, second: FrequencyResponse) -> None:
-    """Check that two responses have the same spectral lines. Raises InputError if not."""
-    if not np.array_equal(first.frequency, second.frequency):
-        raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,9 @@ from scipy import stats
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.response.fitting import refined
+from friso.identification.response.estimators import multisine
+from friso.identification.response.fitting import ResponseTarget
+from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
 from friso.intervals import COVERAGE
@@ -45,12 +47,8 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
     """
     frequency = response.frequency
     if len(frequency) < 4 * settings.lines_of_a_window:
-        raise InputError(
-            "response",
-            f"{len(frequency)} lines",
-            f"at least {4 * settings.lines_of_a_window} lines",
-            "a multisine of 100 lines",
-        )
+        least = f"at least {4 * settings.lines_of_a_window} lines"
+        raise InputError("response", f"{len(frequency)} lines", least, "a multisine of 100 lines")
     ratio = response.response / model(frequency)
     weight = 2 * np.abs(response.response) ** 2 / response.scatter() ** 2
     half, ones = len(frequency) // 2, np.ones(settings.lines_of_a_window)
@@ -64,9 +62,8 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
         onset = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
         return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
     last = int(off[-1]) + settings.lines_of_a_window - 1
-    low, high = frequency[last - settings.lines_of_a_window + 1], frequency[last]
-    middle = float(frequency[last - settings.lines_of_a_window // 2])
-    onset = Estimate(name, "Hz", middle, float(low), float(high), method)
+    places = last - settings.lines_of_a_window // 2, last - settings.lines_of_a_window + 1, last
+    onset = Estimate(name, "Hz", *(float(frequency[place]) for place in places), method)
     return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
 
 
@@ -125,7 +122,7 @@ def friction_from_departure(
         return (1 / (np.exp(p[0]) * s**2 + p[1] * s + p[2]))[None]
 
     inertia = float(np.median(1 / np.abs(values[-4:] * s[-4:] ** 2)))
-    fit = refined(model, np.array([np.log(inertia), inertia, 0.0]), values[None], deviation[None])
+    fit = ResponseTarget(model, values[None], deviation[None]).refined(np.array([np.log(inertia), inertia, 0.0]))
     into, out = part.channels.input_unit, part.channels.output_unit
     method = "mass, damper and spring fitted to the response"
     mass = fit.estimate("mass", f"{into} s^2/{out}", method, lambda p: float(np.exp(p[0])), positive=True)
@@ -139,9 +136,8 @@ def friction_from_departure(
         warnings.append("besides friction a spring acts (guide, cable, cogging or friction before sliding)")
     if left > 0.5:
         warnings.append("friction as a damper and a spring leaves more than half of the departure unexplained")
-    return Drag(
-        mass, damping, stiffness, _coulomb(damping, velocity, into), velocity, sign, float(left), tuple(warnings)
-    )
+    coulomb = _coulomb(damping, velocity, into)
+    return Drag(mass, damping, stiffness, coulomb, velocity, sign, float(left), tuple(warnings))
 
 
 def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
@@ -159,3 +155,82 @@ def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
     model = abs(sine / random - 1) * value
     half = float(np.hypot(damping.half_width * random, COVERAGE * model / np.sqrt(3)))
     return Estimate("friction.coulomb", unit, value, max(value - half, 0.0), value + half, method)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A simulation of friction, compared with a measured response that leaves its mass line.
+
+    `responses` are simulated responses by the factor on the recorded input. `left` is the fraction of the departure
+    from the mass line, weighted by the deviations, that the simulation with the recorded input does not explain. It is
+    0 for a full explanation and 1 for none.
+    """
+
+    responses: Mapping[float, FrequencyResponse]
+    left: float
+
+
+def explained(
+    drag: Drag,
+    measured: FrequencyResponse,
+    inputs: Sequence[np.ndarray],
+    sample_time: float,
+    limits: tuple[float, float],
+    factors: Sequence[float] = (0.5, 1.0, 2.0),
+) -> Explanation:
+    """Simulate mass, spring and Coulomb friction of `drag` under each realisation's input.
+
+    One period of each input is simulated, shape (n,). The result is compared with the `measured` response between
+    `limits` [Hz]. The `factors`, of which 1 must be one, show how the response depends on the amplitude. Raises
+    InputError if `drag` has no friction level or 1 is missing.
+    """
+    if not drag.coulomb.value > 0:
+        raise InputError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
+    if 1.0 not in factors:
+        raise InputError("factors", f"{list(factors)}", "factors with 1 among them, the recorded input", "(0.5, 1, 2)")
+    forces = np.concatenate([factor * drag.sign * np.stack(inputs) for factor in factors])
+    spring = max(drag.stiffness.value, 0.0)
+    repeated = np.tile(forces, settings.periods_simulated)
+    positions = slid(repeated, sample_time, drag.mass.value, drag.coulomb.value, spring)[0]
+    settled = slice(4 * forces.shape[1], None)
+    records = [
+        ResponseRecord(drag.sign * force[settled], position[settled], sample_time)
+        for force, position in zip(repeated, positions, strict=True)
+    ]
+    groups = {factor: records[i * len(inputs) : (i + 1) * len(inputs)] for i, factor in enumerate(factors)}
+    responses = {factor: multisine(group, channels=measured.channels) for factor, group in groups.items()}
+    return Explanation(responses, _unexplained(drag, measured.between(*limits), responses[1.0]))
+
+
+def slid(
+    force: np.ndarray, sample_time: float, mass: float, coulomb: float, stiffness: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Simulate a mass [kg] on a spring [N/m] with Coulomb friction [N] under forces [N].
+
+    The mass starts at rest. Returns position [m] and velocity [m/s], with the forces' shape (runs, n). Time stepping
+    treats sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass if it can within the
+    step. The error is of first order in the sample time.
+    """
+    position, velocity = np.zeros(len(force)), np.zeros(len(force))
+    positions, velocities = np.empty_like(force), np.empty_like(force)
+    most = sample_time * coulomb / mass
+    for k in range(force.shape[1]):
+        free = velocity + sample_time / mass * (force[:, k] - stiffness * position)
+        velocity = free - np.clip(free, -most, most)
+        position = position + sample_time * velocity
+        positions[:, k], velocities[:, k] = position, velocity
+    return positions, velocities
+
+
+def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
+    """Return the part of a response's distance from its mass line that a simulation leaves.
+
+    The part is a fraction: 0 if the simulation equals the response, 1 if it does no better than the mass line.
+    """
+    real, imaginary = (
+        np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
+    )
+    line = -drag.sign / (drag.mass.value * (2 * np.pi * measured.frequency) ** 2)
+    weight = 1 / measured.scatter()
+    off = [np.linalg.norm(weight * (measured.response - model)) for model in (real + 1j * imaginary, line)]
+    return float(off[0] / off[1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -12,6 +13,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
+from friso.identification.spread import covariance_of_sum
 
 ResponseModel = Callable[[np.ndarray], np.ndarray]
 """A function from parameters (p,) to complex responses (outputs, lines)."""
@@ -96,76 +98,64 @@ def deviations(response: FrequencyResponse) -> np.ndarray:
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 
 
-def refined(
-    model: ResponseModel,
-    start: np.ndarray,
-    response: np.ndarray,
-    deviation: np.ndarray,
-    lower: np.ndarray | float = -np.inf,
-    upper: np.ndarray | float = np.inf,
-    believed: Mapping[int, tuple[float, float]] = NOTHING,
-) -> ResponseFit:
-    """Fit a model's parameters to responses by least squares, weighted by their deviations.
+@dataclass(frozen=True)
+class ResponseTarget:
+    """Complex responses, (outputs, lines), to which a model is fitted, weighted by their deviations."""
 
-    Responses have the shape (outputs, lines). The errors of one line may be correlated between outputs, and those of
-    neighbouring lines with each other, since a model is never quite right: the covariance is the larger of the plain
-    one, scaled by the residual, and a robust one (Newey, West 1987, doi:10.2307/1913610). `believed` holds prior values
-    and deviations of parameters by index; each counts as one more observation. `lower` and `upper` only keep the fit
-    from diverging.
-    """
-    weight = np.sqrt(2) / deviation
-    places = list(believed)
-    middle, reach = np.array(list(believed.values())).reshape(-1, 2).T
-    lines, count = response.shape[1], 2 * response.size
-    free = max(count - len(start), 1)
+    model: ResponseModel
+    response: np.ndarray
+    deviation: np.ndarray
 
-    def solved(first: np.ndarray, scale: float) -> OptimizeResult:
-        def residuals(parameters: np.ndarray) -> np.ndarray:
-            error = (model(parameters) - response) * weight
-            off = (parameters[places] - middle) / reach * scale
-            return np.concatenate([np.stack([error.real, error.imag], axis=-1).ravel(), off])
+    def misfit(self, parameters: np.ndarray) -> float:
+        """Return the sum of squares of the model's errors in units of the variance."""
+        return float(np.sum(np.abs((self.model(parameters) - self.response) / self.deviation) ** 2))
 
-        limits = (lower, upper)
-        return least_squares(
-            residuals,
-            first,
-            bounds=limits,
-            x_scale="jac",
-            ftol=settings.tolerance_of_a_fit,
-            xtol=settings.tolerance_of_a_fit,
-            max_nfev=200,
-        )
+    def refined(
+        self,
+        start: np.ndarray,
+        lower: np.ndarray | float = -np.inf,
+        upper: np.ndarray | float = np.inf,
+        believed: Mapping[int, tuple[float, float]] = NOTHING,
+    ) -> ResponseFit:
+        """Fit the model's parameters by least squares.
 
-    def reduced(solution: OptimizeResult) -> float:
-        return float(np.sum(solution.fun[:count] ** 2)) / free
+        The errors of one line may be correlated between outputs, and those of neighbouring lines with each other, since
+        a model is never quite right: the covariance is the larger of the plain one, scaled by the residual, and a
+        robust one (Newey, West 1987, doi:10.2307/1913610). `believed` holds prior values and deviations of parameters
+        by index; each counts as one more observation. `lower` and `upper` only keep the fit from diverging.
+        """
+        weight, places = np.sqrt(2) / self.deviation, list(believed)
+        middle, reach = np.array(list(believed.values())).reshape(-1, 2).T
+        (outputs, lines), count = self.response.shape, 2 * self.response.size
+        free, tolerance = max(count - len(start), 1), settings.tolerance_of_a_fit
+        options: Any = {"x_scale": "jac", "ftol": tolerance, "xtol": tolerance, "max_nfev": 200}
 
-    solution = solved(start, 1.0)
-    if places:
-        solution = solved(solution.x, np.sqrt(reduced(solution)))
-    size = np.linalg.norm(solution.jac, axis=0)
-    size[size == 0] = 1.0
-    slopes = solution.jac / size
-    inverse = np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True)
-    plain = inverse * reduced(solution)
-    scores = slopes * solution.fun[:, None]
-    by_line = scores[:count].reshape(response.shape[0], lines, 2, -1).sum(axis=(0, 2))
-    alone = slopes[count:].T @ slopes[count:] * reduced(solution)
-    robust = inverse @ (_long_run(by_line) * (count / free) + alone) @ inverse
-    covariance = _larger(plain, robust) / size[:, None] / size
-    return ResponseFit(solution.x, covariance, reduced(solution) * free, count)
+        def solved(first: np.ndarray, scale: float) -> OptimizeResult:
+            def residuals(parameters: np.ndarray) -> np.ndarray:
+                error = (self.model(parameters) - self.response) * weight
+                off = (parameters[places] - middle) / reach * scale
+                return np.concatenate([np.stack([error.real, error.imag], axis=-1).ravel(), off])
 
+            return least_squares(residuals, first, bounds=(lower, upper), **options)
 
-def _long_run(scores: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores (lines, p) that are correlated over some lines.
+        def reduced(solution: OptimizeResult) -> float:
+            return float(np.sum(solution.fun[:count] ** 2)) / free
 
-    A score is a column of the fit times the residual.
-    """
-    total = scores.T @ scores
-    reach = int(4 * (len(scores) / 100) ** (2 / 9))
-    for lag in range(1, min(reach, len(scores) - 1) + 1):
-        cross = scores[lag:].T @ scores[:-lag]
-        total += (1 - lag / (reach + 1)) * (cross + cross.T)
-    return total
+        solution = solved(start, 1.0)
+        if places:
+            solution = solved(solution.x, np.sqrt(reduced(solution)))
+        size = np.linalg.norm(solution.jac, axis=0)
+        size[size == 0] = 1.0
+        slopes = solution.jac / size
+        inverse = np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True)
+        plain = inverse * reduced(solution)
+        scores = slopes * solution.fun[:, None]
+        by_line = scores[:count].reshape(outputs, lines, 2, -1).sum(axis=(0, 2))
+        alone = slopes[count:].T @ slopes[count:] * reduced(solution)
+        together = covariance_of_sum(by_line, int(4 * (lines / 100) ** (2 / 9)) + 1)
+        robust = inverse @ (together * (count / free) + alone) @ inverse
+        covariance = _larger(plain, robust) / size[:, None] / size
+        return ResponseFit(solution.x, covariance, reduced(solution) * free, count)
 
 
 def _larger(plain: np.ndarray, robust: np.ndarray) -> np.ndarray:

@@ -117,9 +117,8 @@ def _widest(
     """
     signs = (1.0, -1.0) if sign is None else (sign,)
     bands = [(*band, its_sign) for its_sign in signs if (band := _straight(response, slope, its_sign, start, stop))]
-    return (
-        max(bands, key=lambda limits: response.frequency[limits[1]] / response.frequency[limits[0]]) if bands else None
-    )
+    frequency = response.frequency
+    return max(bands, key=lambda limits: frequency[limits[1]] / frequency[limits[0]], default=None)
 
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
@@ -140,12 +139,8 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
     count = last - first + 1
     total, linear, square, turned = sums[:, np.maximum(last + 1, first)] - sums[:, np.minimum(first, last + 1)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        chi = square - linear**2 / total
-        good = (
-            (count >= settings.lines_of_a_band)
-            & (turned == 0)
-            & (chi <= stats.chi2.ppf(0.95, np.maximum(count - 1, 1)))
-        )
+        even = square - linear**2 / total <= stats.chi2.ppf(0.95, np.maximum(count - 1, 1))
+        good = (count >= settings.lines_of_a_band) & (turned == 0) & even
     width = np.where(good, np.log2(frequency[last] / frequency[first]), -1.0)
     i, j = np.unravel_index(np.argmax(width), width.shape)
     if width[i, j] < settings.octaves_of_a_band:
@@ -208,10 +203,8 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
     noise = float(np.sqrt(np.sum(gains**2 * relative**2 / 2)))
     half_width = stats.t.ppf(0.975, free) * scatter if scatter > noise else COVERAGE * noise
     turned = float(np.average(-np.log(np.cos(phase)), weights=weight))
-    half = (
-        float(np.hypot(half_width, np.sum(coefficients[1:] ** 2) / 2)) + max(turned, 0.0) + float(np.median(relative))
-    )
-    return float(coefficients[0]), half, independent
+    bent = float(np.hypot(half_width, np.sum(coefficients[1:] ** 2) / 2))
+    return float(coefficients[0]), bent + max(turned, 0.0) + float(np.median(relative)), independent
 
 
 def _independent(residual: np.ndarray) -> float:
@@ -255,12 +248,10 @@ def _bent(shapes: list[np.ndarray], level: np.ndarray, weight: np.ndarray) -> tu
     columns, coefficients = ones, np.array([np.average(level, weights=weight)])
     straight = squares = float(np.sum(weight * (level - coefficients[0]) ** 2))
     for shape in shapes:
-        columns_tried = np.hstack([ones, shape[:, None]])
-        fitted = np.linalg.solve(
-            columns_tried.T @ (weight[:, None] * columns_tried), columns_tried.T @ (weight * level)
-        )
-        left = float(np.sum(weight * (level - columns_tried @ fitted) ** 2))
-        free = max(_independent(level - columns_tried @ fitted) - 2, 1.0)
+        tried = np.hstack([ones, shape[:, None]])
+        fitted = np.linalg.solve(tried.T @ (weight[:, None] * tried), tried.T @ (weight * level))
+        left = float(np.sum(weight * (level - tried @ fitted) ** 2))
+        free = max(_independent(level - tried @ fitted) - 2, 1.0)
         if left < squares and straight - left > stats.f.ppf(0.99, 1, free) * left / free:
-            columns, coefficients, squares = columns_tried, fitted, left
+            columns, coefficients, squares = tried, fitted, left
     return columns, coefficients

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import reduce
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.response.fitting import ResponseFit, refined
-from friso.identification.response.rational import (
-    RationalShape,
-    Row,
-    bounds,
-    orders,
-    poles_and_zeros,
-    rational,
-    simplest_model,
-)
+from friso.identification.response.fitting import ResponseFit, ResponseTarget
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
 
@@ -29,17 +23,13 @@ METHOD = "rational fit of the response"
 class Modes:
     """A fit of modes over `band` [Hz], with its resonances and antiresonances by frequency.
 
-    Estimates are called "resonance 1 frequency" and so on. `order` says how the number of modes was chosen. `low_level`
-    and `high_level` are the acceleration per input below and above all modes (mass lines), unknown without a rigid
-    body.
+    Estimates are called "resonance 1 frequency" and so on. `order` says how the number of modes was chosen.
     """
 
     shape: RationalShape
     fit: ResponseFit
     scale: float
     estimates: tuple[Estimate, ...]
-    low_level: Estimate
-    high_level: Estimate
     order: str
     band: tuple[float, float]
     warnings: tuple[str, ...]
@@ -69,14 +59,14 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
     rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, settings.modes_at_most)]
     shape, start, *_ = simplest_model(rows)
     low, high = bounds(shape, s)
-    fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
+    target = ResponseTarget(lambda p: rational(p, shape, s)[None], part.response[None], deviation[None])
+    fit = target.refined(start, low, high)
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
-    low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
     warnings = [*_cancelling(fit, shape, scale, limits)]
     if fit.reduced > settings.misfit_of_a_right_model:
         warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
     estimates = _pairs(fit, shape, scale, limits)
-    return Modes(shape, fit, scale, estimates, low_level, high_level, _described(shape, rows), limits, tuple(warnings))
+    return Modes(shape, fit, scale, estimates, _described(shape, rows), limits, tuple(warnings))
 
 
 def _described(shape: RationalShape, rows: list[Row]) -> str:
@@ -137,18 +127,191 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
     return nearest
 
 
-def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
-    """Return the acceleration per input on the mass line below or above all modes.
+@dataclass(frozen=True)
+class RationalShape:
+    """Structure of a rational model: a rigid body or not, modes, and a constant beyond them."""
 
-    `which` is "low" or "high". Below all modes the rigid body alone counts; above, the residues of the modes are added.
-    The level is not determined without a rigid body, or above if modes beyond the band still act.
+    rigid: bool
+    modes: int
+    constant: bool
+
+    @property
+    def nonlinear(self) -> int:
+        """Return the number of nonlinear parameters, which come first.
+
+        Nonlinear parameters are viscous pole and delay, logarithms of frequencies, then logarithms of damping ratios.
+        """
+        return 2 + 2 * self.modes
+
+    @property
+    def words(self) -> str:
+        """Describe the model's structure in words."""
+        parts = [f"{self.modes} mode{'s' if self.modes != 1 else ''}"]
+        parts += ["rigid body"] * self.rigid + ["constant"] * self.constant
+        return " + ".join(parts)
+
+
+class Row(NamedTuple):
+    """A rational model that was tried, with its parameters (p,).
+
+    `bic` is the Bayesian information criterion, and `squares` the sum of squares over variances.
     """
-    unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
-    name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"
-    if not shape.rigid:
-        return Estimate.unknown(name, unit, METHOD, "no rigid body fits the response in this band")
-    if which == "high" and shape.constant:
-        return Estimate.unknown(name, unit, METHOD, "modes beyond the band still act at its upper end")
-    stop = shape.nonlinear + (1 if which == "low" else 1 + shape.modes)
-    factor = (2 * np.pi * scale) ** 2
-    return fit.estimate(name, unit, METHOD, lambda p: factor * float(np.sum(p[shape.nonlinear : stop])))
+
+    shape: RationalShape
+    parameters: np.ndarray
+    bic: float
+    squares: float
+
+
+def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
+    """Fit rational models with 0, 1, ... modes, at most `most`, as long as one more mode helps.
+
+    The models have a `rigid` body or not. They are fitted to `values` with their `deviation` at complex frequencies `s`
+    over a scale, (lines,) each. The last result is the best of these models with a constant added.
+    """
+    rows: list[Row] = []
+    nonlinear = np.zeros(2)
+    for modes in range(most + 1):
+        shape = RationalShape(rigid, modes, False)
+        if modes:
+            nonlinear = _another(nonlinear, shape, s, values, deviation)
+        if rigid or modes:
+            nonlinear = _eliminated(nonlinear, shape, s, values, deviation)
+            rows.append(_completed(nonlinear, shape, s, values, deviation))
+        if len(rows) > 1 and not _better(rows[-1], rows[-2]):
+            break
+    best = simplest_model(rows)
+    shape = RationalShape(rigid, best.shape.modes, True)
+    nonlinear = _eliminated(best.parameters[: shape.nonlinear], shape, s, values, deviation)
+    return [*rows, _completed(nonlinear, shape, s, values, deviation)]
+
+
+def simplest_model(rows: list[Row]) -> Row:
+    """Return the model that wins if models are compared in order of their size.
+
+    A larger model must beat the winner so far clearly.
+    """
+    ordered = sorted(rows, key=lambda row: (len(row.parameters), not row.shape.rigid))
+    best = ordered[0]
+    for row in ordered[1:]:
+        if _better(row, best):
+            best = row
+    return best
+
+
+def _better(larger: Row, smaller: Row) -> bool:
+    """Tell whether a larger model beats a smaller one clearly.
+
+    Its Bayesian criterion and its sum of squares must both be lower by more than the settings ask.
+    """
+    lower = larger.bic < smaller.bic - settings.criterion_of_a_mode
+    return lower and larger.squares < settings.squares_left_by_a_mode * smaller.squares
+
+
+def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
+    """Return the complex responses, (linear, lines), whose weighted sum is the model's response.
+
+    There is one for the rigid body, if the model has one, one for each mode, and 1 for the constant, if it has one. The
+    linear parameters are the weights.
+    """
+    viscous, delay = nonlinear[:2]
+    omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
+    parts = [1 / (s * (s + viscous))[None]] if shape.rigid else []
+    parts.append(1 / (s**2 + 2 * (damping * omega)[:, None] * s + (omega**2)[:, None]))
+    if shape.constant:
+        parts.append(np.ones((1, len(s)), complex))
+    return np.concatenate(parts) * np.exp(-s * delay)
+
+
+def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
+    """Return the response of a rational model, shape (lines,).
+
+    `s`, shape (lines,), is i times the frequency over a reference frequency, without unit.
+    """
+    return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
+
+
+def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the best linear parameters, real, and the weighted residuals.
+
+    Residuals hold all real parts, then all imaginary parts.
+    """
+    weight = np.sqrt(2) / deviation
+    matrix, right = (columns * weight).T, values * weight
+    matrix, right = np.concatenate([matrix.real, matrix.imag]), np.concatenate([right.real, right.imag])
+    sizes = np.linalg.norm(matrix, axis=0)
+    linear = np.linalg.lstsq(matrix / sizes, right, rcond=1e-12)[0] / sizes
+    return linear, matrix @ linear - right
+
+
+def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest value that the fit allows for each parameter.
+
+    Modes lie within an octave of the band, damping ratios between 1e-4 and 2, and delays turn the phase by at most one
+    radian at the highest frequency.
+    """
+    low, high, linear = np.abs(s[0]), np.abs(s[-1]), int(shape.rigid) + shape.modes + int(shape.constant)
+    rest = np.full(linear, np.inf)
+    omega, damping = np.full(shape.modes, np.log(low / 2)), np.full(shape.modes, np.log(1e-4))
+    lower = np.concatenate([[0.0, -1 / high], omega, damping, -rest])
+    upper = np.concatenate([[high, 1 / high], omega + np.log(4 * high / low), damping + np.log(2e4), rest])
+    return lower, upper
+
+
+def _another(
+    nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+) -> np.ndarray:
+    """Add one more mode to the nonlinear parameters, where it improves the fit most."""
+    before = shape.modes - 1
+    best, best_parameters = np.inf, nonlinear
+    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), settings.frequencies_tried):
+        for damping in settings.dampings_tried:
+            start = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
+            left = _linear_parameters(_columns(start, shape, s), values, deviation)[1]
+            if left @ left < best:
+                best, best_parameters = left @ left, start
+    return best_parameters
+
+
+def _eliminated(
+    start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+) -> np.ndarray:
+    """Refine the nonlinear parameters of a model from a start, and return them.
+
+    At each step the linear parameters follow by least squares (Golub, Pereyra 1973).
+    """
+
+    def left(nonlinear: np.ndarray) -> np.ndarray:
+        return _linear_parameters(_columns(nonlinear, shape, s), values, deviation)[1]
+
+    lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
+    options: Any = {"bounds": (lower, upper), "ftol": settings.tolerance_of_a_fit, "max_nfev": 60}
+    return least_squares(left, np.clip(start, lower, upper), **options).x
+
+
+def _completed(
+    nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+) -> Row:
+    """Make the tried model from its nonlinear parameters: all parameters, `bic` and `squares`."""
+    linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
+    parameters = np.concatenate([nonlinear, linear])
+    squares = float(left @ left)
+    return Row(shape, parameters, ResponseFit(parameters, np.zeros((0, 0)), squares, left.size).bic, squares)
+
+
+def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
+    """Return the poles of the modes and the zeros of the response with positive imaginary part.
+
+    Poles and zeros are relative to the scale of s, a reference frequency.
+    """
+    omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
+    linear = parameters[shape.nonlinear :]
+    factors = [np.array([1.0, parameters[0], 0.0])] if shape.rigid else []
+    factors += [np.array([1.0, 2 * z * w, w**2]) for w, z in zip(omega, damping, strict=True)]
+    numerator = np.zeros(1)
+    for number, residue in enumerate(linear):
+        others = [factor for other, factor in enumerate(factors) if other != number]
+        numerator = np.polyadd(numerator, reduce(np.polymul, others, np.array([residue])))
+    zeros = np.roots(numerator)
+    poles = omega * (-damping + 1j * np.sqrt(np.maximum(1 - damping**2, 0.0)))
+    return poles[np.argsort(np.abs(poles))], zeros[zeros.imag > 1e-6 * np.abs(zeros)]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import product
 
 import numpy as np
 from scipy import stats
 
 from friso.identification.response.beyond import COMPLIANCES, HELD, believed, beyond, bounds
-from friso.identification.response.fitting import ResponseFit, deviations, refined
+from friso.identification.response.fitting import ResponseFit, ResponseTarget, deviations
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
 from friso.identification.response.two_mass import TwoMass
@@ -48,15 +49,10 @@ def fit_one_mass(
     values = np.stack([sign * response.response for response, sign in zip(responses, signs, strict=False)])
     deviation = np.stack([deviations(response) for response in responses])
 
-    def model(parameters: np.ndarray) -> np.ndarray:
-        return one_mass(parameters, frequency)
-
-    def misfit(start: np.ndarray) -> float:
-        return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
-
+    target = ResponseTarget(partial(one_mass, frequency=frequency), values, deviation)
     lower, upper = np.array([-np.inf, 0.0, 0.0, *outside[0]]), np.array([np.inf, np.inf, np.inf, *outside[1]])
-    starts = sorted(_starts(values, frequency), key=misfit)[: settings.starts_refined]
-    fits = [refined(model, start, values, deviation, lower, upper, held) for start in starts]
+    starts = sorted(_starts(values, frequency), key=target.misfit)[: settings.starts_refined]
+    fits = [target.refined(start, lower, upper, held) for start in starts]
     return min(fits, key=lambda fit: fit.squares)
 
 

@@ -98,11 +98,8 @@ def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
     """
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]
-    lowest = (
-        (change[inner] <= change[inner - 1])
-        & (change[inner] <= change[inner + 1])
-        & (change[inner] < settings.change_of_a_slip)
-    )
+    here = change[inner]
+    lowest = (here <= change[inner - 1]) & (here <= change[inner + 1]) & (here < settings.change_of_a_slip)
     return [int(lag) for lag in inner[lowest] if change[2 * lag] > settings.growth_of_a_slip * change[lag]]
 
 
@@ -147,6 +144,5 @@ def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
 
 def _not_periodic(problem: str) -> InputError:
     """Build the error for an input that does not repeat."""
-    return InputError(
-        "period", problem, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times"
-    )
+    expected = "an input that repeats at least twice"
+    return InputError("period", problem, expected, "a multisine of 5 s, repeated 20 times")

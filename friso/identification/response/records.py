@@ -62,13 +62,11 @@ def from_log(
     roles = [driving, output] + ([reference] if reference else [])
     for role in roles:
         if role not in log:
-            raise InputError(
-                role, f"a log with {', '.join(log.signals)}", f"a channel for the {role}", f'{role}="Axis1"'
-            )
+            actual = f"a log with {', '.join(log.signals)}"
+            raise InputError(role, actual, f"a channel for the {role}", f'{role}="Axis1"')
     part = log.longest
-    record = ResponseRecord(
-        log[driving][part], log[output][part], log.sample_time, log[reference][part] if reference else None
-    )
+    external = log[reference][part] if reference else None
+    record = ResponseRecord(log[driving][part], log[output][part], log.sample_time, external)
     return record, Channels(driving, log.unit(driving), output, log.unit(output))
 
 
@@ -81,9 +79,8 @@ def _check_signal(name: str, values: np.ndarray, least: int) -> None:
         raise InputError(name, f"{len(values)} samples", f"at least {least}", "20 000 samples")
     bad = int(np.count_nonzero(~np.isfinite(values)))
     if bad:
-        raise InputError(
-            name, f"{bad} samples that are not numbers", "finite samples", "a log cut into segments at gaps"
-        )
+        actual = f"{bad} samples that are not numbers"
+        raise InputError(name, actual, "finite samples", "a log cut into segments at gaps")
     if not np.ptp(values) > 0:
         raise InputError(name, f"a constant signal ({values[0]:g})", "a signal that moves", "a multisine")
 
@@ -118,10 +115,8 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
     if abs(slip) * periods.count > settings.samples_of_a_slip:
-        text = (
-            f"a period has {periods.samples + slip:.7g} samples, because the clocks differ: resampled to whole periods"
-        )
-        warnings = (*warnings, text)
+        text = f"a period has {periods.samples + slip:.7g} samples, because the clocks differ"
+        warnings = (*warnings, f"{text}: resampled to whole periods")
         record = _at_other_rate(record, 1 + slip / periods.samples)
         periods = find_periods(record.driving, periods.samples)
         driving = _harmonics(record.driving, periods)
@@ -136,9 +131,8 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     if len(stationary) < 2:
         raise InputError("period", f"{len(stationary)} period without transient", "at least two", "a longer record")
     frequency = np.arange(1, driven.shape[1] + 1) / (periods.samples * record.sample_time)
-    return Spectra(
-        frequency, driving[stationary].mean(axis=0), driven[stationary], reaction[stationary], excited, warnings
-    )
+    mean = driving[stationary].mean(axis=0)
+    return Spectra(frequency, mean, driven[stationary], reaction[stationary], excited, warnings)
 
 
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
@@ -216,16 +210,14 @@ def _excited(driving: np.ndarray) -> np.ndarray:
     """
     mean = np.abs(driving.mean(axis=0))
     noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean
-    excited = (mean > settings.amplitude_of_an_excited_line * mean.max()) & (
-        mean > settings.deviations_of_an_excited_line * noise
-    )
+    excited = mean > settings.amplitude_of_an_excited_line * mean.max()
+    excited &= mean > settings.deviations_of_an_excited_line * noise
     sizes = np.sort(mean[excited])[::-1]
     if sizes.size > 2:
         steps = sizes[:-1] / sizes[1:]
         cut = int(np.argmax(steps))
-        if steps[cut] > settings.step_between_lines and np.sum(
-            sizes[: cut + 1] ** 2
-        ) > settings.power_of_meant_lines * np.sum(sizes**2):
+        share = np.sum(sizes[: cut + 1] ** 2) / np.sum(sizes**2)
+        if steps[cut] > settings.step_between_lines and share > settings.power_of_meant_lines:
             excited &= mean >= sizes[cut]
     return excited
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from scipy import stats
 
 from friso.errors import InputError
 from friso.identification.response.settings import settings
-
-if TYPE_CHECKING:
-    from control import FrequencyResponseData
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class FrequencyResponse:
     deviation^2 = noise^2 + distortion^2 if both are known, else NaN.
 
     `degrees` is the number of real degrees of freedom behind the deviation. `coherence` is between input and output
-    (None: not known). `kind` is "multisine", "welch", "local polynomial" or "measured". `sample_time` [s] is the
+    (None: not known). `kind` is "multisine", "local polynomial" or "measured". `sample_time` [s] is the
     record's (None: not known).
     """
 
@@ -60,6 +57,19 @@ class FrequencyResponse:
     warnings: tuple[str, ...] = ()
     sample_time: float | None = None
 
+    @classmethod
+    def undivided(
+        cls, frequency: np.ndarray, response: np.ndarray, deviation: np.ndarray, degrees: float, **further: Any
+    ) -> FrequencyResponse:
+        """Make a response whose deviation is not divided into noise and distortion.
+
+        Frequencies [Hz] and all other arrays have the shape (lines,). All lines have equally many `degrees` of freedom.
+        `further` has the other fields.
+        """
+        unknown = np.full(len(frequency), np.nan)
+        freedom = np.full(len(frequency), degrees)
+        return cls(frequency, response, deviation, unknown, unknown, freedom, **further)
+
     def band(self) -> ResponseBand:
         """Return the 95 % intervals of magnitude and phase.
 
@@ -71,32 +81,12 @@ class FrequencyResponse:
             turn = np.where(half < size, np.arcsin(np.minimum(half / size, 1.0)), np.pi)
         return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
 
-    def frd(self) -> FrequencyResponseData:
-        """Convert the response to data for python-control, over frequencies in rad/s."""
-        from control import FrequencyResponseData
-
-        omega = 2 * np.pi * self.frequency
-        return FrequencyResponseData(self.response, omega, inputs=[self.channels.input], outputs=[self.channels.output])
-
-    def times(self, factor: np.ndarray, output: str, output_unit: str) -> FrequencyResponse:
-        """Return the response of another output, by an exact complex `factor` per line, (lines,).
-
-        `output` is the name of the output, in the unit `output_unit`.
-        """
-        size = np.abs(factor)
-        return replace(
-            self,
-            response=self.response * factor,
-            deviation=self.deviation * size,
-            noise=self.noise * size,
-            distortion=self.distortion * size,
-            channels=replace(self.channels, output=output, output_unit=output_unit),
-        )
-
     def accelerations(self) -> FrequencyResponse:
         """Return the response of the acceleration in place of the position: times (i omega)^2."""
-        unit = f"{self.channels.output_unit}/s^2"
-        return self.times(-((2 * np.pi * self.frequency) ** 2), "acceleration", unit)
+        factor = (2 * np.pi * self.frequency) ** 2
+        channels = replace(self.channels, output="acceleration", output_unit=f"{self.channels.output_unit}/s^2")
+        scaled = {name: factor * getattr(self, name) for name in ("deviation", "noise", "distortion")}
+        return replace(self, response=-factor * self.response, channels=channels, **scaled)
 
     def at(self, chosen: np.ndarray) -> FrequencyResponse:
         """Return the response at spectral lines that a mask or their numbers choose."""
@@ -130,9 +120,8 @@ class FrequencyResponse:
             text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
             if self.coherence is not None and self.coherence.size:
                 text += f", coherence at most {np.max(self.coherence):.2g}"
-            expected = (
-                f"a response of {ratio:g} deviations and a coherence of {settings.coherence_of_a_line:g} on some line"
-            )
+            coherence = f"a coherence of {settings.coherence_of_a_line:g}"
+            expected = f"a response of {ratio:g} deviations and {coherence} on some line"
             raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
             return self

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.beyond import COMPLIANCES, DELAY, HELD, believed, beyond, bounds
-from friso.identification.response.fitting import ResponseFit, deviations, refined
+from friso.identification.response.fitting import ResponseFit, ResponseTarget, deviations
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
@@ -129,16 +129,11 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     """
     if not estimate.determined or not all(another.determined and another.half_width > 0 for another in others):
         return estimate
-    values, weights = (
-        np.array([another.value for another in others]),
-        np.array([(COVERAGE / another.half_width) ** 2 for another in others]),
-    )
+    values = np.array([another.value for another in others])
+    weights = np.array([(COVERAGE / another.half_width) ** 2 for another in others])
     off = values - np.average(values, weights=weights)
     ratio = max(float(np.sqrt(np.sum(weights * off**2) / (len(others) - 1))), 1.0)
-    low, high = (
-        estimate.value - ratio * (estimate.value - estimate.low),
-        estimate.value + ratio * (estimate.high - estimate.value),
-    )
+    low, high = (estimate.value + ratio * (end - estimate.value) for end in (estimate.low, estimate.high))
     return replace(estimate, low=low, high=high, method=f"{estimate.method}, scatter of {len(others)} realisations")
 
 
@@ -203,14 +198,10 @@ def _best(
     """
     reach = np.array([FAR] * 3 + [2 * FAR])
 
-    def model(parameters: np.ndarray) -> np.ndarray:
-        return two_masses(parameters, frequency)
-
-    def misfit(start: np.ndarray) -> float:
-        return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
+    target = ResponseTarget(partial(two_masses, frequency=frequency), values, deviation)
 
     def starts() -> Iterator[np.ndarray]:
-        first, second, *_ = sorted(_starts(values, frequency), key=misfit)
+        first, second, *_ = sorted(_starts(values, frequency), key=target.misfit)
         yield first
         yield from (_scaled_to(visible, values[0], frequency) for visible in seen())
         yield second
@@ -219,7 +210,7 @@ def _best(
     for start in starts():
         lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, *outside[0]])
         upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, *outside[1]])
-        fits.append(refined(model, start, values, deviation, lower, upper, held))
+        fits.append(target.refined(start, lower, upper, held))
         if fits[-1].reduced < settings.misfit_of_a_right_model:
             break
     return min(fits, key=lambda fit: fit.squares)

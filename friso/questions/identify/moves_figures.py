@@ -10,9 +10,9 @@ import numpy as np
 from friso.identification.inverse_model import motion
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves
+from friso.identification.output_error.identifiable import Profile
 from friso.identification.output_error.parameters import FitParameter
 from friso.identification.output_error.problem import Simulated
-from friso.identification.output_error.profile import Profile
 from friso.identification.quality import steady_friction
 from friso.identification.readings.common import cart, low_pass, on_bearing
 from friso.identification.settings import identification_settings

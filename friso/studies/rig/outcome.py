@@ -22,7 +22,7 @@ from friso.equations.breakaway import breakaway
 from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import record
-from friso.identification.response.periodic import multisine
+from friso.identification.response.estimators import multisine
 from friso.identification.response.records import ResponseRecord, from_log
 from friso.identification.response.response import Channels, FrequencyResponse
 from friso.stage import Stage

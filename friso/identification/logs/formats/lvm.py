@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.confined import content_by, cut_short, filled_table
 from friso.identification.logs.format import FileHead, LogFormat
-from friso.identification.logs.libraries import content_by, cut_short, filled_table
 from friso.identification.logs.units import split_heading
 
 

@@ -11,9 +11,8 @@ import numpy as np
 from friso.errors import LogError
 from friso.identification.logs.binary import OBJECT, is_hdf5
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.confined import content
+from friso.identification.logs.confined import content, content_by
 from friso.identification.logs.format import FileHead, LogFormat
-from friso.identification.logs.libraries import content_by
 from friso.identification.logs.settings import settings
 from friso.identification.logs.units import split_heading
 
@@ -62,9 +61,7 @@ def _walk(node: Any, name: str, walk: _Contents) -> None:
     """
     if isinstance(node, dict) and OBJECT in node:
         walk.objects.append(f"{name} ({node[OBJECT]})")
-    elif (
-        isinstance(node, dict) and {"X", "Y"} <= set(node) and any("Data" in curve for curve in _structures(node["Y"]))
-    ):
+    elif isinstance(node, dict) and any("Data" in curve for curve in _structures(node.get("Y")) if "X" in node):
         walk.channels += _dspace(node, name)
     elif isinstance(node, dict) and {"time", "signals"} <= set(node):
         walk.channels += _with_time(node, name, walk)
@@ -130,9 +127,8 @@ def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel
         if time.ndim != 1 or values.ndim not in (1, 2) or values.shape[0] != time.size:
             walk.notes.append(f"left out: {source}, {values.shape} values for {time.size} time stamps")
             continue
-        heading, unit = split_heading(
-            _text(curve.get("label")) or _text(curve.get("blockName")).rpartition("/")[2] or source
-        )
+        block = _text(curve.get("blockName")).rpartition("/")[2]
+        heading, unit = split_heading(_text(curve.get("label")) or block or source)
         columns = values.reshape(time.size, -1).T
         named = [part.strip() for part in heading.split(",")]  # several signals share one line of the Simulink model
         for k, column in enumerate(columns):

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.confined import content_by, filled_table
 from friso.identification.logs.format import LogFormat
-from friso.identification.logs.libraries import content_by, filled_table
 from friso.identification.logs.units import split_heading
 
 

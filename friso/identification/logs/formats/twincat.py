@@ -57,9 +57,8 @@ def read_twincat(path: Path) -> ChannelTable:
     if first is None or names_at is None:
         raise LogError("log", "a TwinCAT Scope export without rows of numbers", "an export with data", "", str(path))
     table = {cells[0]: cells for cells in rows[names_at:first] if cells and cells[0]}
-    sample = ";".join(
-        cell for cells in rows[names_at:] for cell in cells if is_number(cell, ",") or is_number(cell, ".")
-    )
+    below = (cell for cells in rows[names_at:] for cell in cells)
+    sample = ";".join(cell for cell in below if is_number(cell, ",") or is_number(cell, "."))
     decimal = "," if delimiter != "," and "," in sample else "."
     if delimiter != "," and decimal == "." and "." not in sample:
         decimal = ","  # whole numbers only so far: the export's locale writes a comma unless a point shows
@@ -97,9 +96,7 @@ def _channels(
     labels, notes, out = table["Name"], [], []
     clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
     times = [_floats(path, form, frame, start) for start in clocks]
-    times = [
-        time[: int(np.flatnonzero(~np.isnan(time))[-1]) + 1] if not np.isnan(time).all() else time[:0] for time in times
-    ]
+    times = [time[: int(np.flatnonzero(~np.isnan(time)).max(initial=-1)) + 1] for time in times]
     _no_shifted_rows(path, form, frame, times)
     for start, end, time in zip(clocks, [*clocks[1:], len(labels)], times, strict=True):
         if not time.size:

@@ -11,7 +11,7 @@ from friso.axis import axis_shown, unit_shown
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
-from friso.identification.output_error.profile import Profile
+from friso.identification.output_error.identifiable import Profile
 from friso.identification.output_error.settings import settings
 from friso.quantities import percent
 from friso.questions.identify.estimates import ends_document

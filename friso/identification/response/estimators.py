@@ -1,8 +1,8 @@
-"""Estimate responses from periodic excitation, with noise and distortion separated.
+"""Estimate responses from periodic excitation, with noise and distortion separated, and from any other.
 
-The robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4: noise differs from period to
-period, nonlinear distortion from one random-phase realisation to another. With an external reference (closed loop,
-indirect) both spectra are taken relative to it, which makes them comparable.
+For periodic excitation, the robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4:
+noise differs from period to period, nonlinear distortion from one random-phase realisation to another. With an external
+reference (closed loop, indirect) both spectra are taken relative to it, which makes them comparable.
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ def multisine(
     spectra_of_records, remarks = _together([spectra(record, period) for record in records])
     excited = np.logical_and.reduce([realisation.excited for realisation in spectra_of_records])
     if not excited.any():
-        raise InputError(
-            "records", "realisations without a common line", "the same excited lines", "one period for all"
-        )
+        actual = "realisations without a common line"
+        raise InputError("records", actual, "the same excited lines", "one period for all")
     response, noise = _averaged(spectra_of_records, excited)
     degrees = np.full(response.shape, 2.0 * sum(len(realisation.input) - 1 for realisation in spectra_of_records))
     if len(spectra_of_records) > 1:
@@ -47,21 +46,9 @@ def multisine(
     warnings = dict.fromkeys([*remarks, *(text for realisation in spectra_of_records for text in realisation.warnings)])
     if not distortion_known:
         warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
-    frequency = spectra_of_records[0].frequency[excited]
-    known_channels = channels or Channels()
-    return FrequencyResponse(
-        frequency,
-        response,
-        deviation,
-        noise,
-        distortion,
-        degrees,
-        "multisine",
-        known_channels,
-        None,
-        tuple(warnings),
-        records[0].sample_time,
-    )
+    lines = (spectra_of_records[0].frequency[excited], response, deviation, noise, distortion, degrees)
+    origin = {"channels": channels or Channels(), "warnings": tuple(warnings), "sample_time": records[0].sample_time}
+    return FrequencyResponse(*lines, "multisine", **origin)
 
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
@@ -102,10 +89,8 @@ def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
     response = outputs.mean(axis=0) / gain
     variance = np.zeros(len(response))
     for realisation in records:
-        residuals = (realisation.output[:, excited] - response * realisation.input[:, excited]) / realisation.reference[
-            excited
-        ]
-        variance += np.var(residuals, axis=0, ddof=1) / len(residuals)
+        left = realisation.output[:, excited] - response * realisation.input[:, excited]
+        variance += np.var(left / realisation.reference[excited], axis=0, ddof=1) / len(left)
     return response, np.sqrt(variance) / (len(records) * np.abs(gain))
 
 
@@ -114,9 +99,11 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
     Both are averaged over periods.
     """
-    outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
-    inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
-    return np.array(outputs), np.array(inputs)
+    outputs, inputs = (
+        np.array([getattr(one, name)[:, excited].mean(axis=0) / one.reference[excited] for one in records])
+        for name in ("output", "input")
+    )
+    return outputs, inputs
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -152,3 +139,49 @@ def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarr
     near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[: settings.lines_sharing_variance]
     local = np.maximum(power[near].mean(axis=0), 0.0)
     return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])
+
+
+def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
+    """Estimate a response by the local polynomial method, free of leakage.
+
+    The method is that of Pintelon, Schoukens, 2nd ed., ch. 7: about every line, response and transient are polynomials
+    of order 2 in the frequency over 17 lines of the spectrum of the whole record; the residual is the noise. One line
+    in 9 is returned, so that neighbours share little. With a reference the method is indirect, which a closed loop
+    requires: the response is the ratio of the responses of output and input to the reference. Raises InputError for a
+    record of fewer than 200 samples.
+    """
+    record, side = record.checked(200), settings.lines_on_a_side
+    size = len(record.driving)
+    driving, excitation, answer = (
+        np.fft.rfft(channel - channel.mean()) / size for channel in (record.driving, record.input, record.output)
+    )
+    centres = np.arange(1 + side, len(driving) - side - 1, side + 1)
+    around = np.arange(-side, side + 1)
+    strength = np.sqrt(np.mean(np.abs(driving[centres[:, None] + around]) ** 2, axis=1))
+    strong = strength > settings.amplitude_of_a_weak_line * strength.max()
+    centres, scale = centres[strong], strength[strong]
+    window = centres[:, None] + around
+    powers = (around / side)[:, None] ** np.arange(settings.order_of_local_polynomials + 1)
+    regressors = driving[window][:, :, None] * powers / scale[:, None, None]
+    transient = np.broadcast_to(powers, (len(centres), *powers.shape))
+    columns = np.concatenate([regressors, transient], axis=2)
+    q, r = np.linalg.qr(columns)
+    row = np.linalg.inv(r)[:, 0, :]
+    fitted = [np.einsum("kij,ki->kj", q.conj(), quantity[window]) for quantity in (excitation, answer)]
+    gain, output = (np.einsum("kj,kj->k", row, quantity) for quantity in fitted)
+    response = output / gain
+    left = answer[window] - response[:, None] * excitation[window]
+    left = left - np.einsum("kij,kj->ki", q, np.einsum("kij,ki->kj", q.conj(), left))
+    free = window.shape[1] - columns.shape[2]
+    variance = np.sum(np.abs(left) ** 2, axis=1) / free
+    deviation = np.sqrt(variance * np.sum(np.abs(row) ** 2, axis=1)) / np.abs(gain)
+    return FrequencyResponse.undivided(
+        centres / (size * record.sample_time),
+        response,
+        deviation,
+        2.0 * free,
+        kind="local polynomial",
+        channels=channels or Channels(),
+        warnings=("noise and nonlinear distortion cannot be distinguished: the deviation covers both",),
+        sample_time=record.sample_time,
+    )
