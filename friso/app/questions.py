@@ -470,15 +470,10 @@ PICTURES = frozenset({"run", "cell", "loops", "bode", "flexure", "map"})
 """The questions whose first part is a picture that appears soon; all other questions wait for it."""
 
 
-def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRequest, Work], Answer]:
-    """Return a function that answers a command about the machine shown."""
-
-    def answer(asked: PageRequest, work: Work) -> Answer:
-        """Answer the command with the options that the page gave."""
-        options = asked.chosen(*OPTIONS.get(command, ()))
-        return KEPT.answer(function, asked.machine, work, options)
-
-    return answer
+def _answered(command: str, asked: PageRequest, work: Work) -> Answer:
+    """Answer a command about the machine shown, with the options that the page gave."""
+    options = asked.chosen(*OPTIONS.get(command, ()))
+    return KEPT.answer(getattr(friso, command), asked.machine, work, options)
 
 
 def _mapped(asked: PageRequest, work: Work) -> Answer:
@@ -493,14 +488,11 @@ def _mapped(asked: PageRequest, work: Work) -> Answer:
 
 
 COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
-    "simulate": _answered(friso.simulate, "simulate"),
-    "check": _answered(friso.check, "check"),
-    "bode": _answered(friso.bode, "bode"),
-    "flexure": _answered(friso.flexure, "flexure"),
-    "boundary": _answered(friso.boundary, "boundary"),
+    **{
+        name: partial(_answered, name)
+        for name in ("simulate", "check", "bode", "flexure", "boundary", "tune", "design")
+    },
     "map": _mapped,
-    "tune": _answered(friso.tune, "tune"),
-    "design": _answered(friso.design, "design"),
     "logs": _looked_into,
     "identify": _identified,
 }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from friso.axis import axis_shown
 from friso.hunting.measures import BANDS as SETTLING_BANDS
-from friso.shown.drawing.figure import BLUE, GREEN, VERMILLION
+from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
 
 if TYPE_CHECKING:
     from friso.hunting import Case

@@ -21,6 +21,7 @@ from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.images import ON_PAGE, draw_beforehand, image
 from friso.shown.drawing.prefixes import listed
+from friso.shown.files import Content, Files, pictures
 from friso.shown.glossary import Glossary
 from friso.stage.foreign import foreign
 from friso.version import VERSION
@@ -85,6 +86,14 @@ class Report:
             return cls(command, name, figures, templates=templates, values=values)
         about = (stage.to_toml(), stage.source)
         return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
+
+    def files(self, beside: Files = MappingProxyType({})) -> dict[str, Content]:
+        """Return the page, files `beside` it, and every figure in all formats, by file name.
+
+        The page has the name of the command's question.
+        """
+        images = pictures(self.figures)  # other processes draw them while the page is written
+        return {f"{self.command.partition(' ')[0]}.html": self.html(), **beside, **images}
 
     def html(self) -> str:
         """Return the page, which opens offline and prints; every run gives the same bytes."""

@@ -11,7 +11,8 @@ from friso.frequency.bode import Bode
 from friso.frequency.cascaded import CascadeLoop
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
-from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash
+from friso.shown.drawing.figure import Dash
+from friso.shown.drawing.palette import BLUE, GREY, ORANGE, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 
 SERIES = "-series"

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.hunting import Diagram, Meeting, Plane
 from friso.questions.boundary.words import ShownKey, conclusion
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 from friso.studies.boundary_lines import (
     Line,
     corner_verdicts,
@@ -31,8 +31,7 @@ def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
     branches = lines(traced)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {
-        "key": key.key,
-        "unit": key.unit,
+        **entries(key, "key", "unit"),
         "points": sorted(points, key=lambda point: point["value"]),
         "ends": dict(zip(("low", "high"), end_verdicts(traced), strict=True)),
         "branches": [_branch(line, key) for line in branches],
@@ -70,8 +69,8 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     x, y = keys
     verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
     return {
-        "x": {"key": x.key, "unit": x.unit},
-        "y": {"key": y.key, "unit": y.unit},
+        "x": entries(x, "key", "unit"),
+        "y": entries(y, "key", "unit"),
         "curves": [_curve(line, keys) for line in lines(traced)],
         "ends": [
             {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind} for end in curve_ends(traced)
@@ -85,7 +84,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
 def _meeting(meeting: Meeting, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     """Return where and how two curves meet, and whether both are changes of one cycle."""
     return {
-        "curves": list(meeting.curves),
+        "curves": meeting.curves,
         "how": meeting.kind,
         "places": _numbers(meeting.places, keys),
         "error": _numbers(meeting.error[None], keys)[0],
@@ -100,9 +99,7 @@ def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
         "cycle": line.shape,
         "points": _numbers(line.at, keys),
         "error": _numbers(line.error, keys),
-        "amplitude_m": line.amplitude.tolist(),
-        "period_s": line.period.tolist(),
-        "ends": line.ends,
+        **entries(line, "amplitude_m", "period_s", "ends"),
     }
 
 

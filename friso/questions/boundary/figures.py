@@ -10,24 +10,8 @@ import numpy as np
 from friso.hunting import Diagram, KeyRange, Plane
 from friso.questions.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, end_sentence
 from friso.questions.map.words import QUIET, quantity
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    LIGHT,
-    VERMILLION,
-    Axis,
-    Category,
-    Cloud,
-    Dash,
-    Figure,
-    Limit,
-    Markers,
-    Panel,
-    Series,
-    Symbol,
-)
+from friso.shown.drawing.figure import Axis, Category, Cloud, Dash, Figure, Limit, Markers, Panel, Series, Symbol
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, LIGHT, VERMILLION
 from friso.studies.boundary_lines import (
     ATTRACTS,
     INVALID,

@@ -10,7 +10,8 @@ import numpy as np
 from friso.equations.motion import last_corner
 from friso.questions.check.traces import common_range, samples, subject, trace_of
 from friso.shown.cases import ShownCase
-from friso.shown.drawing.figure import GREY, INK, Array, Axis, Band, Dash, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import GREY, INK
 
 if TYPE_CHECKING:
     from friso.hunting import Cycle

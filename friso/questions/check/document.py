@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.questions.check.laws import laws_document
 from friso.questions.check.words import answer
-from friso.shown.documents import dwells_document, plain_json, tracking_document, unit_suffix
+from friso.shown.documents import dwells_document, entries, plain_json, tracking_document, unit_suffix
 from friso.stage.tables import passive_where
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
         Swing,
     )
     from friso.remedies.suggestion import Suggestion
-    from friso.shares import Share
     from friso.stage import Stage
     from friso.studies.draws import Draws
     from friso.studies.laws.verdicts import VerdictsByLaw
@@ -83,17 +82,13 @@ def _case(case: Case) -> dict[str, Any]:
     last_1um, last_10um = case.in_the_end.values()
     judgement = case.judgement
     return {
-        "verdict": case.verdict,
-        "peaks": case.peaks,
-        "peak_to_peak_m": case.peak_to_peak,
-        "period_s": case.period,
+        **entries(case, "verdict", "peaks", "peak_to_peak_m", "period_s"),
         "settling_time_s": into_1um,
         "settling_time_10um_s": into_10um,
         "settling_time_in_the_end_s": last_1um,
         "settling_time_10um_in_the_end_s": last_10um,
-        "largest_force_n": case.largest_force,
+        **entries(case, "largest_force_n", "unmoved"),
         "breakaway_force_n": case.breakaway,
-        "unmoved": case.unmoved,
         "cycle": _cycle(judgement.cycle) if judgement.cycle else None,
         "cycles": len(judgement.hunting.cycles),
         "reason": judgement.hunting.reason or None,
@@ -102,13 +97,11 @@ def _case(case: Case) -> dict[str, Any]:
         "windows": _windows(judgement.windows),
         "settles_below": _end(judgement.lower),
         "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
-        "advice_keeps_friction": case.advice_keeps_friction,
-        "slower_keeps_friction": case.slower_keeps_friction,
+        **entries(case, "advice_keeps_friction", "slower_keeps_friction"),
         "kick": _kick(judgement),
         "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
-        "observed": judgement.observed,
-        "given_up": judgement.given_up,
+        **entries(judgement, "observed", "given_up"),
         "loop_unstable_while_it": case.unstable,
         "loop_unstable_bandwidths": _windows(case.unstable_bandwidths),
         **({"loop_unstable_as_built_while_it": case.unstable_as_built} if case.unstable_as_built else {}),
@@ -117,39 +110,19 @@ def _case(case: Case) -> dict[str, Any]:
         **({"tracking": tracking_document(case.tracking)} if case.tracking else {}),
         "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],
         "certain": judgement.hunting.certain,
-        "solver": {
-            "status": case.solver.status,
-            "steps": case.solver.steps,
-            "rejected": case.solver.rejected,
-            "rtol": case.solver.rtol,
-        },
+        "solver": entries(case.solver, "status", "steps", "rejected", "rtol"),
     }
 
 
 def _cycle(cycle: Cycle) -> dict[str, Any]:
     """Return the properties of a hunting cycle."""
-    return {
-        "amplitude_m": cycle.amplitude,
-        "period_s": cycle.period,
-        "swings_per_period": cycle.swings,
-        "multiplier": cycle.multiplier,
-        "symmetric": cycle.symmetric,
-        "attracts": cycle.attracts,
-        "slope": cycle.slope,
-        "growth": cycle.growth,
-        "residual": cycle.residual,
-        "time_constant_s": cycle.time_constant,
-    }
+    names = ("amplitude_m", "period_s", "multiplier", "symmetric", "attracts", "slope", "growth", "residual")
+    return {**entries(cycle, *names, "time_constant_s"), "swings_per_period": cycle.swings}
 
 
 def _swing(swing: Swing) -> dict[str, Any]:
     """Return amplitude and period of a swing that was observed in a run."""
-    return {
-        "amplitude_m": swing.amplitude,
-        "period_s": swing.period,
-        "regular": swing.regular,
-        "swings_per_period": swing.swings,
-    }
+    return {**entries(swing, "amplitude_m", "period_s", "regular"), "swings_per_period": swing.swings}
 
 
 def _kick(judgement: Judgement) -> dict[str, Any] | None:
@@ -171,20 +144,14 @@ def _windows(windows: Iterable[BandwidthWindow]) -> list[dict[str, Any]]:
 
 def _margin(edge: Margin) -> dict[str, Any]:
     """Return how far the bandwidth is from the edge of hunting, for the document."""
-    crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
-    return {**crossover, "settles_at_factor": edge.quiet, "reserve": edge.reserve}
+    return {**entries(edge, "factor", "crossover_hz", "certain", "reserve"), "settles_at_factor": edge.quiet}
 
 
 def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
     """Return one end of the bandwidths at which hunting attracts; None if there is no end."""
     if end is None:
         return None
-    return {
-        "factor": end.inside,
-        "settles_at_factor": end.outside,
-        "certain": end.certain,
-        "reserve": end.reserve,
-    }
+    return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve")}
 
 
 def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
@@ -226,8 +193,8 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "count": draws.sample.count,
         "seed": draws.seed,
         "left_out": draws.sample.left_out,
-        "hunts": _share_document(fates.share(("hunts",))),
-        "attracting_cycle": _share_document(fates.share(ATTRACTED)),
+        "hunts": asdict(fates.share(("hunts",))),
+        "attracting_cycle": asdict(fates.share(ATTRACTED)),
         "criterion": VERDICT_CRITERION,
         "verdicts": fates.counts,
         "loop_unstable": int(fates.unstable.sum()),
@@ -242,8 +209,3 @@ def _ends(values: np.ndarray) -> list[float] | None:
     """Return the least and the largest finite value; None if no value is finite."""
     finite = values[np.isfinite(values)]
     return [float(finite.min()), float(finite.max())] if finite.size else None
-
-
-def _share_document(share: Share) -> dict[str, float]:
-    """Return a probability with its confidence interval."""
-    return {"probability": share.probability, "low": share.low, "high": share.high}

@@ -5,8 +5,6 @@ Every run of the command gives the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from friso.quantities import percent
 from friso.questions.compare.figures import compare_figures
 from friso.questions.compare.words import (
@@ -19,8 +17,7 @@ from friso.questions.compare.words import (
     population,
     table_rows,
 )
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR
 from friso.studies.compare.study import LONGER, Comparison
@@ -28,17 +25,10 @@ from friso.studies.compare.study import LONGER, Comparison
 
 def compare_files(comparison: Comparison) -> dict[str, Content]:
     """Return the page, and every figure in all formats."""
-    figures = compare_figures(comparison)
-    images = pictures(figures)
-    return {"compare.html": page(comparison, figures), **images}
-
-
-def page(comparison: Comparison, figures: Sequence[Figure]) -> str:
-    """Return the page with its figures."""
     return Report.of_stage(
         "compare",
         comparison.stage,
-        figures,
+        compare_figures(comparison),
         sentences=answer(comparison),
         details=details(comparison),
         population=population(comparison),
@@ -54,4 +44,4 @@ def page(comparison: Comparison, figures: Sequence[Figure]) -> str:
         ),
         longer=LONGER,
         shaken=comparison.shaken,
-    ).html()
+    ).files()

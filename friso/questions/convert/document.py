@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from friso.questions.convert.words import SHOWN, sentences
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 
 if TYPE_CHECKING:
     from friso.studies.laws.conversion import LawConversion
@@ -29,12 +29,11 @@ def convert_document(conversion: LawConversion) -> dict[str, Any]:
                     "amplitude_m": item.amplitude,
                     f"before_{SUFFIXES[item.unit]}": item.before,
                     f"after_{SUFFIXES[item.unit]}": item.after,
-                    "off": item.off,
-                    "kept": item.kept,
+                    **entries(item, "off", "kept"),
                 }
                 for item in conversion.compared
             ],
-            "open": {key: list(ends) for key, ends in conversion.open.items()},
+            "open": conversion.open,
             "stiffness_range_n_per_m": [*conversion.points.stiffness] if conversion.points else None,
             "scatter_n": conversion.points.scatter if conversion.points else None,
             "passive": not conversion.active,

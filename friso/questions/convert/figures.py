@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.frequency.friction import steady_force
-from friso.shown.drawing.figure import BLUE, GREY, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREY, VERMILLION
 
 if TYPE_CHECKING:
     from friso.studies.laws.conversion import LawConversion

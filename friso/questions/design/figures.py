@@ -18,24 +18,8 @@ from friso.questions.flexure.modes import modes_figure
 from friso.questions.flexure.table import newtons_per
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.drawable import cell_edges
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    VERMILLION,
-    Array,
-    Axis,
-    Category,
-    Dash,
-    Figure,
-    Limit,
-    Map,
-    Markers,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Array, Axis, Category, Dash, Figure, Limit, Map, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import listed
 
 CHOSEN = "#e3001b"

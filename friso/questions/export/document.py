@@ -6,7 +6,7 @@ from typing import Any
 
 from friso.drives.gains import Gains
 from friso.questions.export.words import notes
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 
 
 def export_document(gains: Gains) -> dict[str, Any]:
@@ -20,8 +20,7 @@ def export_document(gains: Gains) -> dict[str, Any]:
             "structure": gains.diagram.splitlines(),
             "gains": [
                 {
-                    "name": row.name,
-                    "symbol": row.symbol,
+                    **entries(row, "name", "symbol"),
                     "values": [{"value": value, "unit": unit} for value, unit in row.values],
                 }
                 for row in gains.conversions

@@ -11,7 +11,8 @@ from scipy.interpolate import CubicSpline
 from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels
 from friso.leaf_springs.evaluation import Evaluation
 from friso.questions.flexure.modes import modes_figure
-from friso.shown.drawing.figure import BLUE, GREY, ORANGE, Array, Axis, Dash, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Array, Axis, Dash, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREY, ORANGE
 
 COLOURS = {BEAMS: BLUE, CLOSED: ORANGE}
 DASHES: dict[str, Dash] = {CLOSED: "dashed"}

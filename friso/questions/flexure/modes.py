@@ -13,7 +13,8 @@ from scipy.interpolate import CubicSpline
 from friso.leaf_springs.evaluation import Evaluation, Mode
 from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.flexure.layout import block_size
-from friso.shown.drawing.figure import BLUE, LIGHT, VERMILLION, Array, Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import Array, Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, LIGHT, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 
 SHOWN = 8

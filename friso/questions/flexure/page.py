@@ -5,7 +5,6 @@ Every run of the command gives the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from markupsafe import Markup
@@ -16,8 +15,8 @@ from friso.questions.flexure.drawing import drawing_svg
 from friso.questions.flexure.figures import COLOURS, flexure_figures
 from friso.questions.flexure.table import rows
 from friso.questions.flexure.words import assumptions, findings, warnings
-from friso.shown.drawing.figure import GREEN, VERMILLION, Figure
-from friso.shown.files import Content, pictures
+from friso.shown.drawing.palette import GREEN, VERMILLION
+from friso.shown.files import Content
 from friso.shown.pages import Report
 
 
@@ -38,32 +37,22 @@ BASIS = (
 
 def flexure_files(flexure: BothModels) -> dict[str, Content]:
     """Return the page, the drawing, and every figure in all formats."""
-    figures = flexure_figures(flexure)
-    images = pictures(figures)
-    return {
-        "flexure.html": flexure_html(flexure, figures),
-        "flexure_drawing.svg": drawing(flexure),
-        **images,
-    }
-
-
-def flexure_html(flexure: BothModels, figures: Sequence[Figure]) -> str:
-    """Return the page of a mechanism with its figures."""
+    drawing = Markup(_drawing(flexure))
     joint, *further = findings(flexure)
     return Report.of_stage(
         "flexure",
         flexure.stage,
-        figures,
+        flexure_figures(flexure),
         verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(flexure))],
         sentences=[*further, *assumptions(flexure.stage)],
-        drawing=Markup(drawing(flexure)),
+        drawing=drawing,
         columns=[Column(name, COLOURS[name]) for name in flexure.models],
         rows=rows(flexure),
         computed=f": {BASIS}",
-    ).html()
+    ).files({"flexure_drawing.svg": drawing})
 
 
-def drawing(flexure: BothModels) -> str:
+def _drawing(flexure: BothModels) -> str:
     """Return the dimensioned drawing of the mechanism as SVG."""
     data = materials().get(str(flexure.stage.flat().get("flexure.material")))
     material = f"{data.name}, {data.grade}" if data else ""

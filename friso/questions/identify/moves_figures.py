@@ -18,21 +18,8 @@ from friso.identification.readings.common import cart, low_pass, on_bearing
 from friso.identification.settings import identification_settings
 from friso.questions.identify.kind_view import TIME
 from friso.questions.identify.numbers import digits, name_of, unit_of
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREY,
-    INK,
-    ORANGE,
-    VERMILLION,
-    Array,
-    Axis,
-    Band,
-    Figure,
-    Limit,
-    Markers,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Array, Axis, Band, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREY, INK, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit
 
 FORCE = "force"

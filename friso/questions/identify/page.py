@@ -23,8 +23,7 @@ from friso.questions.identify.words import (
     read_rows,
     summaries,
 )
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.stage.correlations import correlations_file, correlations_text
 
@@ -41,36 +40,23 @@ def identify_files(
     stage, correlations = identification.stage, None
     if stage is not None and identification.correlations.keys:
         correlations = correlations_text(identification.correlations, stage)
-    figures = identify_figures(identification, predictions)
-    images = pictures(figures)
-    return {
-        STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
-        correlations_file(Path(STAGE)).name: correlations,
-        "identify.html": identify_html(identification, logs, predictions, figures),
-        **images,
-    }
-
-
-def identify_html(
-    identification: Identification,
-    files: Sequence[LogFile],
-    predictions: Sequence[Prediction],
-    figures: Sequence[Figure],
-) -> str:
-    """Return the whole page of an identification and its figures."""
     several = zip(identification.experiments, labels(identification), strict=True)
-    opening = [f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several]
-    return Report.of_stage(
+    report = Report.of_stage(
         "identify",
-        identification.stage,
-        figures,
-        ", ".join(file.path.name for file in files),
+        stage,
+        identify_figures(identification, predictions),
+        ", ".join(file.path.name for file in logs),
         verdicts=headline(identification),
         columns=COLUMNS,
         rows=estimate_rows(identification),
-        files=read_rows(files),
+        files=read_rows(logs),
         parts=summaries(identification),
         predicted=[prediction_line(prediction) for prediction in predictions],
         warnings=[axis_shown().text(warning) for warning in identification.warnings],
-        opening=opening,
-    ).html()
+        opening=[f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several],
+    )
+    return {
+        STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
+        correlations_file(Path(STAGE)).name: correlations,
+        **report.files(),
+    }

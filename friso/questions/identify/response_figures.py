@@ -14,23 +14,8 @@ from friso.quantities import percent
 from friso.questions.bode.figures import phases
 from friso.questions.identify.kind_view import AREA
 from friso.questions.identify.numbers import unit_of, with_interval
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    VERMILLION,
-    Array,
-    Axis,
-    Band,
-    Dash,
-    Figure,
-    Limit,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, VERMILLION
 
 FACTOR_COLOURS = (GREEN, BLUE, PINK)
 

@@ -18,7 +18,7 @@ from friso.identification.ways import ways_to_show
 from friso.questions.identify.kind_view import Facts, PredictionView, view_of
 from friso.questions.identify.laws import TITLE, how, law_facts, law_sentence
 from friso.questions.identify.numbers import interval_text, name_of, value_text, with_interval, within
-from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
+from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
 
 if TYPE_CHECKING:
     from friso.identification.estimate import Estimate

@@ -7,7 +7,7 @@ from typing import Any
 
 from friso.identification.contents import ChannelContent, LogContent
 from friso.questions.logs.words import conclusions, next_command
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 
 
 def logs_document(contents: Sequence[LogContent]) -> dict[str, Any]:
@@ -27,12 +27,11 @@ def _log(content: LogContent) -> dict[str, Any]:
         "channels": [_channel(channel) for channel in content.channels],
         "response": None if response is None else {"lines": len(response.frequency), "unit": response.unit},
         "open": [
-            {"about": gap.key, "actual": gap.actual, "expected": gap.expected, "example": gap.example or None}
+            {"about": gap.key, **entries(gap, "actual", "expected"), "example": gap.example or None}
             for gap in content.gaps
         ],
         "command": next_command(content),
-        "read": list(content.read),
-        "warnings": list(content.warnings),
+        **entries(content, "read", "warnings"),
     }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from friso.identification.contents import ChannelContent, LogContent
 from friso.interface.answer import AnswerTable
 from friso.platform.system import shell_word
-from friso.shown.drawing.figure import GREEN, ORANGE
+from friso.shown.drawing.palette import GREEN, ORANGE
 from friso.shown.drawing.prefixes import NOTHING, range_with_unit, with_unit
 
 COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")

@@ -15,7 +15,8 @@ from friso.questions.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, loo
 from friso.questions.map.findings import statement
 from friso.questions.map.words import variable
 from friso.shown.drawing.drawable import cell_edges
-from friso.shown.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Cloud, Figure, Map, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK
 from friso.studies.metric import metrics
 
 if TYPE_CHECKING:

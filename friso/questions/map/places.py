@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel
+from friso.shown.drawing.palette import GREY, INK
 from friso.studies.scalings import SCALINGS
 
 if TYPE_CHECKING:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from friso.questions.rig.figures import rig_figures
 from friso.questions.rig.log_files import log_files, stage_text
 from friso.questions.rig.words import sentences
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.studies.rig.outcome import Outcome
 
@@ -18,23 +15,11 @@ def rig_files(outcome: Outcome) -> dict[str, Content]:
 
     The truth behind the logs goes into a folder of its own.
     """
-    drawn = rig_figures(outcome)
-    images = pictures(drawn)
     logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}
-    return {
-        "rig.html": page(outcome, drawn),
-        **logs,
-        "truth/stage.toml": stage_text(outcome.stage, outcome.seed),
-        **images,
-    }
-
-
-def page(outcome: Outcome, figures: Sequence[Figure]) -> str:
-    """Return the page with its figures."""
     return Report.of_stage(
         f"rig {outcome.experiment}",
         outcome.stage,
-        figures,
+        rig_figures(outcome),
         sentences=sentences(outcome),
         notes=outcome.notes,
         columns=("Kind", "Seed", "Sample time", "Ended"),
@@ -43,4 +28,4 @@ def page(outcome: Outcome, figures: Sequence[Figure]) -> str:
             for log in outcome.logs
         ],
         computed=f" on a drive as built, seed {outcome.seed}; {len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}",
-    ).html()
+    ).files({**logs, "truth/stage.toml": stage_text(outcome.stage, outcome.seed)})

@@ -34,9 +34,10 @@ from matplotlib.transforms import Bbox
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.shown.drawing.drawable import drawable, word_ticks
-from friso.shown.drawing.figure import GREY, INK, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.images import FORMATS
 from friso.shown.drawing.matplotlib_maps import LINE, add_colour_bars, add_footer, draw_coloured, footer_height
+from friso.shown.drawing.palette import GREY, INK
 
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels

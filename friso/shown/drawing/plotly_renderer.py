@@ -20,8 +20,9 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from friso.shown.drawing.drawable import drawable, word_ticks
-from friso.shown.drawing.figure import GREY, INK, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.packing import packed, packed_json
+from friso.shown.drawing.palette import GREY, INK
 from friso.shown.drawing.plotly_maps import (
     BAR,
     DASHES,

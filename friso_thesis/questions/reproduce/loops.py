@@ -10,7 +10,8 @@ import numpy as np
 
 from friso.questions.bode.figures import ResponseCurve, bode_figures, magnitude, phases
 from friso.shown.drawing.colours import ramp
-from friso.shown.drawing.figure import INK, Axis, Figure, Limit, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Limit, Panel, Series
+from friso.shown.drawing.palette import INK
 from friso_thesis.studies.thesis.experiments import BUILT
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from friso.identification.kind import Source
 from friso.questions.identify.estimates import estimate_document
 from friso.questions.identify.kind_view import AREA, WAYS, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import INK, Axis, Band, Figure, Limit, Markers, Panel
+from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Markers, Panel
+from friso.shown.drawing.palette import INK
 from friso.shown.drawing.prefixes import range_with_unit
 
 

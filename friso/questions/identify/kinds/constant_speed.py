@@ -15,20 +15,8 @@ from friso.identification.readings.friction_velocity import Direction, FrictionV
 from friso.questions.identify.estimates import estimate_document
 from friso.questions.identify.kind_view import WAYS, Facts, KindView
 from friso.questions.identify.numbers import digits, estimates_in_words, with_interval, within
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PINK,
-    SKY,
-    VERMILLION,
-    Array,
-    Axis,
-    Figure,
-    Markers,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Array, Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, ORANGE, PINK, SKY, VERMILLION
 
 
 def _facts(result: FrictionAtSpeeds) -> Facts:

@@ -8,7 +8,8 @@ from typing import Any
 from friso.identification.experiments.hunting import HuntingLog
 from friso.identification.kind import Source
 from friso.questions.identify.kind_view import TIME, Facts, KindView
-from friso.shown.drawing.figure import INK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.palette import INK, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 
 

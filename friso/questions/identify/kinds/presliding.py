@@ -11,7 +11,8 @@ from friso.quantities import percent
 from friso.questions.identify.estimates import estimate_document
 from friso.questions.identify.kind_view import TIME, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, ORANGE
 
 
 def _facts(result: Presliding) -> Facts:

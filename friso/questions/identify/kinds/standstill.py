@@ -10,7 +10,8 @@ import numpy as np
 from friso.identification.experiments.standstill import StandstillResult
 from friso.identification.kind import Source
 from friso.questions.identify.kind_view import TIME, Facts, KindView
-from friso.shown.drawing.figure import BLUE, GREEN, INK, ORANGE, PINK, VERMILLION, Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, INK, ORANGE, PINK, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 
 _COLOURS = (INK, VERMILLION, BLUE, GREEN, ORANGE, PINK)

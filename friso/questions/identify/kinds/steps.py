@@ -12,7 +12,8 @@ from friso.identification.kind import Source
 from friso.questions.identify.estimates import estimate_document
 from friso.questions.identify.kind_view import AREA, TIME, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK
 
 
 def _facts(result: StepStiffness) -> Facts:

@@ -14,7 +14,8 @@ from friso.identification.logs.log import Log
 from friso.questions.identify.estimates import estimate_document
 from friso.questions.identify.kind_view import TIME, WAYS, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import GREY, INK
 from friso.shown.drawing.prefixes import range_with_unit
 
 

@@ -11,7 +11,8 @@ from friso.identification.estimate import Estimate
 from friso.questions.identify.kinds.slow_sliding import slow_sliding_caption, slow_sliding_panels
 from friso.questions.identify.numbers import with_interval
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, ORANGE, PINK, VERMILLION
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.studies.rig.experiments.constant_speed import ConstantSpeedResult, Passes
 from friso.studies.rig.many_speeds import ManySpeeds, PlaceOnRail

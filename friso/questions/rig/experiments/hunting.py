@@ -15,22 +15,8 @@ from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.quantities import percent
 from friso.questions.rig.outcome_view import OutcomeView
 from friso.shares import Share
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    SKY,
-    VERMILLION,
-    Axis,
-    Band,
-    Figure,
-    Limit,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
 from friso.studies.rig.moves_on_rails import BAND, RailRuns
