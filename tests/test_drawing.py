@@ -40,11 +40,10 @@ from friso.quantities import percent
 from friso.questions.check.figures import check_figures
 from friso.shown import pages
 from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
-from friso.shown.drawing.drawable import drawable
+from friso.shown.drawing.drawable import BUCKETS, KEPT, drawable, thin
 from friso.shown.drawing.figure import Axis, Category, Figure, Map, Panel, Series
 from friso.shown.drawing.palette import GREY
 from friso.shown.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
-from friso.shown.drawing.thinning import BUCKETS, KEPT, thin
 
 # ---------------------------------------------------------------- plain data
 

@@ -9,15 +9,8 @@ import numpy as np
 from friso.hunting import Diagram, Meeting, Plane
 from friso.questions.boundary.words import ShownKey, conclusion
 from friso.shown.documents import entries, plain_json
-from friso.studies.boundary_lines import (
-    Line,
-    corner_verdicts,
-    curve_ends,
-    curve_meetings,
-    end_verdicts,
-    lines,
-    lost_places,
-)
+from friso.studies import boundary_lines
+from friso.studies.boundary_lines import Line
 
 
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
@@ -28,12 +21,12 @@ def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> di
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
     """Return flips, folds and other special points, branches, and the verdicts at both ends."""
-    branches = lines(traced)
+    branches = boundary_lines.lines(traced)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {
         **entries(key, "key", "unit"),
         "points": sorted(points, key=lambda point: point["value"]),
-        "ends": dict(zip(("low", "high"), end_verdicts(traced), strict=True)),
+        "ends": dict(zip(("low", "high"), boundary_lines.end_verdicts(traced), strict=True)),
         "branches": [_branch(line, key) for line in branches],
     }
 
@@ -67,16 +60,17 @@ def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     """Return the curves in the plane of two keys, how they end and meet, and the corner verdicts."""
     x, y = keys
-    verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
+    verdicts = [verdict for _, _, verdict in boundary_lines.corner_verdicts(traced)]
     return {
         "x": entries(x, "key", "unit"),
         "y": entries(y, "key", "unit"),
-        "curves": [_curve(line, keys) for line in lines(traced)],
+        "curves": [_curve(line, keys) for line in boundary_lines.lines(traced)],
         "ends": [
-            {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind} for end in curve_ends(traced)
+            {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind}
+            for end in boundary_lines.curve_ends(traced)
         ],
-        "meetings": [_meeting(meeting, keys) for meeting in curve_meetings(traced)],
-        "lost": _numbers(lost_places(traced), keys),
+        "meetings": [_meeting(meeting, keys) for meeting in boundary_lines.curve_meetings(traced)],
+        "lost": _numbers(boundary_lines.lost_places(traced), keys),
         "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
     }
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from friso.questions.rig.figures import rig_figures
 from friso.questions.rig.log_files import log_files, stage_text
-from friso.questions.rig.words import sentences
+from friso.questions.rig.words import rig_figures, sentences
 from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.studies.rig.outcome import Outcome

@@ -11,10 +11,11 @@ from friso.identification.response.analysis import Bench
 from friso.identification.response.departure import Drag
 from friso.identification.response.mass_line import StraightLine
 from friso.quantities import percent
-from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.estimates import estimate_document, estimates_document
 from friso.questions.identify.kind_view import Facts, KindView, PredictionView
 from friso.questions.identify.numbers import digits, name_of, with_interval
 from friso.questions.identify.response_figures import response_figures
+from friso.shown.documents import entries
 from friso.shown.drawing.prefixes import range_with_unit
 
 
@@ -129,17 +130,13 @@ def _numbers(bench: Bench) -> dict[str, Any]:
 
 def _line_numbers(line: StraightLine) -> dict[str, Any]:
     """Return a straight line fitted to a frequency response, for the document."""
-    band = {"kind": line.kind, "low_hz": line.low, "high_hz": line.high, "sign": line.sign}
-    return {**band, "level": estimate_document(line.level), "value": estimate_document(line.value)}
+    band = {"low_hz": line.low, "high_hz": line.high, **estimates_document(line, "level", "value")}
+    return band | entries(line, "kind", "sign")
 
 
 def _drag_numbers(drag: Drag) -> dict[str, Any]:
     """Return mass, damping, stiffness and Coulomb friction at low frequency, for the document."""
-    several = {"mass": drag.mass, "damping": drag.damping, "stiffness": drag.stiffness, "coulomb": drag.coulomb}
-    return {
-        **{name: estimate_document(estimate) for name, estimate in several.items()},
-        "warnings": list(drag.warnings),
-    }
+    return estimates_document(drag, "mass", "damping", "stiffness", "coulomb") | entries(drag, "warnings")
 
 
 VIEW = KindView[Bench](

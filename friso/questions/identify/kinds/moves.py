@@ -18,7 +18,7 @@ from friso.questions.identify.estimates import ends_document
 from friso.questions.identify.kind_view import Facts, KindView, PredictionView
 from friso.questions.identify.moves_figures import FORCE, moves_figures, record_panels
 from friso.questions.identify.numbers import digits, estimates_in_words, with_interval, within
-from friso.shown.documents import unit_suffix
+from friso.shown.documents import entries, unit_suffix
 from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.prefixes import range_with_unit
 
@@ -131,10 +131,7 @@ def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
     """Return the residual force, for the document."""
     residual = moves.residual
     return {
-        "rms_n": residual.rms,
-        "mean_n": residual.mean,
-        "correlation_time_s": residual.correlation_time,
-        "white": residual.white,
+        **entries(residual, "rms_n", "mean_n", "correlation_time_s", "white"),
         "explained_by_position": residual.by_position,
         "explained_by_velocity": residual.by_velocity,
     }
@@ -142,8 +139,8 @@ def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 def _profile_numbers(profile: Profile) -> dict[str, Any]:
     """Return how much worse the fit becomes as one parameter is varied, for the document."""
-    ends = {"low": profile.low, "high": profile.high, "open_low": profile.open_low, "open_high": profile.open_high}
-    return {**ends, "values": profile.values, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
+    ends = entries(profile, "low", "high", "open_low", "open_high", "values")
+    return {**ends, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
 
 
 def _headline(moves: IdentifiedMoves) -> str:
