@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from friso.axis import axis_shown, unit_of_key
+from friso.hunting import Dwell, Tracking
 from friso.hunting.measures import BANDS
-
-if TYPE_CHECKING:
-    from friso.hunting import Dwell, Tracking
 
 
 def plain_json(value: Any) -> Any:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -23,11 +23,9 @@ from friso.shown.drawing.images import ON_PAGE, draw_beforehand, image
 from friso.shown.drawing.prefixes import listed
 from friso.shown.files import Content, Files, pictures
 from friso.shown.glossary import Glossary
+from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.version import VERSION
-
-if TYPE_CHECKING:
-    from friso.stage import Stage
 
 
 def made_with() -> str:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.equations.motion import last_corner
+from friso.hunting import Cycle
 from friso.questions.check.traces import common_range, samples, subject, trace_of
 from friso.shown.cases import ShownCase
 from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Markers, Panel, Series
 from friso.shown.drawing.palette import GREY, INK
-
-if TYPE_CHECKING:
-    from friso.hunting import Cycle
 
 _VIEW = 2.2  # reach of a return map's axes, relative to the largest cycle
 _STARTS, _FOLLOWED = 401, 300  # number of distances followed by a return map, and number of swings followed

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from friso.axis import axis_shown
+from friso.hunting import Case
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE
 from friso.questions.check.cycle_figures import cycle_figure, return_map_figure
 from friso.questions.check.traces import common_range, samples, subject, trace_of
 from friso.shown.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.shown.drawing.figure import Array, Axis, Dash, Figure, Limit, Markers, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREY, INK, LIGHT, ORANGE, PINK, SKY
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from friso.hunting import Case
 
 SHARES = {"force_p": ("P", SKY), "force_i": ("I", ORANGE), "force_d": ("D", PINK)}
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from friso.shown.cases import ShownCase
 from friso.shown.drawing.figure import Array
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def trace_of(item: ShownCase) -> xr.Dataset:

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
-from friso.hunting import MORE_WORK, SEARCH_LIMITS, CheckPart, Decline, Feeding
-from friso.hunting.criteria import ATTRACTED
+from friso.hunting import (
+    MORE_WORK,
+    SEARCH_LIMITS,
+    AttractionEnd,
+    BandwidthWindow,
+    Case,
+    CheckPart,
+    Decline,
+    Feeding,
+    Kick,
+    Margin,
+    MoveShare,
+)
+from friso.hunting.criteria import ATTRACTED, Verdict
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
 from friso.shown.cases import BANDS, ShownCase, band_text, shown_cases
@@ -28,11 +39,6 @@ from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.motion import motion_of
 from friso.stage.section import numeric_fields
 from friso.stage.standstill import integral_leak
-
-if TYPE_CHECKING:
-    from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin, MoveShare
-    from friso.hunting.criteria import Verdict
-
 
 _MICRON, _TEN_MICRON = BANDS
 

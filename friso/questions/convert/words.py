@@ -6,7 +6,7 @@ The sentences say what is kept, what is not, and what measurements leave open.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,7 @@ from friso.quantities import percent
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage.stage import declared_keys
-
-if TYPE_CHECKING:
-    from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
-
+from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
 
 SHOWN: Mapping[MeasuredKind, str] = {
     "curve": "steady friction over speed",

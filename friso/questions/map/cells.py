@@ -9,9 +9,9 @@ import json
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from friso.questions.map.words import (
     FAILED,
@@ -32,9 +32,6 @@ from friso.shown.drawing.figure import Array, Axis, Category
 from friso.shown.drawing.prefixes import choose
 from friso.studies.cells import INFERRED
 from friso.studies.metric import metrics, worded
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SAMPLE = "sample"  # dimension of sampled maps, which have no grid
 

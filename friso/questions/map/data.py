@@ -8,9 +8,10 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from friso.axis import unit_shown
 from friso.errors import InputError
@@ -27,11 +28,7 @@ from friso.shown.drawing.prefixes import choose
 from friso.stage import Stage, loads
 from friso.studies.metric import worded
 from friso.studies.scalings import SCALINGS
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from friso.studies.traces import Traces
+from friso.studies.traces import Traces
 
 MOST = 250_000  # most cells in a page: more take a browser seconds to open and colour
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from friso.axis import axis_shown
 from friso.hunting.criteria import ATTRACTED, CREEPS, RESTS, SWINGS
@@ -25,14 +24,10 @@ from friso.questions.map.words import (
 from friso.shares import share_interval
 from friso.shown.drawing.prefixes import listed, percentage
 from friso.shown.loop_words import unstable_loop
+from friso.stage import Stage
 from friso.studies.metric import MapFinding, metrics, worded
 from friso.studies.scalings import SCALINGS
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from friso.stage import Stage
-    from friso.studies.study import Study
+from friso.studies.study import Study
 
 _NO_RESULT = {"failed": "the run was not completed", "invalid": "these values are not a valid stage"}
 
