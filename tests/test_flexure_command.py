@@ -28,9 +28,8 @@ from friso.leaf_springs.evaluation import Mode
 from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.flexure.document import flexure_document
 from friso.questions.flexure.drawing import drawing_svg
-from friso.questions.flexure.figures import flexure_figures
+from friso.questions.flexure.figures import VIEWS, best_view, flexure_figures, modes_figure
 from friso.questions.flexure.layout import SCALES, WIDTH, block_size
-from friso.questions.flexure.modes import VIEWS, best_view, modes_figure
 from friso.questions.flexure.page import flexure_files
 from friso.questions.flexure.question import EXAMPLE
 from friso.questions.flexure.table import rows

@@ -46,17 +46,19 @@ from friso.identification.stage_file import estimate_text, identified_stage, mad
 from friso.questions.identify.document import identify_document
 from friso.questions.identify.figures import identify_figures
 from friso.questions.identify.kinds.constant_speed import VIEW as CONSTANT_SPEED
-from friso.questions.identify.moves_figures import moves_figures, record_panels
+from friso.questions.identify.kinds.moves import moves_figures, record_panels
 from friso.questions.identify.numbers import interval_text, unit_of, value_text, with_interval
 from friso.questions.identify.page import identify_files
 from friso.questions.identify.words import (
+    COLUMNS,
     LEFT,
     NO_STAGE,
-    answer,
+    details,
     estimate_rows,
     headline,
     labels,
     prediction_line,
+    sentences,
     summaries,
 )
 from friso.shown.drawing import plotly_renderer
@@ -398,7 +400,10 @@ def test_the_facts_of_moves_say_how_the_machine_was_simulated(snapshots: Snapsho
 
 def test_the_terminal_says_all_of_it_the_answer_first(case: tuple, snapshots: Snapshots) -> None:
     result, files, predictions = case
-    lines = answer(result, files, predictions)
+    table = [COLUMNS[:-1], *(row.texts[:-1] for row in estimate_rows(result))]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    aligned = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]
+    lines = [*sentences(result, predictions), "", *aligned, *details(result, files)]
     text = "\n".join(lines)
     assert lines[: len(headline(result))] == [sentence for _, sentence in headline(result)]
     for part in ("axis.csv", "118", "something <to> know", " 4 %", "70 %"):

@@ -16,7 +16,7 @@ from friso.frequency.crossover import WANTED
 from friso.frequency.ranges import Range
 from friso.questions.design.window import stiffest, view
 from friso.questions.design.words import hertz, size
-from friso.questions.flexure.modes import modes_figure
+from friso.questions.flexure.figures import modes_figure
 from friso.questions.flexure.table import newtons_per
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.drawable import cell_edges

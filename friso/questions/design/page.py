@@ -10,8 +10,7 @@ from markupsafe import Markup
 from friso.design_method.method import Design, UnfinishedDesign
 from friso.materials import materials
 from friso.questions.design.figures import design_figures
-from friso.questions.design.leaves import requirement_rows
-from friso.questions.design.steps import steps
+from friso.questions.design.steps import requirement_rows, steps
 from friso.questions.design.words import headline
 from friso.questions.flexure.drawing import drawing_svg
 from friso.shown.files import Content

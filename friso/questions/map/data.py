@@ -16,7 +16,7 @@ import xarray as xr
 from friso.axis import unit_shown
 from friso.errors import InputError
 from friso.hunting.measures import BANDS
-from friso.questions.check.traces import common_range
+from friso.questions.check.figures import common_range
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, coloured, look, pick, plane_first
 from friso.questions.map.figures import edge_of_hunting
 from friso.questions.map.places import SHOWN
