@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from friso.equations.bandwidth import bandwidth
 from friso.hunting import (
@@ -119,15 +119,14 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
     return [*says, *filter(None, [conclusion(cases)]), *_goes_on(cases, says)]
 
 
-def _goes_on(cases: Mapping[str, Case], says: Sequence[str]) -> list[str]:
-    """Say which commands have no limit of work, if the sentences `says` on the cases leave something open for it."""
-    if not any(MORE_WORK in text for text in says) and not any(case.judgement.given_up for case in cases.values()):
-        return []
-    return [
-        "A check ends after a fixed amount of work. Without that limit, friso boundary follows hunting over a range of "
-        "your choice (--x speed=0.5..2, or another key), friso map runs stages over one, and friso simulate runs one "
-        "motion for longer (--set motion.duration)."
-    ]
+def _goes_on(cases: Mapping[str, Case], says: Sequence[str]) -> Iterator[str]:
+    """Yield which commands have no limit of work, if the sentences `says` on the cases leave something open."""
+    if any(MORE_WORK in text for text in says) or any(case.judgement.given_up for case in cases.values()):
+        yield (
+            "A check ends after a fixed amount of work. Without that limit, friso boundary follows hunting over a "
+            "range of your choice (--x speed=0.5..2, or another key), friso map runs stages over one, and friso "
+            "simulate runs one motion for longer (--set motion.duration)."
+        )
 
 
 def conclusion(cases: Mapping[str, Case]) -> str | None:
@@ -344,12 +343,11 @@ def _small_swing(case: Case) -> str:
     return f": at its end it swings by {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
 
 
-def _doubts(case: Case) -> list[str]:
-    """Say why the verdict is not certain, if it is not."""
+def _doubts(case: Case) -> Iterator[str]:
+    """Yield why the verdict is not certain, if it is not."""
     hunting = case.judgement.hunting
-    if hunting.certain:
-        return []
-    return [f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."]
+    if not hunting.certain:
+        yield f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."
 
 
 def _running_away(case: Case) -> list[str]:

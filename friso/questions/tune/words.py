@@ -219,13 +219,13 @@ def goal_words(goal: Goal) -> str:
     )
 
 
-def _interrupted(tuning: Advice) -> list[str]:
-    """Say that the search was interrupted and the answer is the best so far; or say nothing."""
-    if not tuning.interrupted:
-        return []
-    return [
-        "Interrupted: this is the best so far. Options that are not named were not tried, and one may be unfinished."
-    ]
+def _interrupted(tuning: Advice) -> Iterator[str]:
+    """Yield that the search was interrupted and the answer is the best so far; or nothing."""
+    if tuning.interrupted:
+        yield (
+            "Interrupted: this is the best so far. Options that are not named were not tried, and one may be "
+            "unfinished."
+        )
 
 
 def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
