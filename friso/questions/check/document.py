@@ -8,24 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso import hunting
 from friso.questions.check.laws import laws_document
 from friso.questions.check.words import answer
 from friso.shown.documents import dwells_document, entries, plain_json, tracking_document, unit_suffix
 from friso.stage.tables import passive_where
 
 if TYPE_CHECKING:
-    from friso.hunting import (
-        AttractionEnd,
-        BandwidthWindow,
-        Case,
-        Cycle,
-        Feeding,
-        Judgement,
-        Margin,
-        MarginEnd,
-        ParameterMargin,
-        Swing,
-    )
     from friso.remedies.suggestion import Suggestion
     from friso.stage import Stage
     from friso.studies.draws import Draws
@@ -33,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def check_document(
-    cases: Mapping[str, Case],
+    cases: Mapping[str, hunting.Case],
     draws: Draws | None = None,
     isolator: Suggestion | None = None,
     laws: VerdictsByLaw | None = None,
@@ -70,13 +59,13 @@ def _isolator(isolator: Suggestion) -> dict[str, Any]:
     }
 
 
-def _feeding(feeding: Feeding) -> dict[str, Any]:
+def _feeding(feeding: hunting.Feeding) -> dict[str, Any]:
     """Return the fractions of friction and backlash down to which hunting persists."""
     parts = {"friction": feeding.friction, "backlash": feeding.backlash}
     return {name: asdict(part) | {"needed": part.needed} for name, part in parts.items() if part}
 
 
-def _case(case: Case) -> dict[str, Any]:
+def _case(case: hunting.Case) -> dict[str, Any]:
     """Return all results for one state of the joint: verdict, run, cycle, margins and basins."""
     into_1um, into_10um = case.settling_time.values()
     last_1um, last_10um = case.in_the_end.values()
@@ -114,18 +103,18 @@ def _case(case: Case) -> dict[str, Any]:
     }
 
 
-def _cycle(cycle: Cycle) -> dict[str, Any]:
+def _cycle(cycle: hunting.Cycle) -> dict[str, Any]:
     """Return the properties of a hunting cycle."""
     names = ("amplitude_m", "period_s", "multiplier", "symmetric", "attracts", "slope", "growth", "residual")
     return {**entries(cycle, *names, "time_constant_s"), "swings_per_period": cycle.swings}
 
 
-def _swing(swing: Swing) -> dict[str, Any]:
+def _swing(swing: hunting.Swing) -> dict[str, Any]:
     """Return amplitude and period of a swing that was observed in a run."""
     return {**entries(swing, "amplitude_m", "period_s", "regular"), "swings_per_period": swing.swings}
 
 
-def _kick(judgement: Judgement) -> dict[str, Any] | None:
+def _kick(judgement: hunting.Judgement) -> dict[str, Any] | None:
     """Return the displacements and pushes that start hunting; None if they were not searched."""
     if judgement.displacement is None or judgement.push is None:
         return None
@@ -137,30 +126,30 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
     }
 
 
-def _windows(windows: Iterable[BandwidthWindow]) -> list[dict[str, Any]]:
+def _windows(windows: Iterable[hunting.BandwidthWindow]) -> list[dict[str, Any]]:
     """Return windows of bandwidths by their ends."""
     return [{"low": _end(window.low), "high": _end(window.high)} for window in windows]
 
 
-def _margin(edge: Margin) -> dict[str, Any]:
+def _margin(edge: hunting.Margin) -> dict[str, Any]:
     """Return how far the bandwidth is from the edge of hunting, for the document."""
     return {**entries(edge, "factor", "crossover_hz", "certain", "reserve"), "settles_at_factor": edge.quiet}
 
 
-def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
+def _end(end: hunting.AttractionEnd | None) -> dict[str, Any] | None:
     """Return one end of the bandwidths at which hunting attracts; None if there is no end."""
     if end is None:
         return None
     return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve")}
 
 
-def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
+def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:
     """Return the multiples of a parameter at which hunting begins or ends.
 
     Each end has the last multiple with an unchanged verdict and the next multiple with another verdict.
     """
 
-    def end(one: MarginEnd | None) -> dict[str, Any] | None:
+    def end(one: hunting.MarginEnd | None) -> dict[str, Any] | None:
         """Return one end of a margin; None if hunting does not change on that side."""
         return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}
 
@@ -173,7 +162,7 @@ def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
     }
 
 
-def joint_margins_document(stage: Stage, margins: Mapping[str, ParameterMargin]) -> dict[str, Any]:
+def joint_margins_document(stage: Stage, margins: Mapping[str, hunting.ParameterMargin]) -> dict[str, Any]:
     """Return the margins of a stage in the keys of its joint, as multiples and as values."""
     document, flat, fields = {}, stage.flat(), stage.numeric_keys()
     for key, margin in margins.items():

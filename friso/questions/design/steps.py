@@ -14,22 +14,9 @@ from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
 from friso.frequency.crossover import WANTED
 from friso.quantities import percent, plain_factor
+from friso.questions.design import words
 from friso.questions.design.window import CrossoverBound, comfortable, lower, upper
-from friso.questions.design.words import (
-    DesignStep,
-    brings,
-    corner,
-    edge,
-    gaps,
-    hertz,
-    leaves,
-    probability,
-    restless,
-    seconds,
-    settling,
-    size,
-    trimmed,
-)
+from friso.questions.design.words import DesignStep, hertz, seconds, size, trimmed
 from friso.questions.flexure.table import megapascals, newtons_per
 from friso.questions.flexure.words import assumptions
 from friso.shown.drawing.prefixes import listed
@@ -46,9 +33,9 @@ def steps(design: Design) -> tuple[DesignStep, ...]:
 def isolator_step(design: Design) -> DesignStep:
     """Return the step that decides whether an isolator is needed."""
     corners, flat = design.without, design.original.flat()
-    sentences = [f"Without an isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
+    sentences = [f"Without an isolator the machine {words.edge(corners)}.", *_worst(corners, design), *_gap(design)]
     if not design.needed:
-        sentences.append(brings(design))
+        sentences.append(words.brings(design))
     facts = [
         ("Corners of friction and masses", str(corners.population.count)),
         ("Edge of hunting without isolator", _edge(corners)),
@@ -56,7 +43,7 @@ def isolator_step(design: Design) -> DesignStep:
         ("Machine's limit", hertz(design.spec.limit)),
         ("Crossovers searched", " to ".join(map(hertz, corners.searched))),
     ]
-    losses = gaps(corners, flat)
+    losses = words.gaps(corners, flat)
     facts += [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
     answer = "yes" if design.needed else "no"
     return DesignStep(f"Is an isolator needed: {answer}", tuple(sentences), tuple(facts), ())
@@ -75,7 +62,7 @@ def joint_step(design: Design) -> DesignStep:
     sentences = [
         held,
         _stroke(design),
-        f"With this joint the machine {edge(design.edges)}.",
+        f"With this joint the machine {words.edge(design.edges)}.",
         *_worst(design.edges, design),
     ]
     joint = design.stage.flat()
@@ -128,7 +115,7 @@ def _worst(corners: Corners, design: Design) -> list[str]:
     sentences = []
     if corners.hunts:
         count = corners.population.count
-        sentences.append(f"Worst of {count} corners: {corner(corners, design.stage.flat(), corners.worst)}.")
+        sentences.append(f"Worst of {count} corners: {words.corner(corners, design.stage.flat(), corners.worst)}.")
     if corners.unknown:
         sentences.append(
             f"In {corners.unknown} of {corners.population.count} corners the edge is not certain: simulations below it "
@@ -143,7 +130,7 @@ def _gap(design: Design) -> list[str]:
 
     The list is empty for a friction law that has no static and Coulomb friction.
     """
-    losses = gaps(design.without, design.original.flat())
+    losses = words.gaps(design.without, design.original.flat())
     if losses is None:
         return []
     small = design.without.edges[losses < GAP]
@@ -167,7 +154,7 @@ def leaves_step(design: Design) -> DesignStep:
     """Return the step that chooses the leaf springs, with reasons."""
     sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
     figures = ("design_front", "design_modes")
-    return DesignStep(f"Leaf springs: {leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
+    return DesignStep(f"Leaf springs: {words.leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
 
 
 def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
@@ -393,10 +380,12 @@ def _damping(design: Design) -> str:
 def moves_step(design: Design) -> DesignStep:
     """Return the step that verifies the design in simulated moves."""
     free, locked = design.verification.free, design.verification.locked
-    sentences = [f"Of {free.tried} moves over all ranges and tolerances {restless(free)}: {probability(free)}."]
-    other = settling(locked)
-    held = f"{other[0].lower()}{other[1:]}, and {restless(locked)}"
-    sentences.append(f"{settling(free)}. Of {locked.tried} with the joint locked: {held}.")
+    sentences = [
+        f"Of {free.tried} moves over all ranges and tolerances {words.restless(free)}: {words.probability(free)}."
+    ]
+    other = words.settling(locked)
+    held = f"{other[0].lower()}{other[1:]}, and {words.restless(locked)}"
+    sentences.append(f"{words.settling(free)}. Of {locked.tried} with the joint locked: {held}.")
     broken = len(free.completed) - free.tried
     if broken:
         sentences.append(f"{broken} moves could not be simulated to the end and do not count.")
@@ -405,7 +394,7 @@ def moves_step(design: Design) -> DesignStep:
         *(row for name, outcome in (("free", free), ("locked", locked)) for row in _outcome(name, outcome)),
         ("In position", f"within ±{trimmed(design.spec.position.window, 'm')} of the reference"),
     )
-    title = f"Verification: {free.tried} moves, {restless(free)}"
+    title = f"Verification: {free.tried} moves, {words.restless(free)}"
     return DesignStep(title, tuple(sentence for sentence in sentences if sentence), facts, ("design_settling",))
 
 
