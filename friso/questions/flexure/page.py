@@ -5,8 +5,6 @@ Every run of the command gives the same bytes.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from markupsafe import Markup
 
 from friso.leaf_springs.both_models import BothModels
@@ -15,17 +13,10 @@ from friso.questions.flexure.drawing import drawing_svg
 from friso.questions.flexure.figures import COLOURS, flexure_figures
 from friso.questions.flexure.table import rows
 from friso.questions.flexure.words import assumptions, findings, warnings
+from friso.shown.drawing.figure import Category
 from friso.shown.drawing.palette import GREEN, VERMILLION
 from friso.shown.files import Content
 from friso.shown.pages import Report
-
-
-class Column(NamedTuple):
-    """A model at the head of the table, with its colour."""
-
-    label: str
-    colour: str
-
 
 BASIS = (
     "geometrically exact beams, corrected for what clamps do to a wide leaf, and closed forms (Soemers, Design "
@@ -46,7 +37,7 @@ def flexure_files(flexure: BothModels) -> dict[str, Content]:
         verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(flexure))],
         sentences=[*further, *assumptions(flexure.stage)],
         drawing=drawing,
-        columns=[Column(name, COLOURS[name]) for name in flexure.models],
+        columns=[Category(name, COLOURS[name]) for name in flexure.models],
         rows=rows(flexure),
         computed=f": {BASIS}",
     ).files({"flexure_drawing.svg": drawing})
