@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.interface.answer import AnswerTable
 from friso.quantities import percent
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.prefixes import listed, with_unit
@@ -149,3 +150,8 @@ def convert_document(conversion: LawConversion) -> dict[str, Any]:
             "passive_where": conversion.active or None,
         }
     )
+
+
+def tables(conversion: LawConversion) -> list[AnswerTable]:
+    """Return a table of what measurements show of both laws."""
+    return [AnswerTable(conversion.stage.name, COLUMNS, conversion_rows(conversion))]

@@ -61,15 +61,6 @@ class TuneAnswer(Answer):
         """Tell whether Ctrl-C ended the search, so that the answer is the best so far."""
         return self.result.interrupted
 
-    def details(self) -> Sequence[str]:
-        """Return gains for drives, where the numbers may lie, what matters most, and assumptions."""
-        from friso.questions.tune.gain_words import gain_lines
-        from friso.questions.tune.sensitivity_words import sensitivity_sentences
-        from friso.questions.tune.words import assumptions, window_lines
-
-        advice = self.result
-        return [*gain_lines(advice), *window_lines(advice), *sensitivity_sentences(advice), *assumptions(advice)]
-
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the commands that design or check the leaf springs of an isolator.
 
@@ -192,11 +183,7 @@ def _goal(
     def read(name: str, value: float | str | None, unit: str, example: str, bound: Bound = positive) -> float | None:
         """Read an option as a number in SI; None if it is not given."""
         quantity = Quantity(unit, bound, example).on(stage.axis_kind)
-        text = None if value is None else inputs.text_of(value, quantity.unit)
-        try:
-            return None if text is None else float(quantity.read(text))
-        except InputError as error:
-            raise inputs.wrong(name, error.actual, error.expected, error.example) from None
+        return None if value is None else inputs.quantity_of(value, name, quantity)
 
     return Goal(
         within=read("within", within, "m", "1 um", _IN_POSITION) or Goal.within,

@@ -22,7 +22,9 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
+from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
+from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
 from friso.remedies.least import LEAST
@@ -708,3 +710,8 @@ def sentences(tuning: Advice) -> list[str]:
 def tables(tuning: Advice) -> list[AnswerTable]:
     """Return the table in which remedies and the stage as it is stand side by side."""
     return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]
+
+
+def details(tuning: Advice) -> list[str]:
+    """Return gains for drives, where the numbers may lie, what matters most, and assumptions."""
+    return [*gain_lines(tuning), *window_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)]
