@@ -26,6 +26,7 @@ from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
 from friso.questions.map.places import SHOWN, with_places
 from friso.shown.cases import case_labels
+from friso.shown.documents import entries
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
@@ -103,11 +104,7 @@ def words_of(answer: Answer) -> AnswerPart:
     return {
         "kind": "answer",
         "sentences": [*answer.sentences()],
-        "tables": [
-            {"title": item.title, "columns": item.columns, "rows": item.rows}
-            for item in answer.tables()
-            if not item.behind
-        ],
+        "tables": [entries(table, "title", "columns", "rows") for table in answer.tables() if not table.behind],
         "details": [*answer.details()],
         "failure": answer.failure,
     }

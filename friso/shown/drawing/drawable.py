@@ -122,8 +122,8 @@ def _panel(panel: Panel) -> Panel:
         y=_axis(panel.y, y_factor, y_unit),
         series=tuple(replace(line, x=line.x * x_factor, y=line.y * y_factor) for line in lines),
         markers=tuple(_markers(marker, x_factor, y_factor) for marker in panel.markers),
-        maps=tuple(_coloured(field, x_factor, y_factor) for field in panel.maps),
-        clouds=tuple(_coloured(cloud, x_factor, y_factor) for cloud in panel.clouds),
+        maps=tuple(prefixed(field, x_factor, y_factor) for field in panel.maps),
+        clouds=tuple(prefixed(cloud, x_factor, y_factor) for cloud in panel.clouds),
         bands=tuple(
             replace(band, x=band.x * x_factor, low=band.low * y_factor, high=band.high * y_factor)
             for band in panel.bands
@@ -185,7 +185,7 @@ def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
     return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
 
 
-def _coloured(field: Field, x_factor: float, y_factor: float) -> Field:
+def prefixed(field: Field, x_factor: float = 1.0, y_factor: float = 1.0) -> Field:
     """Return a map or cloud with prefixed axes and numbers; infinite numbers become gaps.
 
     Coordinates are multiplied by the factors of both axes.
