@@ -23,7 +23,8 @@ from friso.app.frames import frame
 from friso.escapes import escaped
 from friso.questions.check.page import check_html
 from friso.questions.map.page import map_html
-from friso.shown.drawing.figure import INK, Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import INK
 from friso.shown.pages import Report
 
 pytestmark = [needs_browser, pytest.mark.usefixtures("own_bandwidth")]

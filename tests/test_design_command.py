@@ -34,11 +34,17 @@ from friso.design_method.spec import Position, Spec, load_spec
 from friso.interface.output_folder import MARKER, OutputFolder
 from friso.progress import Progress
 from friso.quantities import outwards
-from friso.questions.design.control import controller_step, moves_step
 from friso.questions.design.document import design_document, refused_document
 from friso.questions.design.figures import design_figures
-from friso.questions.design.leaves import leaves_step, requirement_rows
-from friso.questions.design.steps import isolator_step, joint_step, steps
+from friso.questions.design.steps import (
+    controller_step,
+    isolator_step,
+    joint_step,
+    leaves_step,
+    moves_step,
+    requirement_rows,
+    steps,
+)
 from friso.questions.design.window import lower, stiffest, upper
 from friso.questions.design.words import brings, edge, headline, hertz, refusal, settling
 from friso.shown import files

@@ -39,11 +39,11 @@ from friso.axis import ROTARY, speaking_of
 from friso.quantities import percent
 from friso.questions.check.figures import check_figures
 from friso.shown import pages
-from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
-from friso.shown.drawing.drawable import drawable
-from friso.shown.drawing.figure import GREY, Axis, Category, Figure, Map, Panel, Series
+from friso.shown.drawing import images, matplotlib_renderer, plotly_maps, plotly_renderer
+from friso.shown.drawing.drawable import BUCKETS, KEPT, drawable, thin
+from friso.shown.drawing.figure import Axis, Category, Figure, Map, Panel, Series
+from friso.shown.drawing.palette import GREY
 from friso.shown.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
-from friso.shown.drawing.thinning import BUCKETS, KEPT, thin
 
 # ---------------------------------------------------------------- plain data
 
@@ -412,7 +412,7 @@ def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
     assert all(len(narrow[name]["title"]["text"].split("<br>")) > 1 for name in ("legend", "legend2"))
     assert max(map(len, note)) < plotly_renderer.NARROW / 6
     assert narrow["height"] > wide["height"]
-    assert narrow["height"] - 2 * (plotly_renderer.PLOT + plotly_renderer.FOOTER) >= 8 * plotly_renderer.KEY_ROW
+    assert narrow["height"] - 2 * (plotly_renderer.PLOT + plotly_renderer.FOOTER) >= 8 * plotly_maps.KEY_ROW
 
 
 def test_a_title_stands_upon_the_legend_or_upon_the_axes() -> None:
@@ -444,9 +444,9 @@ def test_the_note_of_a_map_stands_below_all_rows_of_its_key() -> None:
     field = Map(np.arange(4.0), np.arange(2.0), nothing, "", "", categories=categories, codes=codes)
     figure = Figure("f", "", "", (Panel("", Axis("x", ""), Axis("y", ""), maps=(field,)),), note="a note")
     narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
-    rows = [-layout["annotations"][0]["yshift"] // plotly_renderer.KEY_ROW for layout in (wide, narrow)]
+    rows = [-layout["annotations"][0]["yshift"] // plotly_maps.KEY_ROW for layout in (wide, narrow)]
     assert rows == [1, 2]
-    assert narrow["height"] - wide["height"] == plotly_renderer.KEY_ROW
+    assert narrow["height"] - wide["height"] == plotly_maps.KEY_ROW
     titled = plotly_renderer.parts(replace(figure, panels=(replace(figure.panels[0], title="A title"),)))["layout"]
     assert titled["height"] - wide["height"] == plotly_renderer.TITLE
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -13,10 +14,11 @@ import shells
 
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.closed_model import closed_form_model
-from friso.leaf_springs.evaluation import Evaluation, LeafModel
+from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 
+LeafModel = Callable[[Mechanism, float], Evaluation]
 MODELS: dict[str, LeafModel] = {"closed forms": closed_form_model, "beams": beams}
 MECHANISMS = {
     # leaves, length, width, thickness, spacing [mm], material, mass [kg], x of its centre beyond the leaf ends [mm]

@@ -215,7 +215,7 @@ import errno, os, shutil
 from pathlib import Path
 from unittest.mock import patch
 
-from friso.app.names import plain_name
+from friso.app.uploads import plain_name
 from friso.platform.bounded_file import content_of
 from friso.engine import building
 from friso.engine.private import read_private

@@ -26,7 +26,7 @@ from friso.identification.readings.common import record
 from friso.identification.readings.settings import ReadingSettings
 from friso.identification.sources import log_with_signals, read_all
 from friso.questions.identify.document import identify_document
-from friso.questions.identify.words import answer, headline
+from friso.questions.identify.words import details, estimate_rows, headline, sentences
 
 DT = 2e-3
 MASS, VISCOUS, COULOMB = 6.0, 20.0, 11.0
@@ -129,7 +129,9 @@ def test_what_needs_newtons_is_not_written_and_says_so(volts: tuple[Path, Identi
     lines = [text for _, text in headline(identification)]
     assert any("N/V" in line and "V·s²/m" in line.replace(" ", "·") for line in lines)
     assert any('--scale force="NUMBER N/V"' in line for line in lines)
-    assert not any(" N " in line or line.endswith(" N") for line in answer(identification, files, []))
+    rows = [" ".join(row.texts[:-1]) for row in estimate_rows(identification)]
+    lines = [*sentences(identification, []), *rows, *details(identification, files)]
+    assert not any(" N " in line or line.endswith(" N") for line in lines)
     document: dict[str, Any] = identify_document(identification, files, [])
     assert "mass_v_s2_per_m" in document["experiments"][0]["inverse_model"]
 

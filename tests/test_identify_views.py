@@ -45,17 +45,19 @@ from friso.identification.stage_file import estimate_text, identified_stage, mad
 from friso.questions.identify.document import identify_document
 from friso.questions.identify.figures import identify_figures
 from friso.questions.identify.kinds.constant_speed import VIEW as CONSTANT_SPEED
-from friso.questions.identify.moves_figures import moves_figures, record_panels
+from friso.questions.identify.kinds.moves import moves_figures, record_panels
 from friso.questions.identify.numbers import interval_text, unit_of, value_text, with_interval
-from friso.questions.identify.page import identify_html
+from friso.questions.identify.page import identify_files
 from friso.questions.identify.words import (
+    COLUMNS,
     LEFT,
     NO_STAGE,
-    answer,
+    details,
     estimate_rows,
     headline,
     labels,
     prediction_line,
+    sentences,
     summaries,
 )
 from friso.shown.drawing import plotly_renderer
@@ -397,7 +399,10 @@ def test_the_facts_of_moves_say_how_the_machine_was_simulated(snapshots: Snapsho
 
 def test_the_terminal_says_all_of_it_the_answer_first(case: tuple, snapshots: Snapshots) -> None:
     result, files, predictions = case
-    lines = answer(result, files, predictions)
+    table = [COLUMNS[:-1], *(row.texts[:-1] for row in estimate_rows(result))]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    aligned = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]
+    lines = [*sentences(result, predictions), "", *aligned, *details(result, files)]
     text = "\n".join(lines)
     assert lines[: len(headline(result))] == [sentence for _, sentence in headline(result)]
     for part in ("axis.csv", "118", "something <to> know", " 4 %", "70 %"):
@@ -407,14 +412,20 @@ def test_the_terminal_says_all_of_it_the_answer_first(case: tuple, snapshots: Sn
     snapshots.check("identify", "run", re.sub(r"\d[\d.]*(e[-+]\d+)?", "#", text))  # numbers are tested above
 
 
-def test_logs_that_make_no_stage_have_a_page_all_the_same(case: tuple) -> None:
+def _page_of(case: tuple, figures: list[Figure], monkeypatch: pytest.MonkeyPatch) -> str:
+    """The page of an identification with some figures."""
+    monkeypatch.setattr("friso.questions.identify.page.identify_figures", lambda *_: figures)
+    return str(identify_files(*case)["identify.html"])
+
+
+def test_logs_that_make_no_stage_have_a_page_all_the_same(case: tuple, monkeypatch: pytest.MonkeyPatch) -> None:
     changed = replace(case[0], stage=None, experiments=())
     assert NO_STAGE in [sentence for _, sentence in headline(changed)]
     assert identify_document(changed, case[1], [])["stage"] is None
-    text = Page(identify_html(changed, case[1][:2], [], [])).text
+    text = Page(_page_of((changed, case[1][:2], []), [], monkeypatch)).text
     assert "bench.csv, exp1.csv" in text
     assert "Copy" not in text
-    assert "Copy" in Page(identify_html(case[0], case[1][:2], [], [])).text
+    assert "Copy" in Page(_page_of((case[0], case[1][:2], []), [], monkeypatch)).text
 
 
 # --- the document -----------------------------------------------------------------------------------------------------
@@ -586,13 +597,15 @@ def test_every_figure_can_be_drawn_and_its_axes_have_their_units(figures: list[F
 # --- the page ---------------------------------------------------------------------------------------------------------
 
 
-def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(case: tuple, figures: list[Figure]) -> None:
-    result, files, predictions = case
+def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(
+    case: tuple, figures: list[Figure], monkeypatch: pytest.MonkeyPatch
+) -> None:
     ends = ("intervals", "moves1_force", "moves1_friction", "frequency1_bode")
     subset = [item for item in figures if item.name.endswith(ends)]
     assert len(subset) == 4
-    html = identify_html(result, files, predictions, subset)
-    assert html == identify_html(result, files, predictions, subset)
+    result, _, predictions = case
+    html = _page_of(case, subset, monkeypatch)
+    assert html == _page_of(case, subset, monkeypatch)
     page = Page(html)
     assert all(address.startswith("data:") for address in page.loads)
     levels = [int(tag[1]) for tag in page.tags if tag in ("h1", "h2", "h3", "h4")]

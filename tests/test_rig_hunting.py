@@ -11,9 +11,7 @@ from refusals import Refused
 from friso import load
 from friso.engine.arrays import Status
 from friso.progress import silent
-from friso.questions.rig.document import rig_document
-from friso.questions.rig.figures import rig_figures
-from friso.questions.rig.words import sentences
+from friso.questions.rig.words import rig_document, rig_figures, sentences
 from friso.studies.rig.experiments import hunting
 from friso.studies.rig.moves_on_rails import (
     RailRuns,

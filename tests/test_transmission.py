@@ -24,7 +24,7 @@ from friso.hunting import Decline, Ensemble, Feeding, cannot_hunt, hunting, unst
 from friso.hunting.feeding import dry_friction, feeding
 from friso.hunting.settings import CheckSettings
 from friso.questions.bode.words import caveats
-from friso.questions.check.feeding_words import feeding_sentences
+from friso.questions.check.words import feeding_sentences
 from friso.stage import Stage
 from friso.stage.plausible import idle_encoder
 from friso.virtual_rig.run import run

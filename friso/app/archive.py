@@ -6,14 +6,11 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from friso.axis import speaking_of
+from friso.interface.answer import Answer
 from friso.platform.leftovers import temporary_folder
 from friso.shown.files import pictures
-
-if TYPE_CHECKING:
-    from friso.interface.answer import Answer
 
 
 def archive(answer: Answer, more: Mapping[str, str]) -> bytes:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.shown.documents import entries
 from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure
 
@@ -35,12 +36,7 @@ def figure_on_page(figure: Figure) -> dict[str, Any]:
 
     The data serve wide and narrow pages.
     """
-    return {
-        "name": figure.name,
-        "title": figure.title,
-        "caption": figure.caption,
-        **plotly_renderer.parts_of_both(figure),
-    }
+    return {**entries(figure, "name", "title", "caption"), **plotly_renderer.parts_of_both(figure)}
 
 
 class _Arrays:

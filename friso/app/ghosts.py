@@ -8,12 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from friso.interface.answer import Answer
 from friso.shown.drawing.figure import Figure, Panel
-
-if TYPE_CHECKING:
-    from friso.interface.answer import Answer
 
 GHOST = "#a9a9a9"
 """Colour of lines of the pinned machine."""

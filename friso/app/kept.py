@@ -9,12 +9,11 @@ import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from friso.app.machine import Machine
-    from friso.app.work import Work
-    from friso.interface.answer import Answer
+from friso.app.machine import Machine
+from friso.app.work import Work
+from friso.interface.answer import Answer
 
 MOST = 4
 """Number of latest answers that are kept of each function. An answer with a Bode plot takes 20 MB."""

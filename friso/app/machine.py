@@ -9,7 +9,7 @@ from functools import cache, lru_cache
 from threading import Lock
 from typing import Any
 
-from friso.app.names import plain_name
+from friso.app.uploads import plain_name
 from friso.errors import InputError
 from friso.interface.schema import stage_schema
 from friso.quantities import Number, Quantity

@@ -26,6 +26,7 @@ from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
 from friso.questions.map.places import SHOWN, with_places
 from friso.shown.cases import case_labels
+from friso.shown.documents import entries
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
@@ -103,11 +104,7 @@ def words_of(answer: Answer) -> AnswerPart:
     return {
         "kind": "answer",
         "sentences": [*answer.sentences()],
-        "tables": [
-            {"title": item.title, "columns": item.columns, "rows": item.rows}
-            for item in answer.tables()
-            if not item.behind
-        ],
+        "tables": [entries(table, "title", "columns", "rows") for table in answer.tables() if not table.behind],
         "details": [*answer.details()],
         "failure": answer.failure,
     }
@@ -470,15 +467,10 @@ PICTURES = frozenset({"run", "cell", "loops", "bode", "flexure", "map"})
 """The questions whose first part is a picture that appears soon; all other questions wait for it."""
 
 
-def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRequest, Work], Answer]:
-    """Return a function that answers a command about the machine shown."""
-
-    def answer(asked: PageRequest, work: Work) -> Answer:
-        """Answer the command with the options that the page gave."""
-        options = asked.chosen(*OPTIONS.get(command, ()))
-        return KEPT.answer(function, asked.machine, work, options)
-
-    return answer
+def _answered(command: str, asked: PageRequest, work: Work) -> Answer:
+    """Answer a command about the machine shown, with the options that the page gave."""
+    options = asked.chosen(*OPTIONS.get(command, ()))
+    return KEPT.answer(getattr(friso, command), asked.machine, work, options)
 
 
 def _mapped(asked: PageRequest, work: Work) -> Answer:
@@ -493,14 +485,11 @@ def _mapped(asked: PageRequest, work: Work) -> Answer:
 
 
 COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
-    "simulate": _answered(friso.simulate, "simulate"),
-    "check": _answered(friso.check, "check"),
-    "bode": _answered(friso.bode, "bode"),
-    "flexure": _answered(friso.flexure, "flexure"),
-    "boundary": _answered(friso.boundary, "boundary"),
+    **{
+        name: partial(_answered, name)
+        for name in ("simulate", "check", "bode", "flexure", "boundary", "tune", "design")
+    },
     "map": _mapped,
-    "tune": _answered(friso.tune, "tune"),
-    "design": _answered(friso.design, "design"),
     "logs": _looked_into,
     "identify": _identified,
 }

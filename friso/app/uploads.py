@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 from collections.abc import AsyncIterable
 from contextlib import ExitStack
 from pathlib import Path
 
-from friso.app.names import plain_name
 from friso.errors import InputError
 from friso.platform.leftovers import temporary_folder
-from friso.platform.system import remove_folder
+from friso.platform.system import name_refused, remove_folder
 
 MOST_BYTES = 64_000_000
 """Largest size of a log in bytes."""
@@ -78,3 +78,19 @@ class Uploads:
     def remove(self) -> None:
         """Delete all dropped files and their folder."""
         self.held.close()
+
+
+_OUTSIDE = re.compile(r"[^\w.+ -]")
+
+LONGEST = 150
+"""Longest file name in bytes. File systems take 255, and names of accompanying files are longer."""
+
+
+def plain_name(name: str, otherwise: str) -> str:
+    """Return the last part of a path as a safe file name, or `otherwise` if nothing is left.
+
+    The name cannot lead to another folder, hide the file, or read as an option of a command.
+    """
+    last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
+    plain = last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
+    return f"_{plain}" if name_refused(Path(plain)) else plain

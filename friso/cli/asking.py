@@ -16,8 +16,7 @@ import typer
 
 from friso.axis import speak_of
 from friso.cli.arguments import parted_path
-from friso.cli.common import print_table, print_wrapped, say
-from friso.cli.output import print_document, print_written
+from friso.cli.common import print_document, print_table, print_wrapped, print_written, say
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.platform.interrupts import answers_interrupts, whole_answer

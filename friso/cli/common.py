@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 import textwrap
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -81,8 +83,37 @@ def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
     return parts
 
 
-def print_wrapped(sentence: str, indent: str = "") -> None:
-    """Print a sentence in lines as wide as the terminal, each after the `indent`."""
-    width = shutil.get_terminal_size().columns
-    lines = textwrap.wrap(sentence, max(40, width - len(indent)), break_long_words=False, break_on_hyphens=False)
-    print(textwrap.indent("\n".join(lines), indent))
+def print_wrapped(sentence: str) -> None:
+    """Print a sentence in lines as wide as the terminal."""
+    width = max(40, shutil.get_terminal_size().columns)
+    print("\n".join(textwrap.wrap(sentence, width, break_long_words=False, break_on_hyphens=False)))
+
+
+Replace = Annotated[bool, typer.Option("--overwrite", help="Replace the file if it exists.")]
+
+
+def print_document(document: Mapping[str, Any], files: Iterable[Path] = ()) -> None:
+    """Print the JSON document of a command, with the files written and the plug-ins loaded."""
+    from friso.stage.foreign import foreign
+
+    written = {"files": [str(file) for file in files], "plug_ins": foreign()}
+    print(json.dumps({**document, **written}, allow_nan=False))
+
+
+def print_written(files: Iterable[Path]) -> None:
+    """Print every file written on a line of its own; many pictures share one line."""
+    every = [*files]
+    pictures = [file for file in every if file.suffix in _PICTURES]
+    listed = every if len(pictures) <= _FEW else [file for file in every if file not in pictures]
+    for file in listed:
+        print(f"wrote {one_line(str(file))}")
+    if len(listed) < len(every):
+        figures, forms = (
+            len({file.stem for file in pictures}),
+            ", ".join(sorted({f.suffix[1:].upper() for f in pictures})),
+        )
+        print(f"wrote {figures} figures as {forms}")
+
+
+_PICTURES, _FEW = (".png", ".svg", ".pdf"), 6
+"""Suffixes of pictures, and the largest number of pictures listed one by one."""

@@ -111,35 +111,28 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
 def _display(to_go: Callable[[], str]) -> Display:
     """Build the display of the library rich: description, bar, counts, rate and time left."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        ProgressColumn,
-        Task,
-        TextColumn,
-    )
+    from rich import progress
     from rich.text import Text
 
-    class Rate(ProgressColumn):
+    class Rate(progress.ProgressColumn):
         """The column of the progress bar with the steps per second."""
 
-        def render(self, task: Task) -> Text:
+        def render(self, task: progress.Task) -> Text:
             """Write the steps per second, if there is one or more."""
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
-    class ToGo(ProgressColumn):
+    class ToGo(progress.ProgressColumn):
         """The column of the progress bar with the estimated time left."""
 
-        def render(self, task: Task) -> Text:
+        def render(self, task: progress.Task) -> Text:
             """Write the time left."""
             return Text(to_go())
 
     columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
+        progress.TextColumn("{task.description}", markup=False),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
         Rate(),
         ToGo(),
     )
-    return Progress(*columns, console=console(sys.stderr), transient=True)
+    return progress.Progress(*columns, console=console(sys.stderr), transient=True)

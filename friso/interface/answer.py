@@ -160,13 +160,14 @@ class Answer:
         return False
 
     def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
-        """Show the answer by a `function` in a `module` of the question's folder.
+        """Show the answer by a `function` in a `module` of the question's folder, or in its `words`.
 
         Returns what that function returns for the answer's subject and `more` arguments, or `otherwise` if there is no
         such function.
         """
-        name = f"{self.package}.{module}"
-        shown = getattr(import_module(name), function, None) if self.package and find_spec(name) else None
+        places = [f"{self.package}.{part}" for part in (module, "words")]
+        modules = (import_module(place) for place in places if self.package and find_spec(place))
+        shown = next((getattr(one, function) for one in modules if hasattr(one, function)), None)
         return otherwise if shown is None else shown(self.subject, *more)
 
     def sentences(self) -> Sequence[str]:

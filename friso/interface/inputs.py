@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from friso.errors import InputError, StageError
-from friso.quantities import Quantity, exactly, positive, quoted
+from friso.quantities import Quantity, exactly, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
 from friso.stage.files import load_changed, load_tables
@@ -176,14 +176,14 @@ _LONGEST_STEM = 150
 """Longest part [bytes] of another file's name that is used in names of written files."""
 
 
-def stem_of(source: StageLike, usual: str = "stage") -> str:
+def stem_of(source: StageLike) -> str:
     """Return a stem for names of files about a stage: the name of its file without suffix.
 
-    A stage without a file gets the `usual` stem. Bytes that are not text become "_". A long name is cut, so that
+    The stem of a stage without a file is "stage". Bytes that are not text become "_". A long name is cut, so that
     suffixes still fit.
     """
     if isinstance(source, Stage | Mapping):
-        return usual
+        return "stage"
     return re.sub("[\ud800-\udfff]", "_", Path(source).stem).encode()[:_LONGEST_STEM].decode(errors="ignore")
 
 
@@ -205,7 +205,7 @@ def text_of(value: str | float, unit: str) -> str:
     return value if isinstance(value, str) else exactly(value, unit)
 
 
-def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:
+def quantity_of(value: str | float, name: str, quantity: Quantity) -> float:
     """Convert a text with a unit, or a number in SI, to an SI value.
 
     Raises InputError, which names the option `name`, for a value that the `quantity` does not allow.
@@ -213,15 +213,7 @@ def quantity_of(value: str | float, name: str, quantity: Quantity, example: str 
     try:
         return float(quantity.read(text_of(value, quantity.unit)))
     except InputError as error:
-        raise InputError(name, error.actual, error.expected, f"{name}={example or error.example}") from None
-
-
-def seconds_of(value: str | float, name: str, example: str = "1 ms") -> float:
-    """Read a positive time [s] of the option `name`.
-
-    Raises InputError, which shows the `example`, for any other value.
-    """
-    return quantity_of(value, name, Quantity("s", positive, example))
+        raise InputError(name, error.actual, error.expected, f"{name}={error.example}") from None
 
 
 def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:

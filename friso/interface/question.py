@@ -14,6 +14,7 @@ from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from inspect import Parameter, signature
+from pkgutil import resolve_name
 from typing import Any
 
 from friso.errors import InputError
@@ -44,6 +45,20 @@ class Choices:
 
     title: str
     rows: Callable[[], Iterable[tuple[str, str]]]
+
+    @classmethod
+    def of_registry(cls, title: str, place: str) -> Choices:
+        """Return a list of what a registry holds, with one line on each.
+
+        `place` is the registry's module and its name in it, such as "friso.drives.format:FORMATS".
+        """
+
+        def rows() -> list[tuple[str, str]]:
+            """List the names in the registry, which is imported now."""
+            registry = resolve_name(place)
+            return [(name, registry.one_line(name)) for name in registry]
+
+        return cls(title, rows)
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from friso.axis import axis_shown
+from friso.hunting import Case
 from friso.hunting.measures import BANDS as SETTLING_BANDS
-from friso.shown.drawing.figure import BLUE, GREEN, VERMILLION
-
-if TYPE_CHECKING:
-    from friso.hunting import Case
-    from friso.stage import Stage
+from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
+from friso.stage import Stage
 
 COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
 LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}

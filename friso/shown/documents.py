@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from friso.axis import axis_shown
+from friso.axis import axis_shown, unit_of_key
+from friso.hunting import Dwell, Tracking
 from friso.hunting.measures import BANDS
-
-if TYPE_CHECKING:
-    from friso.hunting import Dwell, Tracking
 
 
 def plain_json(value: Any) -> Any:
@@ -35,6 +33,14 @@ def plain_json(value: Any) -> Any:
     return value
 
 
+def entries(source: object, *keys: str) -> dict[str, Any]:
+    """Return attributes of an object by their keys in a document.
+
+    A key is the attribute's name and its unit: "amplitude_m" is the amplitude [m].
+    """
+    return {key: getattr(source, unit_of_key(key)[0]) for key in keys}
+
+
 def unit_suffix(unit: str) -> str:
     """Return the suffix of a key for a unit: "_n_s_per_m" for "N*s/m", "" without a unit."""
     return f"_{unit.lower().replace('*', '_').replace('/', '_per_').replace('^', '')}" if unit else ""
@@ -45,8 +51,7 @@ def dwells_document(dwells: Sequence[Dwell]) -> list[dict[str, Any]]:
     return [
         {
             "move": dwell.number,
-            "position_m": dwell.position,
-            "since_s": dwell.since,
+            **entries(dwell, "position_m", "since_s"),
             "settling_time_s": dwell.settling[BANDS[0]],
             "settling_time_10um_s": dwell.settling[BANDS[1]],
         }
@@ -60,9 +65,7 @@ def tracking_document(tracking: Tracking) -> dict[str, Any]:
         "largest_error_m": tracking.largest,
         "rms_error_m": tracking.rms,
         "largest_force_n": tracking.largest_force,
-        "period_s": tracking.period,
-        "closed": tracking.closed,
-        "multiplier": tracking.multiplier,
+        **entries(tracking, "period_s", "closed", "multiplier"),
         "reversals": [
             {"time_s": one.time, "position_m": one.position, "largest_error_m": one.error} for one in tracking.reversals
         ],

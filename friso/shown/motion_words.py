@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.axis import axis_shown
 from friso.equations.motion import initial_displacement, reference, rests
+from friso.hunting import Dwell, Tracking
 from friso.hunting.criteria import REST_BAND
 from friso.hunting.measures import BANDS
 from friso.shown.drawing.prefixes import listed, with_unit
+from friso.stage import Stage
 from friso.stage.motion import motion_of
-
-if TYPE_CHECKING:
-    from friso.hunting import Dwell, Tracking
-    from friso.stage import Stage
 
 
 def following_sentence(tracking: Tracking) -> str:

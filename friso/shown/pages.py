@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -21,12 +21,11 @@ from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.images import ON_PAGE, draw_beforehand, image
 from friso.shown.drawing.prefixes import listed
+from friso.shown.files import Content, Files, pictures
 from friso.shown.glossary import Glossary
+from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.version import VERSION
-
-if TYPE_CHECKING:
-    from friso.stage import Stage
 
 
 def made_with() -> str:
@@ -85,6 +84,14 @@ class Report:
             return cls(command, name, figures, templates=templates, values=values)
         about = (stage.to_toml(), stage.source)
         return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
+
+    def files(self, beside: Files = MappingProxyType({})) -> dict[str, Content]:
+        """Return the page, files `beside` it, and every figure in all formats, by file name.
+
+        The page has the name of the command's question.
+        """
+        images = pictures(self.figures)  # other processes draw them while the page is written
+        return {f"{self.command.partition(' ')[0]}.html": self.html(), **beside, **images}
 
     def html(self) -> str:
         """Return the page, which opens offline and prints; every run gives the same bytes."""

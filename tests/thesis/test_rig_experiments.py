@@ -9,9 +9,7 @@ from refusals import Refused
 
 from friso import load
 from friso.progress import silent
-from friso.questions.rig.document import rig_document
-from friso.questions.rig.figures import rig_figures
-from friso.questions.rig.words import sentences
+from friso.questions.rig.words import rig_document, rig_figures, sentences
 from friso.studies.rig.moves_on_rails import rails, with_joint
 from friso_thesis.studies.rig import in_position, measured_cycles, stroke_crossover
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from friso.cli.command import Command
-from friso.cli.output import Replace
+from friso.cli.common import Replace
 from friso.interface.question import HELP, Choices
 
 

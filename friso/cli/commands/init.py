@@ -9,8 +9,7 @@ import typer
 
 from friso.cli.asking import named_as_options
 from friso.cli.command import Command
-from friso.cli.common import Overrides
-from friso.cli.output import Replace
+from friso.cli.common import Overrides, Replace
 from friso.interface.question import MACHINE
 from friso.platform.system import shell_word
 

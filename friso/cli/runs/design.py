@@ -8,8 +8,7 @@ from typing import Any
 import typer
 
 from friso.cli.asking import Shown, ask
-from friso.cli.common import say
-from friso.cli.output import print_document
+from friso.cli.common import print_document, say
 from friso.interface.question import Question
 
 

@@ -10,7 +10,7 @@ from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.questions.bode.states import has_limiter, side
 from friso.questions.bode.words import stability
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 
 
 def bode_document(bode: Bode) -> dict[str, Any]:
@@ -32,12 +32,7 @@ def bode_document(bode: Bode) -> dict[str, Any]:
         "worst": _at(bode, *bode.worst),
         "worst_settled": _at(bode, *bode.settled),
         "unstable_speeds_m_per_s": [
-            {
-                "low": unstable.low,
-                "high": unstable.high,
-                "limiter": _limiter(bode, unstable.touched),
-                "forward": unstable.forward,
-            }
+            {**entries(unstable, "low", "high", "forward"), "limiter": _limiter(bode, unstable.touched)}
             for unstable in bode.unstable
         ],
         "limits": {name: _limits(margins, "hz" if crossover else "factor") for name, margins in bode.limits.items()},
@@ -49,18 +44,9 @@ def bode_document(bode: Bode) -> dict[str, Any]:
 
 def _margins(margins: Margins) -> dict[str, Any]:
     """Return the stability margins and poles of one loop."""
-    return {
-        "stable": margins.stable,
-        "crossovers_hz": list(margins.crossovers),
-        "phase_margin_deg": margins.phase_margin,
-        "gain_margin": margins.gain_margin,
-        "gain_reduction": margins.gain_reduction,
-        "delay_margin_s": margins.delay_margin,
-        "modulus_margin": margins.modulus_margin,
-        "peak_sensitivity": margins.peak_sensitivity,
-        "closest_hz": margins.closest,
-        "poles": [[pole.real, pole.imag] for pole in margins.poles.tolist()],
-    }
+    ratios = entries(margins, "stable", "crossovers_hz", "phase_margin_deg", "gain_margin", "gain_reduction")
+    distances = entries(margins, "delay_margin_s", "modulus_margin", "peak_sensitivity", "closest_hz")
+    return {**ratios, **distances, "poles": [[pole.real, pole.imag] for pole in margins.poles.tolist()]}
 
 
 def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:

@@ -15,19 +15,8 @@ from friso.frequency.crossover import WANTED
 from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
 from friso.questions.bode.table import decibels
 from friso.shown.drawing.colours import ramp
-from friso.shown.drawing.figure import (
-    INK,
-    LIGHT,
-    Array,
-    Axis,
-    Band,
-    Dash,
-    Figure,
-    Limit,
-    Markers,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.palette import INK, LIGHT
 from friso.shown.drawing.prefixes import pretty, with_unit
 from friso.stage.tables import moving_mass
 

@@ -8,16 +8,9 @@ import numpy as np
 
 from friso.hunting import Diagram, Meeting, Plane
 from friso.questions.boundary.words import ShownKey, conclusion
-from friso.shown.documents import plain_json
-from friso.studies.boundary import (
-    Line,
-    corner_verdicts,
-    curve_ends,
-    curve_meetings,
-    end_verdicts,
-    lines,
-    lost_places,
-)
+from friso.shown.documents import entries, plain_json
+from friso.studies import boundary
+from friso.studies.boundary import Line
 
 
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
@@ -28,13 +21,12 @@ def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> di
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
     """Return flips, folds and other special points, branches, and the verdicts at both ends."""
-    branches = lines(traced)
+    branches = boundary.lines(traced)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {
-        "key": key.key,
-        "unit": key.unit,
+        **entries(key, "key", "unit"),
         "points": sorted(points, key=lambda point: point["value"]),
-        "ends": dict(zip(("low", "high"), end_verdicts(traced), strict=True)),
+        "ends": dict(zip(("low", "high"), boundary.end_verdicts(traced), strict=True)),
         "branches": [_branch(line, key) for line in branches],
     }
 
@@ -68,16 +60,17 @@ def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     """Return the curves in the plane of two keys, how they end and meet, and the corner verdicts."""
     x, y = keys
-    verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
+    verdicts = [verdict for _, _, verdict in boundary.corner_verdicts(traced)]
     return {
-        "x": {"key": x.key, "unit": x.unit},
-        "y": {"key": y.key, "unit": y.unit},
-        "curves": [_curve(line, keys) for line in lines(traced)],
+        "x": entries(x, "key", "unit"),
+        "y": entries(y, "key", "unit"),
+        "curves": [_curve(line, keys) for line in boundary.lines(traced)],
         "ends": [
-            {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind} for end in curve_ends(traced)
+            {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind}
+            for end in boundary.curve_ends(traced)
         ],
-        "meetings": [_meeting(meeting, keys) for meeting in curve_meetings(traced)],
-        "lost": _numbers(lost_places(traced), keys),
+        "meetings": [_meeting(meeting, keys) for meeting in boundary.curve_meetings(traced)],
+        "lost": _numbers(boundary.lost_places(traced), keys),
         "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
     }
 
@@ -85,7 +78,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
 def _meeting(meeting: Meeting, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     """Return where and how two curves meet, and whether both are changes of one cycle."""
     return {
-        "curves": list(meeting.curves),
+        "curves": meeting.curves,
         "how": meeting.kind,
         "places": _numbers(meeting.places, keys),
         "error": _numbers(meeting.error[None], keys)[0],
@@ -100,9 +93,7 @@ def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
         "cycle": line.shape,
         "points": _numbers(line.at, keys),
         "error": _numbers(line.error, keys),
-        "amplitude_m": line.amplitude.tolist(),
-        "period_s": line.period.tolist(),
-        "ends": line.ends,
+        **entries(line, "amplitude_m", "period_s", "ends"),
     }
 
 

@@ -10,37 +10,10 @@ import numpy as np
 from friso.hunting import Diagram, KeyRange, Plane
 from friso.questions.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, end_sentence
 from friso.questions.map.words import QUIET, quantity
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    LIGHT,
-    VERMILLION,
-    Axis,
-    Category,
-    Cloud,
-    Dash,
-    Figure,
-    Limit,
-    Markers,
-    Panel,
-    Series,
-    Symbol,
-)
-from friso.studies.boundary import (
-    ATTRACTS,
-    INVALID,
-    REPELS,
-    UNKNOWN,
-    CycleShape,
-    Line,
-    curve_ends,
-    curve_meetings,
-    lines,
-    lost_places,
-    node_verdicts,
-)
+from friso.shown.drawing.figure import Axis, Category, Cloud, Dash, Figure, Limit, Markers, Panel, Series, Symbol
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, LIGHT, VERMILLION
+from friso.studies import boundary
+from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line
 
 NAMES: dict[CycleShape, str] = {
     "symmetric": "hunting cycle",
@@ -87,7 +60,7 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
 
     The legend stands above the first panel.
     """
-    branches, x = lines(traced), _axis(traced.space.ranges[0])
+    branches, x = boundary.lines(traced), _axis(traced.space.ranges[0])
     sizes = [size for line in branches for size in line.amplitude]
     log = max(sizes, default=0.0) > LOGARITHMIC * min(sizes, default=0.0)
     panels = (
@@ -140,7 +113,7 @@ def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
 def _plane(traced: Plane) -> Figure:
     """Draw the curves on which hunting ends, and the verdicts at the nodes of the grid."""
     x, y = (_axis(swept, MARGIN) for swept in traced.space.ranges)
-    curves = lines(traced)
+    curves = boundary.lines(traced)
     series = tuple(
         Series(
             line.at[:, 0],
@@ -152,17 +125,17 @@ def _plane(traced: Plane) -> Figure:
         )
         for line in curves
     )
-    across, up, verdicts = zip(*node_verdicts(traced), strict=True)
+    across, up, verdicts = zip(*boundary.node_verdicts(traced), strict=True)
     codes = np.array([list(NODES).index(verdict) for verdict in verdicts], dtype=float)
     numbers = np.full(codes.shape, np.nan)
     nodes = Cloud(np.array(across), np.array(up), numbers, "", "", categories=tuple(NODES.values()), codes=codes)
     kinds = dict.fromkeys(line.kinds[0] for line in curves)
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
-    lost_ends = [end.at for end in curve_ends(traced) if end.kind == "lost"]
-    meetings = [place for meeting in curve_meetings(traced) for place in meeting.places]
+    lost_ends = [end.at for end in boundary.curve_ends(traced) if end.kind == "lost"]
+    meetings = [place for meeting in boundary.curve_meetings(traced) for place in meeting.places]
     marks = (
-        *_marks(lost_places(traced), LOST, GREY, "cross"),
+        *_marks(boundary.lost_places(traced), LOST, GREY, "cross"),
         *_marks(lost_ends, LOST_END, GREY, "triangle"),
         *_marks(meetings, MEETING, GREEN, "target"),
     )

@@ -10,21 +10,9 @@ from typing import TYPE_CHECKING, Any
 from friso.axis import AxisKind
 from friso.equations.bandwidth import range_example
 from friso.hunting import CYCLE_RTOL, KeyRange
+from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import (
-    AxisRange,
-    Changes,
-    Links,
-    StageLike,
-    Tolerance,
-    axes_of,
-    mention_unstable_loop,
-    pairs_of,
-    read_stage,
-    stem_of,
-    tolerance_of,
-    wrong,
-)
+from friso.interface.inputs import AxisRange, Changes, Links, StageLike, Tolerance
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, any_sign
 from friso.stage import Stage
@@ -123,21 +111,21 @@ def boundary(
     >>> import friso
     >>> friso.boundary(friso.example("thesis_rig"), x="controller.crossover=1 Hz..40 Hz")  # doctest: +SKIP
     """
-    chosen, tolerance = read_stage(stage, set), tolerance_of(rtol)
+    chosen, tolerance = inputs.read_stage(stage, set), inputs.tolerance_of(rtol)
     example = range_example(chosen.flat())
-    ranges = axes_of(axes or {}, {"x": x, "y": y}, example)
+    ranges = inputs.axes_of(axes or {}, {"x": x, "y": y}, example)
     if not ranges or (y and not (x or axes)):
-        raise wrong("x", "no key", "one key or two with their ranges", example)
-    links = pairs_of(link, "link", 'masses.cart="0.7 * mass"')
+        raise inputs.wrong("x", "no key", "one key or two with their ranges", example)
+    links = inputs.pairs_of(link, "link", 'masses.cart="0.7 * mass"')
     from friso.studies.boundary import boundary as traced_boundary
 
     def begins() -> None:
         """Report what is computed, and whether the loop is unstable, before the work starts."""
-        mention_unstable_loop(chosen)
+        inputs.mention_unstable_loop(chosen)
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 
     traced = traced_boundary(chosen, ranges, links, tolerance, log, begins, progress)
-    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], name=stem_of(stage))
+    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], name=inputs.stem_of(stage))
 
 
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:

@@ -12,26 +12,8 @@ import numpy as np
 from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Meeting, Plane, Space
 from friso.shown.drawing.figure import Array
 from friso.shown.drawing.prefixes import listed, plus_minus, pretty, with_unit
-from friso.studies.boundary import (
-    ATTRACTS,
-    INVALID,
-    REPELS,
-    UNKNOWN,
-    CycleShape,
-    Line,
-    PlaneEdge,
-    StabilityChange,
-    corner_verdicts,
-    curve_ends,
-    curve_meetings,
-    end_verdicts,
-    followed_changes,
-    lines,
-    lost_places,
-    place_verdicts,
-    plane_edge,
-    stability_changes,
-)
+from friso.studies import boundary
+from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line, PlaneEdge, StabilityChange
 
 VERDICTS = {
     ATTRACTS: "hunting is possible",
@@ -139,10 +121,10 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     """Say where hunting begins and ends over one key, or along which curves over two."""
     if isinstance(traced, Diagram):
         return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
-    if edge := plane_edge(traced):
+    if edge := boundary.plane_edge(traced):
         return " ".join([_along_one(edge, keys), *_first_meetings(traced, keys)])
-    verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
-    if curves := lines(traced):
+    verdicts = [verdict for _, _, verdict in boundary.corner_verdicts(traced)]
+    if curves := boundary.lines(traced):
         longest = sorted(range(len(curves)), key=lambda number: -len(curves[number].at))[:SHOWN_CURVES]
         more = [f"There are {len(curves) - len(longest)} more curves."] if len(curves) > len(longest) else []
         courses = [f"{_course(traced, number, keys, ROUGHLY)}." for number in longest]
@@ -178,7 +160,7 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
 
 def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
     """Say at which corners of the plane hunting is possible."""
-    corners = corner_verdicts(traced)
+    corners = boundary.corner_verdicts(traced)
     hunting = [_place((x, y), keys) for x, y, verdict in corners if verdict == ATTRACTS]
     unknown = sum(verdict == UNKNOWN for _, _, verdict in corners)
     others = f" (unknown at {unknown})" if unknown else ""
@@ -192,7 +174,10 @@ def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int 
 
     `number` is the index of the curve. Values have `digits` digits.
     """
-    line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
+    line, ends = (
+        boundary.lines(traced)[number],
+        [end for end in boundary.curve_ends(traced) if end.line == number],
+    )
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
     start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
     first, last = (end.kind for end in ends)
@@ -213,7 +198,7 @@ def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Say for each meeting of two curves where they meet, and whether both change one cycle."""
-    return [_meeting(meeting, lines(traced), keys) for meeting in curve_meetings(traced)]
+    return [_meeting(meeting, boundary.lines(traced), keys) for meeting in boundary.curve_meetings(traced)]
 
 
 def _meeting(meeting: Meeting, curves: Sequence[Line], keys: tuple[ShownKey, ...]) -> str:
@@ -243,12 +228,12 @@ ENDS = {
 
 def _edges(traced: Diagram, key: ShownKey) -> str:
     """Say where hunting begins and ends over the range, and how many values were tried."""
-    changes, verdicts = stability_changes(traced), place_verdicts(traced)
+    changes, verdicts = boundary.stability_changes(traced), boundary.place_verdicts(traced)
     values_tried = f"{len(verdicts)} values were tried"
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
     at = {change.low for change in changes}
-    errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in lines(traced) for k in line.special}
-    others = [(value, begins) for value, begins in followed_changes(traced) if value not in at]
+    errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in boundary.lines(traced) for k in line.special}
+    others = [(value, begins) for value, begins in boundary.followed_changes(traced) if value not in at]
     answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
     if changes:
         places = [
@@ -294,7 +279,7 @@ def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, floa
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
     """Describe each branch over one key, and its flips, folds and other special points."""
-    branches = lines(traced)
+    branches = boundary.lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
     return [*(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
 
@@ -329,13 +314,13 @@ def _branch_sentence(line: Line, key: ShownKey, space: Space) -> str:
 def end_sentence(traced: Diagram, key: ShownKey) -> str:
     """Give the verdicts at both ends of the key's range."""
     swept = traced.space.ranges[0]
-    first, last = end_verdicts(traced)
+    first, last = boundary.end_verdicts(traced)
     return f"At {key.text(swept.low)}: {VERDICTS[first]}; at {key.text(swept.high)}: {VERDICTS[last]}."
 
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Describe each curve in the plane of two keys, their meetings, and the corners."""
-    curves = lines(traced)
+    curves = boundary.lines(traced)
     text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
     text += meeting_sentences(traced, keys) or ["No two of the curves meet."] * (len(curves) > 1)
     text += [
@@ -357,7 +342,7 @@ def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Give the verdicts at the corners of the plane, in one sentence if they agree."""
-    corners = corner_verdicts(traced)
+    corners = boundary.corner_verdicts(traced)
     if len({verdict for _, _, verdict in corners}) == 1:
         return [f"At all four corners: {VERDICTS[corners[0][2]]}."]
     return [f"At {_place((x, y), keys)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
@@ -368,7 +353,7 @@ def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
     The list is empty if there are no such points.
     """
-    places = [_place(values, keys) for values in lost_places(traced).tolist()]
+    places = [_place(values, keys) for values in boundary.lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 

@@ -8,33 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso import hunting
 from friso.questions.check.laws import laws_document
 from friso.questions.check.words import answer
-from friso.shown.documents import dwells_document, plain_json, tracking_document, unit_suffix
+from friso.shown.documents import dwells_document, entries, plain_json, tracking_document, unit_suffix
 from friso.stage.tables import passive_where
 
 if TYPE_CHECKING:
-    from friso.hunting import (
-        AttractionEnd,
-        BandwidthWindow,
-        Case,
-        Cycle,
-        Feeding,
-        Judgement,
-        Margin,
-        MarginEnd,
-        ParameterMargin,
-        Swing,
-    )
     from friso.remedies.catalogue import Suggestion
-    from friso.shares import Share
     from friso.stage import Stage
     from friso.studies.draws import Draws
     from friso.studies.laws.verdicts import VerdictsByLaw
 
 
 def check_document(
-    cases: Mapping[str, Case],
+    cases: Mapping[str, hunting.Case],
     draws: Draws | None = None,
     isolator: Suggestion | None = None,
     laws: VerdictsByLaw | None = None,
@@ -71,29 +59,25 @@ def _isolator(isolator: Suggestion) -> dict[str, Any]:
     }
 
 
-def _feeding(feeding: Feeding) -> dict[str, Any]:
+def _feeding(feeding: hunting.Feeding) -> dict[str, Any]:
     """Return the fractions of friction and backlash down to which hunting persists."""
     parts = {"friction": feeding.friction, "backlash": feeding.backlash}
     return {name: asdict(part) | {"needed": part.needed} for name, part in parts.items() if part}
 
 
-def _case(case: Case) -> dict[str, Any]:
+def _case(case: hunting.Case) -> dict[str, Any]:
     """Return all results for one state of the joint: verdict, run, cycle, margins and basins."""
     into_1um, into_10um = case.settling_time.values()
     last_1um, last_10um = case.in_the_end.values()
     judgement = case.judgement
     return {
-        "verdict": case.verdict,
-        "peaks": case.peaks,
-        "peak_to_peak_m": case.peak_to_peak,
-        "period_s": case.period,
+        **entries(case, "verdict", "peaks", "peak_to_peak_m", "period_s"),
         "settling_time_s": into_1um,
         "settling_time_10um_s": into_10um,
         "settling_time_in_the_end_s": last_1um,
         "settling_time_10um_in_the_end_s": last_10um,
-        "largest_force_n": case.largest_force,
+        **entries(case, "largest_force_n", "unmoved"),
         "breakaway_force_n": case.breakaway,
-        "unmoved": case.unmoved,
         "cycle": _cycle(judgement.cycle) if judgement.cycle else None,
         "cycles": len(judgement.hunting.cycles),
         "reason": judgement.hunting.reason or None,
@@ -102,13 +86,11 @@ def _case(case: Case) -> dict[str, Any]:
         "windows": _windows(judgement.windows),
         "settles_below": _end(judgement.lower),
         "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
-        "advice_keeps_friction": case.advice_keeps_friction,
-        "slower_keeps_friction": case.slower_keeps_friction,
+        **entries(case, "advice_keeps_friction", "slower_keeps_friction"),
         "kick": _kick(judgement),
         "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
-        "observed": judgement.observed,
-        "given_up": judgement.given_up,
+        **entries(judgement, "observed", "given_up"),
         "loop_unstable_while_it": case.unstable,
         "loop_unstable_bandwidths": _windows(case.unstable_bandwidths),
         **({"loop_unstable_as_built_while_it": case.unstable_as_built} if case.unstable_as_built else {}),
@@ -117,42 +99,22 @@ def _case(case: Case) -> dict[str, Any]:
         **({"tracking": tracking_document(case.tracking)} if case.tracking else {}),
         "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],
         "certain": judgement.hunting.certain,
-        "solver": {
-            "status": case.solver.status,
-            "steps": case.solver.steps,
-            "rejected": case.solver.rejected,
-            "rtol": case.solver.rtol,
-        },
+        "solver": entries(case.solver, "status", "steps", "rejected", "rtol"),
     }
 
 
-def _cycle(cycle: Cycle) -> dict[str, Any]:
+def _cycle(cycle: hunting.Cycle) -> dict[str, Any]:
     """Return the properties of a hunting cycle."""
-    return {
-        "amplitude_m": cycle.amplitude,
-        "period_s": cycle.period,
-        "swings_per_period": cycle.swings,
-        "multiplier": cycle.multiplier,
-        "symmetric": cycle.symmetric,
-        "attracts": cycle.attracts,
-        "slope": cycle.slope,
-        "growth": cycle.growth,
-        "residual": cycle.residual,
-        "time_constant_s": cycle.time_constant,
-    }
+    names = ("amplitude_m", "period_s", "multiplier", "symmetric", "attracts", "slope", "growth", "residual")
+    return {**entries(cycle, *names, "time_constant_s"), "swings_per_period": cycle.swings}
 
 
-def _swing(swing: Swing) -> dict[str, Any]:
+def _swing(swing: hunting.Swing) -> dict[str, Any]:
     """Return amplitude and period of a swing that was observed in a run."""
-    return {
-        "amplitude_m": swing.amplitude,
-        "period_s": swing.period,
-        "regular": swing.regular,
-        "swings_per_period": swing.swings,
-    }
+    return {**entries(swing, "amplitude_m", "period_s", "regular"), "swings_per_period": swing.swings}
 
 
-def _kick(judgement: Judgement) -> dict[str, Any] | None:
+def _kick(judgement: hunting.Judgement) -> dict[str, Any] | None:
     """Return the displacements and pushes that start hunting; None if they were not searched."""
     if judgement.displacement is None or judgement.push is None:
         return None
@@ -164,36 +126,30 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
     }
 
 
-def _windows(windows: Iterable[BandwidthWindow]) -> list[dict[str, Any]]:
+def _windows(windows: Iterable[hunting.BandwidthWindow]) -> list[dict[str, Any]]:
     """Return windows of bandwidths by their ends."""
     return [{"low": _end(window.low), "high": _end(window.high)} for window in windows]
 
 
-def _margin(edge: Margin) -> dict[str, Any]:
+def _margin(edge: hunting.Margin) -> dict[str, Any]:
     """Return how far the bandwidth is from the edge of hunting, for the document."""
-    crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
-    return {**crossover, "settles_at_factor": edge.quiet, "reserve": edge.reserve}
+    return {**entries(edge, "factor", "crossover_hz", "certain", "reserve"), "settles_at_factor": edge.quiet}
 
 
-def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
+def _end(end: hunting.AttractionEnd | None) -> dict[str, Any] | None:
     """Return one end of the bandwidths at which hunting attracts; None if there is no end."""
     if end is None:
         return None
-    return {
-        "factor": end.inside,
-        "settles_at_factor": end.outside,
-        "certain": end.certain,
-        "reserve": end.reserve,
-    }
+    return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve")}
 
 
-def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
+def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:
     """Return the multiples of a parameter at which hunting begins or ends.
 
     Each end has the last multiple with an unchanged verdict and the next multiple with another verdict.
     """
 
-    def end(one: MarginEnd | None) -> dict[str, Any] | None:
+    def end(one: hunting.MarginEnd | None) -> dict[str, Any] | None:
         """Return one end of a margin; None if hunting does not change on that side."""
         return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}
 
@@ -206,7 +162,7 @@ def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
     }
 
 
-def joint_margins_document(stage: Stage, margins: Mapping[str, ParameterMargin]) -> dict[str, Any]:
+def joint_margins_document(stage: Stage, margins: Mapping[str, hunting.ParameterMargin]) -> dict[str, Any]:
     """Return the margins of a stage in the keys of its joint, as multiples and as values."""
     document, flat, fields = {}, stage.flat(), stage.numeric_keys()
     for key, margin in margins.items():
@@ -226,8 +182,8 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "count": draws.sample.count,
         "seed": draws.seed,
         "left_out": draws.sample.left_out,
-        "hunts": _share_document(fates.share(("hunts",))),
-        "attracting_cycle": _share_document(fates.share(ATTRACTED)),
+        "hunts": asdict(fates.share(("hunts",))),
+        "attracting_cycle": asdict(fates.share(ATTRACTED)),
         "criterion": VERDICT_CRITERION,
         "verdicts": fates.counts,
         "loop_unstable": int(fates.unstable.sum()),
@@ -242,8 +198,3 @@ def _ends(values: np.ndarray) -> list[float] | None:
     """Return the least and the largest finite value; None if no value is finite."""
     finite = values[np.isfinite(values)]
     return [float(finite.min()), float(finite.max())] if finite.size else None
-
-
-def _share_document(share: Share) -> dict[str, float]:
-    """Return a probability with its confidence interval."""
-    return {"probability": share.probability, "low": share.low, "high": share.high}

@@ -7,7 +7,8 @@ import numpy as np
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.shown.cases import case_labels
-from friso.shown.drawing.figure import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
+from friso.shown.drawing.figure import Axis, Band, Figure, Panel
+from friso.shown.drawing.palette import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION
 from friso.shown.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval
 from friso.studies.draws import Draws, Fates
 from friso.studies.settings import settings

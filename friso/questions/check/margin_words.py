@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from friso.equations.scaled_friction import least_static_factor, static_frictions
-from friso.hunting import SEARCH_LIMITS
+from friso.hunting import SEARCH_LIMITS, Case, MarginEnd, ParameterMargin
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
     digits_that_differ,
@@ -16,9 +16,6 @@ from friso.shown.drawing.prefixes import (
     rounded_up,
     with_unit,
 )
-
-if TYPE_CHECKING:
-    from friso.hunting import Case, MarginEnd, ParameterMargin
 
 
 def friction_sentences(case: Case) -> list[str]:

@@ -11,20 +11,9 @@ from friso.engine.kernel import kernels
 from friso.engine.simulate import SIMULATION_RTOL, simulate
 from friso.errors import InputError
 from friso.hunting import LONG_RUN_RTOL, Case, needed_kernels
+from friso.interface import inputs
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import (
-    LOGGER,
-    Changes,
-    Seed,
-    StageLike,
-    Tolerance,
-    Whole,
-    correlations_of,
-    mention_unstable_loop,
-    read_stage,
-    tolerance_of,
-    whole_number,
-)
+from friso.interface.inputs import LOGGER, Changes, Seed, StageLike, Tolerance, Whole
 from friso.platform.interrupts import answers_interrupts
 from friso.progress import Progress, silent
 from friso.stage import Stage
@@ -219,8 +208,8 @@ def check(
     >>> print(answer.data["peak_to_peak"].attrs["units"])
     m
     """
-    chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
-    return checked_stage(chosen, correlations_of(stage, chosen), tolerance, draws, seed, laws, progress)
+    chosen, tolerance = inputs.read_stage(stage, set, uncertain_too=True), inputs.tolerance_of(rtol)
+    return checked_stage(chosen, inputs.correlations_of(stage, chosen), tolerance, draws, seed, laws, progress)
 
 
 def checked_stage(
@@ -241,7 +230,7 @@ def checked_stage(
     loose = max(tolerance, LONG_RUN_RTOL)
     sample = uncertain = None
     if draws is not None:
-        whole_number(draws, "draws", 1, settings.most_draws, "1000")
+        inputs.whole_number(draws, "draws", 1, settings.most_draws, "1000")
         try:
             sample = draw(chosen, correlations, draws, seed)
         except InputError as error:
@@ -251,7 +240,7 @@ def checked_stage(
     from friso.hunting import check as judged
 
     kernels(needed_kernels(chosen))
-    mention_unstable_loop(chosen)
+    inputs.mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
     cases = {name: _as_built(case) for name, case in cases.items()}
     drawn = across = None

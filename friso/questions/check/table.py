@@ -6,10 +6,9 @@ The cases are the stage as given, with its joint locked, and with its joint free
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from friso.axis import axis_shown
-from friso.hunting import MORE_WORK, CheckPart
+from friso.hunting import MORE_WORK, Case, CheckPart, Cycle, Kick, Tracking
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
@@ -24,9 +23,6 @@ from friso.shown.drawing.prefixes import (
     window_with_unit,
     with_unit,
 )
-
-if TYPE_CHECKING:
-    from friso.hunting import Case, Cycle, Kick, Tracking
 
 _WINDOWS = 4  # largest number of listed windows of kicks
 UNKNOWN = f"not determined: that takes {MORE_WORK}"

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from friso.equations.bandwidth import bandwidth
-from friso.hunting import MORE_WORK, SEARCH_LIMITS, CheckPart
-from friso.hunting.criteria import ATTRACTED
+from friso.hunting import (
+    MORE_WORK,
+    SEARCH_LIMITS,
+    AttractionEnd,
+    BandwidthWindow,
+    Case,
+    CheckPart,
+    Decline,
+    Feeding,
+    Kick,
+    Margin,
+    MoveShare,
+)
+from friso.hunting.criteria import ATTRACTED, Verdict
 from friso.quantities import percent, plain_factor
-from friso.questions.check.feeding_words import feeding_sentences
 from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
 from friso.shown.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.shown.drawing.prefixes import (
@@ -28,10 +38,6 @@ from friso.shown.motion_words import dwell_sentences, following_sentence
 from friso.stage.controllers import FORCE_LIMIT, integral_leak
 from friso.stage.motion import motion_of
 from friso.stage.section import numeric_fields
-
-if TYPE_CHECKING:
-    from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin, MoveShare
-    from friso.hunting.criteria import Verdict
 
 _MICRON, _TEN_MICRON = BANDS
 
@@ -112,15 +118,14 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
     return [*says, *filter(None, [conclusion(cases)]), *_goes_on(cases, says)]
 
 
-def _goes_on(cases: Mapping[str, Case], says: Sequence[str]) -> list[str]:
-    """Say which commands have no limit of work, if the sentences `says` on the cases leave something open for it."""
-    if not any(MORE_WORK in text for text in says) and not any(case.judgement.given_up for case in cases.values()):
-        return []
-    return [
-        "A check ends after a fixed amount of work. Without that limit, friso boundary follows hunting over a range of "
-        "your choice (--x speed=0.5..2, or another key), friso map runs stages over one, and friso simulate runs one "
-        "motion for longer (--set motion.duration)."
-    ]
+def _goes_on(cases: Mapping[str, Case], says: Sequence[str]) -> Iterator[str]:
+    """Yield which commands have no limit of work, if the sentences `says` on the cases leave something open."""
+    if any(MORE_WORK in text for text in says) or any(case.judgement.given_up for case in cases.values()):
+        yield (
+            "A check ends after a fixed amount of work. Without that limit, friso boundary follows hunting over a "
+            "range of your choice (--x speed=0.5..2, or another key), friso map runs stages over one, and friso "
+            "simulate runs one motion for longer (--set motion.duration)."
+        )
 
 
 def conclusion(cases: Mapping[str, Case]) -> str | None:
@@ -337,12 +342,11 @@ def _small_swing(case: Case) -> str:
     return f": at its end it swings by {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
 
 
-def _doubts(case: Case) -> list[str]:
-    """Say why the verdict is not certain, if it is not."""
+def _doubts(case: Case) -> Iterator[str]:
+    """Yield why the verdict is not certain, if it is not."""
     hunting = case.judgement.hunting
-    if hunting.certain:
-        return []
-    return [f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."]
+    if not hunting.certain:
+        yield f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."
 
 
 def _running_away(case: Case) -> list[str]:
@@ -614,3 +618,37 @@ def _end(case: Case) -> str:
     if not case.period:
         return f"in its last quarter it still moves by {at_the_end(case)}"
     return f"still {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
+
+
+def feeding_sentences(feeding: Feeding) -> list[str]:
+    """Say whether hunting ends without friction or without backlash, and at which fraction."""
+    friction, backlash = feeding.friction, feeding.backlash
+    if friction is None:
+        feeds = "The backlash feeds it" if backlash.needed else "The backlash does not feed it"
+        return [f"{feeds}: there is no dry friction; {_course('backlash', backlash)}.", *_doubt(backlash)]
+    feeds = {
+        (True, True): "Friction and backlash feed it together, and it ends without either of them",
+        (True, False): "Friction feeds it, not the backlash",
+        (False, True): "The backlash feeds it, not the friction",
+        (False, False): "Either friction or backlash alone would feed it",
+    }[friction.needed, backlash.needed]
+    return [
+        f"{feeds}: {_course('dry friction', friction)}; {_course('backlash', backlash)}.",
+        *_doubt(friction, backlash),
+    ]
+
+
+def _course(name: str, decline: Decline) -> str:
+    """Say how hunting changes as friction or backlash is scaled down."""
+    if decline.gone == 0:
+        return f"it shrinks in proportion to the {name}, and is gone without it"
+    if decline.gone is None:
+        return f"it lasts down to {percent(decline.lasts, 3)} of the {name}"
+    return f"it persists at {decline.lasts:.3g} times the {name} and disappears at {decline.gone:.3g} times"
+
+
+def _doubt(*declines: Decline) -> list[str]:
+    """Return a sentence if the result is not certain; an empty list otherwise."""
+    certain = all(decline.certain for decline in declines)
+    doubt = "That is not certain: some simulations were given up, or swings too small for them to see may last."
+    return [] if certain else [doubt]

@@ -10,7 +10,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.questions.compare.words import sentences
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 from friso.studies.compare.study import Comparison, OptionResult
 
 
@@ -27,14 +27,12 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
             "details": details,
             "stage": comparison.stage.name,
             "interrupted": bool(comparison.not_run),
-            "seed": comparison.seed,
+            **entries(comparison, "seed", "within_m", "bandwidth_limit_hz"),
             "machines": machines.count,
             "criteria": {
                 "swings": f"{OUTCOME}; band: {axis_shown().suffix('within_m')}",
                 "distinct_peaks": axis_shown().text(PEAKS),
             },
-            "within_m": comparison.within,
-            "bandwidth_limit_hz": comparison.bandwidth_limit,
             "needed_bandwidth_hz": comparison.turning,
             "deadband_m": comparison.options.deadband,
             "sample_time_s": comparison.stage.flat()["drive.sample_time"],
@@ -57,6 +55,7 @@ def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
         "name": result.option.kind.title,
         "crossover_hz": crossover,
         "bandwidth_factor": result.option.factor,
+        **entries(result, "unstable", "failed", "rests"),
         "swings": asdict(result.swinging),
         "distinct_peaks": asdict(result.counted),
         "in_position": asdict(result.settled),
@@ -65,10 +64,7 @@ def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
         "in_position_rms_m": asdict(result.in_position),
         "force_rms_n": asdict(result.force),
         "modulus_margin": asdict(result.margin) | {"least": float(result.loops.margin.min())},
-        "unstable": result.unstable,
-        "failed": result.failed,
         "machines_in_position": result.in_position_count,
-        "rests": result.rests,
         "against_a": {
             "swings": asdict(pair.swinging),
             "sooner": asdict(pair.sooner),

@@ -7,21 +7,8 @@ import numpy as np
 from friso.equations.motion import last_corner
 from friso.questions.compare.words import label
 from friso.shares import Share
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    SKY,
-    VERMILLION,
-    Axis,
-    Figure,
-    Markers,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.compare.study import LONGER, Comparison, OptionResult
 

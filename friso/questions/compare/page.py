@@ -5,22 +5,10 @@ Every run of the command gives the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from friso.quantities import percent
+from friso.questions.compare import words
 from friso.questions.compare.figures import compare_figures
-from friso.questions.compare.words import (
-    COLUMNS,
-    PAIRED,
-    answer,
-    details,
-    options_rows,
-    paired_rows,
-    population,
-    table_rows,
-)
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR
 from friso.studies.compare.study import LONGER, Comparison
@@ -28,30 +16,23 @@ from friso.studies.compare.study import LONGER, Comparison
 
 def compare_files(comparison: Comparison) -> dict[str, Content]:
     """Return the page, and every figure in all formats."""
-    figures = compare_figures(comparison)
-    images = pictures(figures)
-    return {"compare.html": page(comparison, figures), **images}
-
-
-def page(comparison: Comparison, figures: Sequence[Figure]) -> str:
-    """Return the page with its figures."""
     return Report.of_stage(
         "compare",
         comparison.stage,
-        figures,
-        sentences=answer(comparison),
-        details=details(comparison),
-        population=population(comparison),
+        compare_figures(comparison),
+        sentences=words.answer(comparison),
+        details=words.details(comparison),
+        population=words.population(comparison),
         remarks=comparison.notes,
-        options=options_rows(comparison),
-        columns=COLUMNS,
-        rows=table_rows(comparison),
-        paired_columns=PAIRED,
-        paired=paired_rows(comparison),
+        options=words.options_rows(comparison),
+        columns=words.COLUMNS,
+        rows=words.table_rows(comparison),
+        paired_columns=words.PAIRED,
+        paired=words.paired_rows(comparison),
         computed=(
             f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND:g} tolerances, model error "
             f"{percent(MODEL_ERROR)}"
         ),
         longer=LONGER,
         shaken=comparison.shaken,
-    ).html()
+    ).files()

@@ -5,19 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import partial
 
+from friso.interface import inputs
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import (
-    Changes,
-    FrequencyLike,
-    LengthLike,
-    Seed,
-    SettingName,
-    StageLike,
-    correlations_of,
-    mention_unstable_loop,
-    quantity_of,
-    read_stage,
-)
+from friso.interface.inputs import Changes, FrequencyLike, LengthLike, Seed, SettingName, StageLike
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
 
@@ -99,15 +89,15 @@ def compare(
     >>> import friso
     >>> friso.compare(friso.example("thesis_drive"), machines=200)  # doctest: +SKIP
     """
-    chosen = read_stage(stage, set, leaves_out=(), uncertain_too=True)
+    chosen = inputs.read_stage(stage, set, leaves_out=(), uncertain_too=True)
     length = Quantity("m", positive, "1 um").on(chosen.axis_kind)
-    tolerance = quantity_of(length.example if within is None else within, "within", length)
+    tolerance = inputs.quantity_of(length.example if within is None else within, "within", length)
     hertz = Quantity("Hz", positive, "15 Hz")
-    limit = None if bandwidth_limit is None else quantity_of(bandwidth_limit, "bandwidth_limit", hertz)
+    limit = None if bandwidth_limit is None else inputs.quantity_of(bandwidth_limit, "bandwidth_limit", hertz)
     from friso.studies.compare.study import compare as compared
 
-    correlations = correlations_of(stage, chosen)
-    begins = partial(mention_unstable_loop, chosen)
+    correlations = inputs.correlations_of(stage, chosen)
+    begins = partial(inputs.mention_unstable_loop, chosen)
     return CompareAnswer(
         compared(chosen, machines, seed, tolerance, correlations, progress, tuple(also), begins, limit)
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -186,12 +186,11 @@ def answer(comparison: Comparison) -> list[str]:
     return [*_unstable(comparison), *_interrupted(comparison), *says]
 
 
-def _interrupted(comparison: Comparison) -> list[str]:
-    """Say which options were not run because of an interruption; empty if all were run."""
-    if not comparison.not_run:
-        return []
+def _interrupted(comparison: Comparison) -> Iterator[str]:
+    """Yield which options were not run because of an interruption, unless all were run."""
     letters = listed([option.letter for option in comparison.not_run], "and")
-    return [f"Interrupted: this is the answer so far. It is that of the options which were run; {letters} were not."]
+    if letters:
+        yield (f"Interrupted: this is the answer so far. It is that of the options which were run; {letters} were not.")
 
 
 def _turning(comparison: Comparison) -> list[str]:
@@ -227,18 +226,17 @@ def _share_at(needed: NeededBandwidth, number: int) -> str:
     return percent(float(needed.shares[number]), 3)
 
 
-def _unstable(comparison: Comparison) -> list[str]:
-    """Say on how many machines the loop is unstable as it is, whatever the friction.
+def _unstable(comparison: Comparison) -> Iterator[str]:
+    """Yield on how many machines the loop is unstable as it is, whatever the friction.
 
-    The list is empty if there are no such machines.
+    Nothing is yielded if there are no such machines.
     """
     base, count = comparison.results[0], comparison.machines.count
-    if not base.unstable:
-        return []
-    return [
-        f"As it is, the loop is unstable on {base.unstable} of {count} machines, whatever the friction: retune the "
-        "controller (friso bode)."
-    ]
+    if base.unstable:
+        yield (
+            f"As it is, the loop is unstable on {base.unstable} of {count} machines, whatever the friction: retune the "
+            "controller (friso bode)."
+        )
 
 
 def details(comparison: Comparison) -> list[str]:

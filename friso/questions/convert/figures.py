@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from friso.frequency.members import steady_force
-from friso.shown.drawing.figure import BLUE, GREY, VERMILLION, Axis, Figure, Markers, Panel, Series
-
-if TYPE_CHECKING:
-    from friso.studies.laws.conversion import LawConversion
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREY, VERMILLION
+from friso.studies.laws.conversion import LawConversion
 
 SHOWN = 5.0
 """Length of drawn virgin curves, in units of the deflection that static friction causes at the first stiffness."""

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from friso.questions.convert.figures import convert_figures
 from friso.shown.files import Content, image_files
-
-if TYPE_CHECKING:
-    from friso.studies.laws.conversion import LawConversion
+from friso.studies.laws.conversion import LawConversion
 
 
 def convert_files(conversion: LawConversion, stem: str) -> dict[str, Content]:

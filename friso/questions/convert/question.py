@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, LawName, StageLike, Whole, read_stage, stem_of, whole_number
 from friso.progress import Progress, silent
 
@@ -23,14 +22,7 @@ class ConvertAnswer(Answer):
     `result` is the `LawConversion`, and ``answer.stage`` is the converted stage.
     """
 
-    title: str
     name: str
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return a table of what measurements show of both laws."""
-        from friso.questions.convert.words import COLUMNS, conversion_rows
-
-        return [AnswerTable(self.title, COLUMNS, conversion_rows(self.result))]
 
     def files(self) -> Files:
         """Return the stage file and the figure."""
@@ -80,6 +72,4 @@ def convert(
     whole_number(elements, "elements", 1, MOST, "6")
     from friso.studies.laws.conversion import convert as converted
 
-    return ConvertAnswer(
-        converted(chosen, friction, elements, virgin), title=chosen.name, name=f"{stem_of(stage)}_{friction}"
-    )
+    return ConvertAnswer(converted(chosen, friction, elements, virgin), name=f"{stem_of(stage)}_{friction}")

@@ -6,16 +6,16 @@ The sentences say what is kept, what is not, and what measurements leave open.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
+from friso.interface.answer import AnswerTable
 from friso.quantities import percent
+from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage.stage import declared_keys
-
-if TYPE_CHECKING:
-    from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
+from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
 
 SHOWN: Mapping[MeasuredKind, str] = {
     "curve": "steady friction over speed",
@@ -118,3 +118,40 @@ def blocks(conversion: LawConversion) -> list[str]:
     begin = text.index("[friction]")
     end = text.find("\n[", begin + 1)
     return [text[begin : end if end > 0 else None].strip()]
+
+
+SUFFIXES = {"N": "n", "N/m": "n_per_m", "N*s/m": "n_s_per_m", "J": "j"}
+"""Suffixes of keys, by unit."""
+
+
+def convert_document(conversion: LawConversion) -> dict[str, Any]:
+    """Return what is kept, what is not, what stays open, and the keys of the new law."""
+    flat = conversion.stage.flat()
+    return plain_json(
+        {
+            "conclusion": " ".join(sentences(conversion)),
+            "stage": conversion.stage.name,
+            "law": conversion.law,
+            "friction": {key.removeprefix("friction."): v for key, v in flat.items() if key.startswith("friction.")},
+            "compared": [
+                {
+                    "what": SHOWN[item.kind],
+                    "amplitude_m": item.amplitude,
+                    f"before_{SUFFIXES[item.unit]}": item.before,
+                    f"after_{SUFFIXES[item.unit]}": item.after,
+                    **entries(item, "off", "kept"),
+                }
+                for item in conversion.compared
+            ],
+            "open": conversion.open,
+            "stiffness_range_n_per_m": [*conversion.points.stiffness] if conversion.points else None,
+            "scatter_n": conversion.points.scatter if conversion.points else None,
+            "passive": not conversion.active,
+            "passive_where": conversion.active or None,
+        }
+    )
+
+
+def tables(conversion: LawConversion) -> list[AnswerTable]:
+    """Return a table of what measurements show of both laws."""
+    return [AnswerTable(conversion.stage.name, COLUMNS, conversion_rows(conversion))]

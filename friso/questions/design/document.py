@@ -20,7 +20,7 @@ from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.questions.design.window import lower, upper
 from friso.questions.design.words import need_words, refusal, so_far
-from friso.shown.documents import plain_json, unit_suffix
+from friso.shown.documents import entries, plain_json, unit_suffix
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
@@ -78,13 +78,7 @@ def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]
 def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
     """Return the requirements to relax, from which value to which."""
     return [
-        {
-            "key": relaxation.key,
-            "requirement": relaxation.requirement,
-            "from": relaxation.value,
-            "to": relaxation.needed,
-            "unit": relaxation.unit,
-        }
+        {**entries(relaxation, "key", "requirement", "unit"), "from": relaxation.value, "to": relaxation.needed}
         for relaxation in relaxed
     ]
 
@@ -126,9 +120,7 @@ def _leaves(design: Design) -> dict[str, Any]:
         "drive_stiffness_n_per_m": beams.drive[0],
         "first_interfering_hz": choice.frequency,
         "max_stress_pa": beams.stress,
-        "clamp_stress_pa": beams.clamp_stress,
-        "yield_margin": beams.yield_margin,
-        "fatigue_margin": beams.fatigue_margin,
+        **entries(beams, "clamp_stress_pa", "yield_margin", "fatigue_margin"),
         "load_n": design.fitted.task.load,
         "buckling_load_n": beams.buckling,
         "requirements": [
@@ -140,14 +132,8 @@ def _leaves(design: Design) -> dict[str, Any]:
 
 def _sizes(geometry: Geometry) -> dict[str, Any]:
     """Return the dimensions and material of leaf springs."""
-    return {
-        "count": int(geometry.sheet.leaves),
-        "length_m": geometry.length,
-        "width_m": geometry.width,
-        "thickness_m": geometry.sheet.thickness,
-        "spacing_m": geometry.spacing,
-        "material": geometry.sheet.material,
-    }
+    sheet = {"count": int(geometry.sheet.leaves), **entries(geometry.sheet, "thickness_m", "material")}
+    return {**sheet, **entries(geometry, "length_m", "width_m", "spacing_m")}
 
 
 def _front(design: Design) -> list[dict[str, Any]]:
@@ -174,12 +160,9 @@ def _controller(design: Design) -> dict[str, Any]:
     kp, ki, kd, _ = gains.parallel.values()
     return {
         "crossover_hz": controller.crossover,
-        "bounds_above_hz": [{"value": bound.value, "reason": bound.reason} for bound in upper(design)],
-        "bounds_below_hz": [{"value": bound.value, "reason": bound.reason} for bound in lower(design)],
-        "k_p_n_per_m": gains.k_p,
-        "tau_z_s": gains.tau_z,
-        "tau_i_s": gains.tau_i,
-        "tau_p_s": gains.tau_p,
+        "bounds_above_hz": [entries(bound, "value", "reason") for bound in upper(design)],
+        "bounds_below_hz": [entries(bound, "value", "reason") for bound in lower(design)],
+        **entries(gains, "k_p_n_per_m", "tau_z_s", "tau_i_s", "tau_p_s"),
         "kp_n_per_m": kp,
         "ki_n_per_m_s": ki,
         "kd_n_s_per_m": kd,

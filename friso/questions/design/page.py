@@ -5,19 +5,15 @@ Every run of the command gives the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from markupsafe import Markup
 
 from friso.design_method.method import Design, UnfinishedDesign
 from friso.materials import materials
 from friso.questions.design.figures import design_figures
-from friso.questions.design.leaves import requirement_rows
-from friso.questions.design.steps import steps
+from friso.questions.design.steps import requirement_rows, steps
 from friso.questions.design.words import headline
 from friso.questions.flexure.drawing import drawing_svg
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 
 LEAVES = 2
@@ -36,34 +32,27 @@ def design_files(design: Design | UnfinishedDesign) -> dict[str, Content]:
     """
     if isinstance(design, UnfinishedDesign):
         return {NOT_VERIFIED: design.stage.to_toml()}
-    figures = design_figures(design)
-    images = pictures(figures)
-    return {
-        NOT_VERIFIED: None,
-        "design.toml": design.stage.to_toml(),
-        "worst.toml": design.verification.worst.to_toml(),
-        "design.html": design_html(design, figures),
-        "design_drawing.svg": drawing(design),
-        **images,
-    }
-
-
-def design_html(design: Design, figures: Sequence[Figure]) -> str:
-    """Return the page of a design with its figures."""
-    return Report.of_stage(
+    drawing = Markup(_drawing(design))
+    report = Report.of_stage(
         "design",
         design.stage,
-        figures,
+        design_figures(design),
         spec=design.spec,
         verdicts=headline(design),
         steps=steps(design),
         leaves=LEAVES,
-        drawing=Markup(drawing(design)),
+        drawing=drawing,
         requirements=requirement_rows(design),
-    ).html()
+    )
+    return {
+        NOT_VERIFIED: None,
+        "design.toml": design.stage.to_toml(),
+        "worst.toml": design.verification.worst.to_toml(),
+        **report.files({"design_drawing.svg": drawing}),
+    }
 
 
-def drawing(design: Design) -> str:
+def _drawing(design: Design) -> str:
     """Return the dimensioned drawing of the leaf springs as SVG."""
     choice = design.fitted.choice
     data = materials()[choice.geometry.sheet.material]

@@ -11,17 +11,9 @@ from pathlib import Path
 
 from friso.design_method.prepare import assumed, by_rules, check_designable, offset_points, outline
 from friso.design_method.spec import Spec, load_spec, read_spec
+from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import (
-    AS_BUILT,
-    LOGGER,
-    Changes,
-    FrequencyLike,
-    StageLike,
-    mention_unstable_loop,
-    quantity_of,
-    read_stage,
-)
+from friso.interface.inputs import AS_BUILT, LOGGER, Changes, FrequencyLike, StageLike
 from friso.platform.extras import need
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
@@ -107,13 +99,15 @@ def design(
     >>> friso.design(friso.example("thesis_rig"), friso.example("specs/thesis"))  # doctest: +SKIP
     """
     need("design", "friso design")
-    chosen = read_stage(stage, set, leaves_out=AS_BUILT[1:])
+    chosen = inputs.read_stage(stage, set, leaves_out=AS_BUILT[1:])
     check_designable(chosen)
     specification = specification_of(chosen, spec)
     if crossover is not None:
-        specification = specification.with_limit(quantity_of(crossover, "crossover", Quantity("Hz", positive, "20 Hz")))
+        specification = specification.with_limit(
+            inputs.quantity_of(crossover, "crossover", Quantity("Hz", positive, "20 Hz"))
+        )
     _tell_what_is_assumed(chosen, specification, spec is None)
-    mention_unstable_loop(chosen)
+    inputs.mention_unstable_loop(chosen)
     if chosen.drive:
         LOGGER.warning(
             "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+
+import numpy as np
 
 from friso.design_method.method import Design
 from friso.design_method.population import Corners
-from friso.quantities import percent
-from friso.questions.design.control import controller_step, moves_step
-from friso.questions.design.leaves import leaves_step
-from friso.questions.design.words import DesignStep, brings, corner, edge, gaps, hertz, size, trimmed
-from friso.questions.flexure.table import newtons_per
+from friso.design_method.requirements import RelaxableKey, Requirement
+from friso.design_method.verification import MachineOutcomes
+from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
+from friso.frequency.crossover import WANTED
+from friso.quantities import percent, plain_factor
+from friso.questions.design import words
+from friso.questions.design.window import CrossoverBound, comfortable, lower, upper
+from friso.questions.design.words import DesignStep, hertz, seconds, size, trimmed
+from friso.questions.flexure.table import megapascals, newtons_per
+from friso.questions.flexure.words import assumptions
+from friso.shown.drawing.prefixes import listed
 
 GAP = 1.0
 """Least difference [N] of static and Coulomb friction for hunting, as found in the thesis (Sec. 4.3.1)."""
@@ -24,9 +33,9 @@ def steps(design: Design) -> tuple[DesignStep, ...]:
 def isolator_step(design: Design) -> DesignStep:
     """Return the step that decides whether an isolator is needed."""
     corners, flat = design.without, design.original.flat()
-    sentences = [f"Without an isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
+    sentences = [f"Without an isolator the machine {words.edge(corners)}.", *_worst(corners, design), *_gap(design)]
     if not design.needed:
-        sentences.append(brings(design))
+        sentences.append(words.brings(design))
     facts = [
         ("Corners of friction and masses", str(corners.population.count)),
         ("Edge of hunting without isolator", _edge(corners)),
@@ -34,7 +43,7 @@ def isolator_step(design: Design) -> DesignStep:
         ("Machine's limit", hertz(design.spec.limit)),
         ("Crossovers searched", " to ".join(map(hertz, corners.searched))),
     ]
-    losses = gaps(corners, flat)
+    losses = words.gaps(corners, flat)
     facts += [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
     answer = "yes" if design.needed else "no"
     return DesignStep(f"Is an isolator needed: {answer}", tuple(sentences), tuple(facts), ())
@@ -53,7 +62,7 @@ def joint_step(design: Design) -> DesignStep:
     sentences = [
         held,
         _stroke(design),
-        f"With this joint the machine {edge(design.edges)}.",
+        f"With this joint the machine {words.edge(design.edges)}.",
         *_worst(design.edges, design),
     ]
     joint = design.stage.flat()
@@ -106,7 +115,7 @@ def _worst(corners: Corners, design: Design) -> list[str]:
     sentences = []
     if corners.hunts:
         count = corners.population.count
-        sentences.append(f"Worst of {count} corners: {corner(corners, design.stage.flat(), corners.worst)}.")
+        sentences.append(f"Worst of {count} corners: {words.corner(corners, design.stage.flat(), corners.worst)}.")
     if corners.unknown:
         sentences.append(
             f"In {corners.unknown} of {corners.population.count} corners the edge is not certain: simulations below it "
@@ -121,7 +130,7 @@ def _gap(design: Design) -> list[str]:
 
     The list is empty for a friction law that has no static and Coulomb friction.
     """
-    losses = gaps(design.without, design.original.flat())
+    losses = words.gaps(design.without, design.original.flat())
     if losses is None:
         return []
     small = design.without.edges[losses < GAP]
@@ -135,3 +144,286 @@ def _gap(design: Design) -> list[str]:
     about = "" if top == design.without.highest else "about "
     reach = f"up to {about}{hertz(float(top))}" if top < design.without.searched[1] else "at all crossovers searched"
     return [f"{text} According to the thesis hunting needs about {GAP:g} N; here corners with less also hunt, {reach}."]
+
+
+BINDS = 0.95
+"""Fraction of a requirement's bound from which the requirement is called binding."""
+
+
+def leaves_step(design: Design) -> DesignStep:
+    """Return the step that chooses the leaf springs, with reasons."""
+    sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
+    figures = ("design_front", "design_modes")
+    return DesignStep(f"Leaf springs: {words.leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
+
+
+def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
+    """Return a row for each requirement: its name, the keys that relax it, and their values.
+
+    The last text of a row is the fraction of the requirement that the leaves use up.
+    """
+    choice = design.fitted.choice
+    return [
+        (
+            requirement.name,
+            _keys(requirement, lambda relaxable: relaxable.key),
+            _keys(requirement, lambda relaxable: trimmed(relaxable.value, relaxable.unit)),
+            f"{percent(share, 3)}{', binds' if share > BINDS else ''}",
+        )
+        for requirement, share in zip(choice.requirements, choice.excess, strict=True)
+    ]
+
+
+def _keys(requirement: Requirement, text: Callable[[RelaxableKey], str]) -> str:
+    """Describe by `text` each key whose change relaxes a requirement, and join the descriptions."""
+    return ", ".join(map(text, requirement.keys))
+
+
+def _sizes(design: Design) -> tuple[tuple[str, str], ...]:
+    """Return the dimensions of the leaf springs by name."""
+    geometry = design.fitted.choice.geometry
+    return (
+        ("Leaves", f"{geometry.sheet.leaves:g} of {geometry.sheet.material}"),
+        (
+            "Length, width, thickness",
+            f"{size(geometry.length)}, {size(geometry.width)}, {size(geometry.sheet.thickness)} mm",
+        ),
+        ("Spacing", f"{size(geometry.spacing)} mm"),
+    )
+
+
+def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
+    """Return stiffness, frequency, stress and margins of the leaf springs by name."""
+    choice, beams = design.fitted.choice, design.fitted.choice.beams
+    return (
+        ("Drive stiffness, by beams", newtons_per(beams.drive[0], "mm")),
+        ("First interfering frequency, by beams", hertz(choice.frequency)),
+        ("Stress at the clamps at full stroke", megapascals(beams.clamp_stress)),
+        ("Margin to yield, to fatigue", f"{plain_factor(beams.yield_margin)} times, {_factor(beams.fatigue_margin)}"),
+        ("Buckling load", trimmed(beams.buckling, "N")),
+        ("Load along the leaves, weight included", f"{design.fitted.task.load:.3g} N"),
+        (
+            "Support stiffness at full stroke, x and y",
+            f"{newtons_per(beams.support_x[-1], 'µm')}, {newtons_per(beams.support_y[-1], 'µm')}",
+        ),
+        ("Shortening at full stroke", trimmed(beams.shortening, "m")),
+    )
+
+
+def _interfering(design: Design) -> str:
+    """Name the first mode that interferes with control, and its distance from the crossover."""
+    choice, multiple = design.fitted.choice, design.spec.safety.parasitic
+    mode = choice.beams.interfering
+    if mode is None:
+        return f"None of the modes considered interferes with control ({multiple:g} times the crossover is required)."
+    return (
+        f"The first mode that interferes with control is {mode.name}, at {hertz(mode.frequency)}: "
+        f"{plain_factor(mode.frequency / design.controller.crossover)} times the crossover ({multiple:g} required)."
+    )
+
+
+def _strength(design: Design) -> str:
+    """Write stress, strength margins and buckling load, with what is required."""
+    beams, load, safety = design.fitted.choice.beams, design.fitted.task.load, design.spec.safety
+    fatigue = "" if math.isnan(beams.fatigue_margin) else f" and {_factor(beams.fatigue_margin)} below fatigue"
+    required = "" if math.isnan(beams.fatigue_margin) else f" and {safety.fatigue:g}"
+    margin = beams.buckling / load
+    forms = ", met by the closed forms" if margin < safety.buckling else ""
+    return (
+        f"With the stroke alone, the stress at the clamps is {megapascals(beams.clamp_stress)}, "
+        f"{beams.yield_margin:.3g} "
+        f"times below yield{fatigue} ({safety.strength:g}{required} required). The leaves buckle at "
+        f"{trimmed(beams.buckling, 'N')}, {plain_factor(margin)} times the {load:.3g} N that they carry "
+        f"({safety.buckling:g} required{forms})."
+    )
+
+
+def _why(design: Design) -> str:
+    """Say which requirements led to these leaves."""
+    choice = design.fitted.choice
+    binding = [
+        requirement.name for requirement, share in zip(choice.requirements, choice.excess, strict=True) if share > BINDS
+    ]
+    chosen = "They are the softest on the front that allow this crossover"
+    if not binding:
+        return f"{chosen}; no requirement is binding except space and available thicknesses."
+    return f"{chosen}; binding requirements (less than 5 % to spare): {listed(binding, 'and')}."
+
+
+def _confirmed(design: Design) -> str:
+    """Say how many leaf springs the beam model confirms, and how close the closed forms are."""
+    tried = design.confirmed
+    failed = sum(bool(confirmation.failure) for confirmation in tried)
+    confirmed = [confirmation for confirmation in tried if not confirmation.failure]
+    off = [abs(confirmation.stiffness / confirmation.candidate.stiffness - 1) for confirmation in confirmed]
+    off += [
+        abs(confirmation.frequency / confirmation.candidate.frequency - 1)
+        for confirmation in confirmed
+        if math.isfinite(confirmation.frequency)
+    ]
+    apart = f", within {percent(max(off))} of the closed forms" if off else ""
+    broken = f"; {failed} could not be computed" if failed else ""
+    passed = len(design.fitted.choice.passed_over)
+    over = f" {passed} softer ones failed in the beam model and were skipped." if passed else ""
+    return (
+        f"Of the {len(design.candidates)} geometries on the front the beam model confirms {len(confirmed)} of "
+        f"{len(tried)} "
+        f"tried{apart}{broken}.{over}"
+    )
+
+
+def _factor(value: float) -> str:
+    """Write a margin as a factor; "unknown" if it is not finite."""
+    return f"{plain_factor(value)} times" if np.isfinite(value) else "unknown"
+
+
+ROUNDED = 0.01
+"""Relative distance of a crossover from its bound that is rounding, since crossovers have three digits."""
+
+LITTLE = 0.1
+"""Least relative gain of modulus margin for which more joint damping is recommended."""
+
+
+def controller_step(design: Design) -> DesignStep:
+    """Return the step that chooses the crossover and the gains, with reasons."""
+    controller = design.controller
+    gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)}."
+    faster = [_faster(design)] if design.damped else []
+    sentences = (_not_higher(design), *faster, _not_lower(design), gains, _margin(design), _damping(design))
+    figures = ("design_window", "design_damping")
+    return DesignStep(f"Controller: crossover {hertz(controller.crossover)}", sentences, _gains(design), figures)
+
+
+def _gains(design: Design) -> tuple[tuple[str, str], ...]:
+    """Return the numbers of the controller by name."""
+    controller, gains, flat = design.controller, design.controller.gains, design.stage.flat()
+    window = " to ".join(map(hertz, comfortable(design)))
+    return (
+        ("Crossover", hertz(controller.crossover)),
+        ("Tuned for", f"{trimmed(flat[TUNED_MASS], 'kg')}, α = {flat[ALPHA]:g}, β = {flat[BETA]:g}"),
+        ("k_p", trimmed(gains.k_p, "N/m")),
+        ("τ_z, τ_i, τ_p", ", ".join(trimmed(time, "s") for time in (gains.tau_z, gains.tau_i, gains.tau_p))),
+        ("As gains of a PID: kp, ki, kd", _parallel(design)),
+        ("Least modulus margin, as designed", f"{controller.margin:.3g}"),
+        ("The same over the corners", f"{controller.corners.min():.3g}"),
+        (f"Modulus margin above {WANTED:g}", window),
+    )
+
+
+def _faster(design: Design) -> str:
+    """Say how high the crossover could be with more joint damping, and with how much."""
+    assert design.damped
+    return (
+        f"With {trimmed(design.damped.needed, 'N*s/m')} of joint damping instead of "
+        f"{trimmed(design.damped.value, 'N*s/m')} it could be {hertz(design.faster)}: --set joint.damping tries it."
+    )
+
+
+def _parallel(design: Design) -> str:
+    """Write the gains of Eq. 6 (thesis) in parallel form: a PID on the error, and its low-pass."""
+    kp, ki, kd, tau = design.controller.gains.parallel.values()
+    gains = f"{trimmed(kp, 'N/m')}, {trimmed(ki, 'N/(m*s)')}, {trimmed(kd, 'N*s/m')}"
+    return f"{gains}, with a low-pass filter of time constant τ_p = {trimmed(tau, 's')}"
+
+
+def _not_higher(design: Design) -> str:
+    """Say what limits the crossover from above."""
+    bounds, crossover = upper(design), design.controller.crossover
+    text = f"Upper limits: {_bounds(bounds)}."
+    short = 1 - crossover / bounds[0].value
+    if short < ROUNDED:
+        return text
+    return (
+        f"{text} The crossover is {percent(short)} below the first of these, because sizes are rounded to tenths of a "
+        "millimetre and must be confirmed by the beam model."
+    )
+
+
+def _not_lower(design: Design) -> str:
+    """Say what limits the crossover from below."""
+    bounds = lower(design)
+    if not bounds:
+        return "Nothing limits it from below, but a higher crossover settles faster."
+    return f"Lower limits: {_bounds(bounds)}; above these, a higher crossover settles faster."
+
+
+def _bounds(bounds: list[CrossoverBound]) -> str:
+    """List bounds of the crossover [Hz], each with its reason."""
+    return listed([f"{hertz(bound.value)} ({bound.reason})" for bound in bounds], "and")
+
+
+def _margin(design: Design) -> str:
+    """Write the least modulus margin, as designed and at the extremes of friction and masses."""
+    controller = design.controller
+    return (
+        f"The smallest modulus margin of the settled states is {controller.margin:.3g} as designed and "
+        f"{controller.corners.min():.3g} over the corners ({WANTED:g} is required)."
+    )
+
+
+def _damping(design: Design) -> str:
+    """Say whether damping is worth adding in the joint, to raise the least modulus margin."""
+    damping = design.controller.damping
+    as_designed, best, worth = float(damping.margins[0]), float(damping.margins.max()), damping.worth
+    now = f"with its own damping of {trimmed(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"
+    if worth == 0 or best < (1 + LITTLE) * as_designed:
+        return (
+            f"More damping in the joint is not worth adding: {now}, and none up to "
+            f"{trimmed(damping.tried[-1], 'N*s/m')} raises it above {best:.3g}."
+        )
+    return (
+        f"Damping in the joint is worth adding: {now}, with {trimmed(damping.tried[worth], 'N*s/m')} it is "
+        f"{damping.margins[worth]:.3g}; more damping adds little."
+    )
+
+
+def moves_step(design: Design) -> DesignStep:
+    """Return the step that verifies the design in simulated moves."""
+    free, locked = design.verification.free, design.verification.locked
+    sentences = [
+        f"Of {free.tried} moves over all ranges and tolerances {words.restless(free)}: {words.probability(free)}."
+    ]
+    other = words.settling(locked)
+    held = f"{other[0].lower()}{other[1:]}, and {words.restless(locked)}"
+    sentences.append(f"{words.settling(free)}. Of {locked.tried} with the joint locked: {held}.")
+    broken = len(free.completed) - free.tried
+    if broken:
+        sentences.append(f"{broken} moves could not be simulated to the end and do not count.")
+    sentences += [_met(design), f"{_worst_move(free)}: worst.toml"]
+    facts = (
+        *(row for name, outcome in (("free", free), ("locked", locked)) for row in _outcome(name, outcome)),
+        ("In position", f"within ±{trimmed(design.spec.position.window, 'm')} of the reference"),
+    )
+    title = f"Verification: {free.tried} moves, {words.restless(free)}"
+    return DesignStep(title, tuple(sentence for sentence in sentences if sentence), facts, ("design_settling",))
+
+
+def _met(design: Design) -> str:
+    """Say whether the settling time meets the specification; empty if none is specified."""
+    limit, time = design.spec.position.settling_time, design.verification.free.slower_than(0.05)
+    if limit is None:
+        return ""
+    return f"Required for 95 % of the moves: {seconds(float(limit))}. {'Met' if time <= limit else 'Not met'}."
+
+
+def _worst_move(outcome: MachineOutcomes) -> str:
+    """Describe the worst simulated move: how far it swings or creeps, or how late it settles."""
+    k = outcome.worst
+    if outcome.restless[k]:
+        return f"The worst move, which {outcome.words[k]} over {trimmed(outcome.swing[k], 'm')}"
+    return f"The worst move, which takes {seconds(float(outcome.settling[k]))} to settle"
+
+
+def _outcome(name: str, outcome: MachineOutcomes) -> tuple[tuple[str, str], ...]:
+    """Return the rows on the moves with the joint in one state."""
+    low, high = outcome.interval
+    return (
+        (
+            f"Joint {name}: not at rest in position",
+            f"{outcome.missed} of {outcome.tried}, {percent(low)} to {percent(high)}",
+        ),
+        (
+            f"Joint {name}: settling, median and 95 %",
+            f"{seconds(outcome.slower_than(0.5))}, {seconds(outcome.slower_than(0.05))}",
+        ),
+    )

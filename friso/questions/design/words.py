@@ -19,7 +19,7 @@ from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.platform.system import shell_word
 from friso.quantities import outwards, percent
 from friso.questions.map.words import in_sentence
-from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
+from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import choose, pretty, with_unit
 from friso.stage.stage import numeric_keys
 

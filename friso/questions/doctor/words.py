@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from friso.interface.answer import AnswerTable
 from friso.studies.doctor import DoctorCheck
@@ -22,3 +23,12 @@ def tables(checks: Sequence[DoctorCheck]) -> list[AnswerTable]:
         return [AnswerTable("", ["Result"], [(check.subject, [check.text]) for check in checks])]
     rows = [(check.subject, [check.text, "" if check.works else check.remedy]) for check in checks]
     return [AnswerTable("", ["Result", "Remedy"], rows)]
+
+
+def doctor_document(checks: Sequence[DoctorCheck]) -> dict[str, Any]:
+    """Return whether friso works, and the result of every check."""
+    return {
+        "conclusion": sentences(checks)[0],
+        "works": all(check.works for check in checks),
+        "findings": [vars(check) for check in checks],
+    }

@@ -2,14 +2,6 @@
 
 from friso.interface.question import STOPS, Choices, Question
 
-
-def listed_formats() -> list[tuple[str, str]]:
-    """Return the kinds of parameter files, with one line on each."""
-    from friso.drives.format import FORMATS
-
-    return [(name, FORMATS.one_line(name)) for name in FORMATS]
-
-
 QUESTION = Question(
     __name__,
     85,
@@ -17,5 +9,5 @@ QUESTION = Question(
     'export gains examples/twincat_cascade.toml --set travel_per_turn="10 mm"',
     takes=("what", "stage"),
     metavars={"what": "gains"},
-    choices=Choices("Formats of --to, and of friso init --from", listed_formats),
+    choices=Choices.of_registry("Formats of --to, and of friso init --from", "friso.drives.format:FORMATS"),
 )

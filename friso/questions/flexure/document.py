@@ -10,7 +10,7 @@ from typing import Any
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.evaluation import Evaluation
 from friso.questions.flexure.words import sentences
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 
 
 def flexure_document(flexure: BothModels) -> dict[str, Any]:
@@ -23,12 +23,10 @@ def _evaluation(evaluation: Evaluation) -> dict[str, Any]:
     """Return stiffness, modes, stresses and margins by one model."""
     first = evaluation.interfering
     plain = {
-        "model": evaluation.model,
-        "stroke_m": evaluation.stroke,
+        **entries(evaluation, "model", "stroke_m", "nonlinearity"),
         "drive_stiffness_n_per_m": evaluation.drive[0],
         "drive_stiffness_under_load_n_per_m": evaluation.loaded_drive,
         "drive_stiffness_at_stroke_n_per_m": evaluation.drive[-1],
-        "nonlinearity": evaluation.nonlinearity,
         "support_stiffness_n_per_m": {
             axis: {"zero": support[0], "full": support[-1]}
             for axis, support in (("x", evaluation.support_x), ("y", evaluation.support_y))
@@ -38,17 +36,12 @@ def _evaluation(evaluation: Evaluation) -> dict[str, Any]:
         "interferes": [evaluation.interferes(mode) for mode in evaluation.modes],
         "first_interfering_hz": None if first is None else first.frequency,
         "max_stress_pa": evaluation.stress,
-        "clamp_stress_pa": evaluation.clamp_stress,
         "stress_concentration": evaluation.mechanism.stress_concentration,
-        "yield_margin": evaluation.yield_margin,
-        "fatigue_margin": evaluation.fatigue_margin,
-        "shortening_m": evaluation.shortening,
+        **entries(evaluation, "yield_margin", "fatigue_margin", "shortening_m", "buckling_margin"),
         "buckling_load_n": evaluation.buckling,
         "buckling_load_per_leaf_n": evaluation.buckling / evaluation.mechanism.leaves,
-        "buckling_margin": evaluation.buckling_margin,
         "stiffness_zero": evaluation.stiffness[0],
         "stiffness_full": evaluation.stiffness[1],
-        "deflections_m": evaluation.deflections,
-        "forces_n": evaluation.forces,
+        **entries(evaluation, "clamp_stress_pa", "deflections_m", "forces_n"),
     }
     return {key: plain_json(value) for key, value in plain.items()}

@@ -11,24 +11,8 @@ import math
 import numpy as np
 
 from friso.leaf_springs.mechanism import Mechanism
+from friso.questions.flexure import svg
 from friso.questions.flexure.layout import ABOVE, CLAMP, FOOT, RIM, SCALES, STOP, WIDTH, PaperDrawing, block_size
-from friso.questions.flexure.svg import (
-    TEXT,
-    SheetPoint,
-    across,
-    area,
-    arrow,
-    box,
-    circle,
-    clipped,
-    fits,
-    leader,
-    path,
-    sheet,
-    upwards,
-    words,
-    words_over,
-)
 
 CLOSE = 1e-6
 """Lengths on paper [mm] below this are treated as 0."""
@@ -52,7 +36,7 @@ def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", materia
         *_legend(drawing),
         *_title_block(drawing, title, material),
     ]
-    return sheet(WIDTH, drawing.height, label, parts)
+    return svg.sheet(WIDTH, drawing.height, label, parts)
 
 
 def _side_view(drawing: PaperDrawing) -> list[str]:
@@ -60,21 +44,22 @@ def _side_view(drawing: PaperDrawing) -> list[str]:
     mechanism = drawing.mechanism
     start, end = drawing.x0, drawing.x0 + drawing.size(mechanism.length)
     row = drawing.size(mechanism.depth) / 2
-    parts = [words((5, drawing.z0 - drawing.spans[1][1] - ABOVE + 5), "From the side (x–z)", bold=True)]
+    parts = [svg.words((5, drawing.z0 - drawing.spans[1][1] - ABOVE + 5), "From the side (x–z)", bold=True)]
     parts += _block(drawing, 1, drawing.z0)
     for offset in mechanism.offsets:
         height = drawing.z0 - drawing.size(offset)
-        parts += [path(_bent(drawing, height, side), "dashed") for side in (-1, 1)]
-        parts.append(box((start, height - drawing.leaf / 2), (end, height + drawing.leaf / 2), "thin", "#222222"))
+        parts += [svg.path(_bent(drawing, height, side), "dashed") for side in (-1, 1)]
+        parts.append(svg.box((start, height - drawing.leaf / 2), (end, height + drawing.leaf / 2), "thin", "#222222"))
     clamps = ((start - CLAMP, start), (end, end + CLAMP))
     parts += [
-        box((x1, drawing.z0 - row - RIM), (x2, drawing.z0 + row + RIM), fill="url(#leaf-hatch)") for x1, x2 in clamps
+        svg.box((x1, drawing.z0 - row - RIM), (x2, drawing.z0 + row + RIM), fill="url(#leaf-hatch)")
+        for x1, x2 in clamps
     ]
     parts += [word for side in (-1, 1) for word in _stop(drawing, end, drawing.z0 + side * (row + RIM), side)]
     return parts + _side_dimensions(drawing, start, end, row)
 
 
-def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
+def _bent(drawing: PaperDrawing, height: float, side: int) -> list[svg.SheetPoint]:
     """Return the middle line of a leaf that is deflected by the stroke, on paper.
 
     `height` is the height of the leaf's clamp, and `side` (1 or -1) the direction. Both ends of the line are parallel.
@@ -94,7 +79,7 @@ def _stop(drawing: PaperDrawing, end: float, edge: float, side: int) -> list[str
     are on paper.
     """
     near, far = edge + side * drawing.travel, edge + side * (drawing.travel + STOP)
-    return [box((end, near), (end + CLAMP, far), fill="url(#leaf-hatch)")]
+    return [svg.box((end, near), (end + CLAMP, far), fill="url(#leaf-hatch)")]
 
 
 def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float) -> list[str]:
@@ -105,22 +90,24 @@ def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float
     mechanism, left = drawing.mechanism, drawing.x0 + drawing.spans[0][0]
     below = drawing.z0 - drawing.spans[1][0]
     top = drawing.z0 - row
-    parts = across(start, end, below + 6, drawing.z0 + row + RIM, _mm(mechanism.length))
-    parts += upwards(top, top + drawing.size(mechanism.spacing), left - 6, start - CLAMP, _mm(mechanism.spacing))
+    parts = svg.across(start, end, below + 6, drawing.z0 + row + RIM, _mm(mechanism.length))
+    parts += svg.upwards(top, top + drawing.size(mechanism.spacing), left - 6, start - CLAMP, _mm(mechanism.spacing))
     if mechanism.leaves > 2:
         count = int(mechanism.leaves) - 1
         total = f"{count} x {_mm(mechanism.spacing)} = {_mm(mechanism.depth)}"
-        text = total if fits(total, 2 * row) else _mm(mechanism.depth)
-        parts += upwards(top, drawing.z0 + row, left - 13, start - CLAMP, text)
+        text = total if svg.fits(total, 2 * row) else _mm(mechanism.depth)
+        parts += svg.upwards(top, drawing.z0 + row, left - 13, start - CLAMP, text)
     tip = (start + 0.15 * (end - start), top - drawing.leaf / 2)
     note = [f"{mechanism.leaves:g} leaves, thickness {_mm(mechanism.thickness)}"]
-    parts += leader(tip, (tip[0] + 3, drawing.z0 - drawing.spans[1][1] - 4), note)
+    parts += svg.leader(tip, (tip[0] + 3, drawing.z0 - drawing.spans[1][1] - 4), note)
     edge, beside = drawing.z0 + row + RIM, end + CLAMP + 3
-    parts += upwards(edge, edge + drawing.travel, beside, end + CLAMP, "")
+    parts += svg.upwards(edge, edge + drawing.travel, beside, end + CLAMP, "")
     parts.append(
-        words_over((beside + 2, edge + drawing.travel / 2 + 1), f"±{_mm(drawing.stroke)} stroke, gap to the limiter")
+        svg.words_over(
+            (beside + 2, edge + drawing.travel / 2 + 1), f"±{_mm(drawing.stroke)} stroke, gap to the limiter"
+        )
     )
-    parts.append(words((start - CLAMP / 2, drawing.z0 - row - RIM - 1.5), "cart", "middle"))
+    parts.append(svg.words((start - CLAMP / 2, drawing.z0 - row - RIM - 1.5), "cart", "middle"))
     return parts + _axes(drawing.z0 - drawing.spans[1][0] + 6, "z") + _stage_note(drawing)
 
 
@@ -133,7 +120,7 @@ def _stage_note(drawing: PaperDrawing) -> list[str]:
     )
     knee = (drawing.x0 + drawing.spans[0][1] + 4, tip[1] - 5)
     size = " x ".join(f"{1e3 * edge:.3g}" for edge in block_size(drawing.mechanism))
-    return leader(
+    return svg.leader(
         tip, knee, [f"stage, {drawing.mechanism.body.mass:.4g} kg", "as a block of its", "moments of inertia:", size]
     )
 
@@ -153,8 +140,8 @@ def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
         (low >= bottom - CLOSE, [(near, under), (far, under)]),
         (high <= top + CLOSE, [(near, over), (far, over)]),
     ]
-    fill = area((near, under), (far, over), "#f1f1f1")
-    return [fill, *(path(ends, "phantom") for inside, ends in edges if inside)]
+    fill = svg.area((near, under), (far, over), "#f1f1f1")
+    return [fill, *(svg.path(ends, "phantom") for inside, ends in edges if inside)]
 
 
 def _top_view(drawing: PaperDrawing) -> list[str]:
@@ -162,26 +149,31 @@ def _top_view(drawing: PaperDrawing) -> list[str]:
     mechanism = drawing.mechanism
     start, end, half = drawing.x0, drawing.x0 + drawing.size(mechanism.length), drawing.size(mechanism.width) / 2
     left = drawing.x0 + drawing.spans[0][0]
-    parts = [words((5, drawing.y0 - drawing.spans[2][1] - ABOVE + 9), "From above (x–y)", bold=True)]
+    parts = [svg.words((5, drawing.y0 - drawing.spans[2][1] - ABOVE + 9), "From above (x–y)", bold=True)]
     parts += _block(drawing, 2, drawing.y0)
-    parts.append(area((start, drawing.y0 - half), (end, drawing.y0 + half), "#0072B2", 0.18))
-    parts.append(box((start, drawing.y0 - half), (end, drawing.y0 + half)))
+    parts.append(svg.area((start, drawing.y0 - half), (end, drawing.y0 + half), "#0072B2", 0.18))
+    parts.append(svg.box((start, drawing.y0 - half), (end, drawing.y0 + half)))
     clamps = ((start - CLAMP, start), (end, end + CLAMP))
     parts += [
-        box((x1, drawing.y0 - half - RIM), (x2, drawing.y0 + half + RIM), fill="url(#leaf-hatch)") for x1, x2 in clamps
+        svg.box((x1, drawing.y0 - half - RIM), (x2, drawing.y0 + half + RIM), fill="url(#leaf-hatch)")
+        for x1, x2 in clamps
     ]
-    parts.append(path([(left - 2, drawing.y0), (drawing.x0 + drawing.spans[0][1] + 2, drawing.y0)], "centre"))
-    parts += upwards(drawing.y0 - half, drawing.y0 + half, left - 6, start - CLAMP, _mm(mechanism.width))
-    parts += [words((start - CLAMP / 2, drawing.y0 - half - RIM - 1.5), "cart", "middle")]
-    parts += [words((end + CLAMP / 2, drawing.y0 - half - RIM - 1.5), "stage", "middle")]
+    parts.append(svg.path([(left - 2, drawing.y0), (drawing.x0 + drawing.spans[0][1] + 2, drawing.y0)], "centre"))
+    parts += svg.upwards(drawing.y0 - half, drawing.y0 + half, left - 6, start - CLAMP, _mm(mechanism.width))
+    parts += [svg.words((start - CLAMP / 2, drawing.y0 - half - RIM - 1.5), "cart", "middle")]
+    parts += [svg.words((end + CLAMP / 2, drawing.y0 - half - RIM - 1.5), "stage", "middle")]
     return parts + _axes(drawing.y0 - drawing.spans[2][0] + 6, "y")
 
 
 def _axes(y: float, up: str) -> list[str]:
     """Return the two axes of a view, at its lower left: x to the right, and the one named `up`."""
     corner = (9.0, y)
-    parts = [path([(9.0, y - 8), corner, (17.0, y)], "thin"), arrow((17.0, y), (1, 0)), arrow((9.0, y - 8), (0, -1))]
-    return [*parts, words((18.2, y + 1), "x"), words((8.0, y - 9.2), up)]
+    parts = [
+        svg.path([(9.0, y - 8), corner, (17.0, y)], "thin"),
+        svg.arrow((17.0, y), (1, 0)),
+        svg.arrow((9.0, y - 8), (0, -1)),
+    ]
+    return [*parts, svg.words((18.2, y + 1), "x"), svg.words((8.0, y - 9.2), up)]
 
 
 def _marks(drawing: PaperDrawing) -> list[str]:
@@ -192,36 +184,36 @@ def _marks(drawing: PaperDrawing) -> list[str]:
         parts += _centre_mark(places["C"])
         parts += _push_mark(places["A"], up == 2)
         x, y = places["S"]
-        parts.append(path([(x, y - 1.3), (x + 1.3, y), (x, y + 1.3), (x - 1.3, y)], "thin", "#D55E00", closed=True))
+        parts.append(svg.path([(x, y - 1.3), (x + 1.3, y), (x, y + 1.3), (x - 1.3, y)], "thin", "#D55E00", closed=True))
         for (x, y), letters in _together({letter: places[letter] for letter in "AS"}).items():
-            parts.append(words_over((x + 2.4, y - 1.8), ", ".join(letters), bold=True))
-        parts.append(words_over((places["C"][0] + 2.2, places["C"][1] + 4.2), "C", bold=True))
+            parts.append(svg.words_over((x + 2.4, y - 1.8), ", ".join(letters), bold=True))
+        parts.append(svg.words_over((places["C"][0] + 2.2, places["C"][1] + 4.2), "C", bold=True))
     return parts
 
 
-def _together(places: dict[str, SheetPoint]) -> dict[SheetPoint, list[str]]:
+def _together(places: dict[str, svg.SheetPoint]) -> dict[svg.SheetPoint, list[str]]:
     """Group the letters of marks by where they stand; marks close together share one point."""
-    groups: dict[SheetPoint, list[str]] = {}
+    groups: dict[svg.SheetPoint, list[str]] = {}
     for letter, place in places.items():
-        near = next((group for group in groups if math.dist(group, place) < 2 * TEXT), place)
+        near = next((group for group in groups if math.dist(group, place) < 2 * svg.TEXT), place)
         groups.setdefault(near, []).append(letter)
     return groups
 
 
-def _centre_mark(at: SheetPoint) -> list[str]:
+def _centre_mark(at: svg.SheetPoint) -> list[str]:
     """Return the symbol of a centre of mass."""
     x, y = at
     quarters = [f"M {x:.2f} {y:.2f} h {s * 1.7} a 1.7 1.7 0 0 1 {-s * 1.7} {s * 1.7} Z" for s in (1, -1)]
-    return [circle(at, 1.7, "#ffffff"), f'<path d="{" ".join(quarters)}" fill="#222222"/>']
+    return [svg.circle(at, 1.7, "#ffffff"), f'<path d="{" ".join(quarters)}" fill="#222222"/>']
 
 
-def _push_mark(at: SheetPoint, sideways: bool) -> list[str]:
+def _push_mark(at: svg.SheetPoint, sideways: bool) -> list[str]:
     """Return the symbol of the actuator: arrows if seen `sideways`, else a tip seen end-on."""
     if not sideways:
-        return [circle(at, 2.2), circle(at, 0.4, "#222222")]
+        return [svg.circle(at, 2.2), svg.circle(at, 0.4, "#222222")]
     x, y = at
-    line = path([(x, y - 6), (x, y + 6)], "push")
-    return [line, arrow((x, y - 6.5), (0, -1), "#D55E00"), arrow((x, y + 6.5), (0, 1), "#D55E00")]
+    line = svg.path([(x, y - 6), (x, y + 6)], "push")
+    return [line, svg.arrow((x, y - 6.5), (0, -1), "#D55E00"), svg.arrow((x, y + 6.5), (0, 1), "#D55E00")]
 
 
 def _legend(drawing: PaperDrawing) -> list[str]:
@@ -240,7 +232,7 @@ def _legend(drawing: PaperDrawing) -> list[str]:
         "x, y, z from the middle between the clamps at the cart · dashed: at the stroke",
         f"Not to scale: {', '.join(faults)}.",
     ]
-    return [words((5, drawing.foot + 4 + 4.5 * k), line, size=2.8) for k, line in enumerate(lines)]
+    return [svg.words((5, drawing.foot + 4 + 4.5 * k), line, size=2.8) for k, line in enumerate(lines)]
 
 
 def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
@@ -257,16 +249,16 @@ def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
         f"{material_line}, {strength}",
     ]
     room = split - 9
-    parts = [box((5, top), (WIDTH - 5, top + FOOT)), path([(split, top), (split, top + FOOT)])]
-    parts.append(words((8, top + 6), clipped(title or "Leaf springs", room, 3.8), size=3.8, bold=True))
-    parts += [words((8, top + 12 + 5 * k), clipped(line, room, 2.8), size=2.8) for k, line in enumerate(lines)]
+    parts = [svg.box((5, top), (WIDTH - 5, top + FOOT)), svg.path([(split, top), (split, top + FOOT)])]
+    parts.append(svg.words((8, top + 6), svg.clipped(title or "Leaf springs", room, 3.8), size=3.8, bold=True))
+    parts += [svg.words((8, top + 12 + 5 * k), svg.clipped(line, room, 2.8), size=2.8) for k, line in enumerate(lines)]
     ratio = f"{drawing.scale:g}:1" if drawing.scale >= 1 else f"1:{1 / drawing.scale:g}"
-    parts.append(words((split + 3, top + 6), f"Scale {ratio}", size=3.8, bold=True))
-    parts.append(words((split + 3, top + 11), "all dimensions in mm", size=2.8))
+    parts.append(svg.words((split + 3, top + 6), f"Scale {ratio}", size=3.8, bold=True))
+    parts.append(svg.words((split + 3, top + 11), "all dimensions in mm", size=2.8))
     return parts + _scale_bar(drawing, (split + 3, top + 17))
 
 
-def _scale_bar(drawing: PaperDrawing, at: SheetPoint) -> list[str]:
+def _scale_bar(drawing: PaperDrawing, at: svg.SheetPoint) -> list[str]:
     """Return a bar of a round length, which stays true if the sheet is printed at another size."""
     length = max(
         nice
@@ -275,8 +267,15 @@ def _scale_bar(drawing: PaperDrawing, at: SheetPoint) -> list[str]:
         if nice * drawing.scale <= 50
     )
     x, y, half = *at, length * drawing.scale / 2
-    parts = [box((x, y), (x + half, y + 1.6), "thin", "#222222"), box((x + half, y), (x + 2 * half, y + 1.6), "thin")]
-    return [*parts, words((x, y + 5), "0", size=2.6), words((x + 2 * half, y + 5), f"{length:g} mm", "end", size=2.6)]
+    parts = [
+        svg.box((x, y), (x + half, y + 1.6), "thin", "#222222"),
+        svg.box((x + half, y), (x + 2 * half, y + 1.6), "thin"),
+    ]
+    return [
+        *parts,
+        svg.words((x, y + 5), "0", size=2.6),
+        svg.words((x + 2 * half, y + 5), f"{length:g} mm", "end", size=2.6),
+    ]
 
 
 def _mm(length: float) -> str:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels
-from friso.leaf_springs.evaluation import Evaluation
-from friso.questions.flexure.modes import modes_figure
-from friso.shown.drawing.figure import BLUE, GREY, ORANGE, Array, Axis, Dash, Figure, Markers, Panel, Series
+from friso.leaf_springs.evaluation import Evaluation, Mode
+from friso.leaf_springs.mechanism import Mechanism
+from friso.questions.flexure.layout import block_size
+from friso.shown.drawing.figure import Array, Axis, Dash, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREY, LIGHT, ORANGE, VERMILLION
+from friso.shown.drawing.prefixes import with_unit
 
 COLOURS = {BEAMS: BLUE, CLOSED: ORANGE}
 DASHES: dict[str, Dash] = {CLOSED: "dashed"}
@@ -110,3 +113,203 @@ def _even_falling(x: Array, y: Array, at: Array) -> Array:
 def _deflection(flexure: BothModels) -> Axis:
     """Return the axis of the deflection up to the stroke."""
     return Axis("Deflection", "m", (0.0, flexure.best.stroke))
+
+
+SHOWN = 8
+"""Number of modes drawn."""
+
+LARGE = 0.16
+"""Amplitude of the largest motion, relative to the size of the picture."""
+
+ASPECT = 1.45
+"""Width of a picture over its height."""
+
+HALF = 0.5
+"""Smallest fraction of a mode's energy in the drawn shape for the mode to be drawn."""
+
+ENOUGH = 0.9
+"""Smallest fraction of a mode's motion that a view must show to be chosen."""
+
+LEAF_POINTS = 65
+"""Number of points along a drawn leaf."""
+
+VIEWS = {"from the side": (0, 2), "from above": (0, 1), "along the leaves": (1, 2)}
+"""The two axes of each view, in order of preference."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Lines on the mechanism: their points [m] at rest, shape (n, 3), and how a mode moves them."""
+
+    rest: Array
+    moved: Array
+
+
+def modes_figure(evaluation: Evaluation) -> Figure:
+    """Draw the first modes, one panel each."""
+    modes = [mode for mode in evaluation.modes if mode.interferes or drawable_share(evaluation.mechanism, mode) > HALF][
+        :SHOWN
+    ]
+    panels = tuple(_panel(evaluation.mechanism, mode, mode is evaluation.modes[0] or mode.interferes) for mode in modes)
+    caption = (
+        "The first modes with the cart held and the leaves straight, enlarged to be visible. Grey: at rest. The stage "
+        "is "
+        "drawn as the block of its mass and moments of inertia. A mode that actuator and sensor both see limits the "
+        "crossover. Torsion of the leaves about their middle lines is not drawn."
+    )
+    return Figure("flexure_modes", "Modes", caption, panels, columns=2)
+
+
+def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
+    """Return the panel of one mode, with the motion enlarged so that it can be seen.
+
+    `visible` is true if actuator and sensor both see the mode, which sets colour and label.
+    """
+    view = best_view(mechanism, mode)
+    axes = VIEWS[view]
+    shapes = [*_leaves(mechanism, mode, axes), _block(mechanism, mode, axes)]
+    corners = np.concatenate([shape.rest[:, axes] for shape in shapes])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    largest = max(float(np.abs(shape.moved[:, axes]).max()) for shape in shapes)
+    size = float(np.max(high - low))
+    gain = LARGE * size / largest
+    colour, label = (VERMILLION, "seen by actuator and sensor") if visible else (BLUE, "not seen by both")
+    rest = _polyline([shape.rest[:, axes] for shape in shapes])
+    moved = _polyline([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
+    lines = (Series(*rest, f"at rest, {view}", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
+    x, y = _limits(low - LARGE * size * 1.1, high + LARGE * size * 1.1)
+    title = f"{mode.name}, {with_unit(mode.frequency, 'Hz')}"
+    return Panel(title, Axis("xyz"[axes[0]], "m", x), Axis("xyz"[axes[1]], "m", y), lines, equal=True)
+
+
+def best_view(mechanism: Mechanism, mode: Mode) -> str:
+    """Return the name of the first view that shows nearly all of a mode's motion.
+
+    If there is none, the view that shows most of the motion is taken.
+    """
+    everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(mechanism, mode)])
+    shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
+    spans = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
+    return next((view for view, share in spans.items() if share > ENOUGH), max(spans, key=spans.__getitem__))
+
+
+def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
+    """Return the fraction of a mode's kinetic energy that its picture shows.
+
+    The picture shows the motion of the stage and of the middle lines of the leaves. The rest is torsion of the leaves.
+    """
+    speed = _rigid(mechanism, mode, _centre(mechanism)[None, :])[0]
+    stage = mechanism.body.mass * np.sum(speed**2) + np.sum(
+        np.array(mechanism.body.inertia, dtype=float) * mode.stage[3:] ** 2
+    )
+    middle = (mode.leaves[:, 1:] ** 2 + mode.leaves[:, :-1] ** 2).mean(axis=1) / 2
+    return float(stage + mechanism.leaf_mass * np.sum(middle))
+
+
+def _corners_moved(mechanism: Mechanism, mode: Mode) -> Array:
+    """Return the displacements of the eight corners of the stage's block in a mode, (8, 3)."""
+    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+    return _rigid(mechanism, mode, _centre(mechanism) + signs * np.array(block_size(mechanism)) / 2)
+
+
+def _centre(mechanism: Mechanism) -> Array:
+    """Return the stage's centre of mass [m]."""
+    return np.array([float(coordinate) for coordinate in mechanism.body.centre])
+
+
+def _rigid(mechanism: Mechanism, mode: Mode, points: Array) -> Array:
+    """Return the displacements, in a mode, of points [m] of the stage; both of shape (n, 3)."""
+    arm = points - np.array([float(mechanism.length), 0.0, 0.0])
+    return mode.stage[:3] + np.cross(mode.stage[3:], arm)
+
+
+def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
+    """Return the outline of the stage, at rest and moved, in the plane of two `axes`.
+
+    The plane goes through the stage's centre of mass.
+    """
+    half = np.array(block_size(mechanism)) / 2
+    rest = np.tile(_centre(mechanism), (5, 1))
+    for axis, signs in zip(axes, ((-1, 1, 1, -1, -1), (-1, -1, 1, 1, -1)), strict=True):
+        rest[:, axis] += half[axis] * np.array(signs)
+    return Shape(rest, _rigid(mechanism, mode, rest))
+
+
+def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
+    """Return the lines of the leaves in a view, at rest and moved.
+
+    Leaves are middle lines if seen from the side, outlines from above, and cross-sections along their length.
+    """
+    draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
+    return [
+        shape
+        for k, offset in enumerate(mechanism.offsets)
+        for shape in draw(mechanism, mode, mode.leaves[k], float(offset))
+    ]
+
+
+def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """Return the middle line of a leaf at rest and moved; `offset` is the leaf's height z [m]."""
+    x, leaf = _smooth(mechanism, leaf)
+    return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
+
+
+def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """Return the outline of a leaf from above: both long edges and both ends.
+
+    `offset` is the leaf's height z [m]. Cross-sections turn as the middle line does.
+    """
+    x, leaf = _smooth(mechanism, leaf)
+    turn = np.gradient(leaf[:, 1], x)
+    turn -= turn[0]  # the rest at the clamp is shear, nearly constant along the leaf
+    sides = []
+    for y in (-mechanism.width / 2, mechanism.width / 2):
+        rest = np.stack([x, np.full_like(x, y), np.full_like(x, offset)], axis=1)
+        sides.append((rest, leaf + np.stack([-y * turn, 0 * turn, 0 * turn], axis=1)))
+    around = [np.concatenate([first, second[::-1], first[:1]]) for first, second in zip(*sides, strict=True)]
+    return [Shape(*around)]
+
+
+def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
+    """Interpolate a leaf's displacements by a cubic spline, for a smooth line.
+
+    Returns the positions along the leaf [m], and the displacement at each.
+    """
+    reported, fine = (np.linspace(0.0, float(mechanism.length), count) for count in (len(leaf), LEAF_POINTS))
+    return fine, CubicSpline(reported, leaf)(fine)
+
+
+def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """Return a few cross-sections of a leaf between cart and stage, at rest and moved.
+
+    `offset` is the leaf's height z [m]. Along the leaf, sections turn by an evenly growing part of the turn of the
+    stage.
+    """
+    shapes = []
+    for k in np.linspace(0, len(leaf) - 1, 5).astype(int):
+        share = k / (len(leaf) - 1)
+        ends = np.array(
+            [[share * float(mechanism.length), y, offset] for y in (-mechanism.width / 2, mechanism.width / 2)]
+        )
+        lift = share * mode.stage[3] * ends[:, 1]
+        shapes.append(Shape(ends, leaf[k] + np.stack([0 * lift, 0 * lift, lift], axis=1)))
+    return shapes
+
+
+def _polyline(lines: list[Array]) -> tuple[Array, Array]:
+    """Join lines, each of shape (n, 2), into one with gaps between them; return its x and y."""
+    gap = np.full((1, 2), np.nan)
+    points = np.concatenate([part for line in lines for part in (line, gap)])
+    return points[:, 0], points[:, 1]
+
+
+def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the limits of both axes around a drawing that lies between `low` and `high`, (2,).
+
+    The aspect ratio of the panel is the usual one.
+    """
+    width, height = high - low
+    middle = (low + high) / 2
+    half = np.array([max(width, ASPECT * height), max(height, width / ASPECT)]) / 2
+    (x1, y1), (x2, y2) = middle - half, middle + half
+    return (float(x1), float(x2)), (float(y1), float(y2))

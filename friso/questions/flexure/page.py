@@ -5,9 +5,6 @@ Every run of the command gives the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
 from markupsafe import Markup
 
 from friso.leaf_springs.both_models import BothModels
@@ -16,17 +13,10 @@ from friso.questions.flexure.drawing import drawing_svg
 from friso.questions.flexure.figures import COLOURS, flexure_figures
 from friso.questions.flexure.table import rows
 from friso.questions.flexure.words import assumptions, findings, warnings
-from friso.shown.drawing.figure import GREEN, VERMILLION, Figure
-from friso.shown.files import Content, pictures
+from friso.shown.drawing.figure import Category
+from friso.shown.drawing.palette import GREEN, VERMILLION
+from friso.shown.files import Content
 from friso.shown.pages import Report
-
-
-class Column(NamedTuple):
-    """A model at the head of the table, with its colour."""
-
-    label: str
-    colour: str
-
 
 BASIS = (
     "geometrically exact beams, corrected for what clamps do to a wide leaf, and closed forms (Soemers, Design "
@@ -38,32 +28,22 @@ BASIS = (
 
 def flexure_files(flexure: BothModels) -> dict[str, Content]:
     """Return the page, the drawing, and every figure in all formats."""
-    figures = flexure_figures(flexure)
-    images = pictures(figures)
-    return {
-        "flexure.html": flexure_html(flexure, figures),
-        "flexure_drawing.svg": drawing(flexure),
-        **images,
-    }
-
-
-def flexure_html(flexure: BothModels, figures: Sequence[Figure]) -> str:
-    """Return the page of a mechanism with its figures."""
+    drawing = Markup(_drawing(flexure))
     joint, *further = findings(flexure)
     return Report.of_stage(
         "flexure",
         flexure.stage,
-        figures,
+        flexure_figures(flexure),
         verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(flexure))],
         sentences=[*further, *assumptions(flexure.stage)],
-        drawing=Markup(drawing(flexure)),
-        columns=[Column(name, COLOURS[name]) for name in flexure.models],
+        drawing=drawing,
+        columns=[Category(name, COLOURS[name]) for name in flexure.models],
         rows=rows(flexure),
         computed=f": {BASIS}",
-    ).html()
+    ).files({"flexure_drawing.svg": drawing})
 
 
-def drawing(flexure: BothModels) -> str:
+def _drawing(flexure: BothModels) -> str:
     """Return the dimensioned drawing of the mechanism as SVG."""
     data = materials().get(str(flexure.stage.flat().get("flexure.material")))
     material = f"{data.name}, {data.grade}" if data else ""

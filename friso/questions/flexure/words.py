@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from friso.interface.answer import AnswerTable
 from friso.leaf_springs.both_models import BothModels
@@ -139,70 +139,61 @@ def _borne(evaluation: Evaluation) -> list[str]:
     return lines
 
 
-def _loaded(evaluation: Evaluation) -> list[str]:
-    """Say how a load along the leaves changes stiffness and frequency in the drive direction.
+def _loaded(evaluation: Evaluation) -> Iterator[str]:
+    """Yield how a load along the leaves changes stiffness and frequency in the drive direction.
 
-    The list is empty without a load.
+    Nothing is yielded without a load.
     """
     load = float(evaluation.mechanism.load)
-    if not load:
-        return []
     first = evaluation.modes[0].frequency * math.sqrt(max(evaluation.loaded_drive / evaluation.drive[0], 0.0))
-    close = (
-        f" That is {evaluation.buckling_margin:.2g} times below buckling, so the stiffness depends on it strongly."
-        if load > 0
-        else ""
-    )
-    return [
-        f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
-        f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all other "
-        f"results are without it.{close}"
-    ]
+    close = f" That is {evaluation.buckling_margin:.2g} times below buckling, so the stiffness depends on it strongly."
+    if load:
+        yield (
+            f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
+            f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all other "
+            f"results are without it.{close if load > 0 else ''}"
+        )
 
 
-def _breaks_away(flexure: BothModels) -> list[str]:
-    """Warn that the cart breaks away inside the stroke, because the leaves push too hard.
+def _breaks_away(flexure: BothModels) -> Iterator[str]:
+    """Yield that the cart breaks away inside the stroke, because the leaves push too hard.
 
-    The list is empty if static friction holds the cart, or is not known.
+    Nothing is yielded if static friction holds the cart, or is not known.
     """
     static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
-    if static is None or force <= static:
-        return []
-    return [
-        f"The cart breaks away inside the stroke: the leaves push with {with_unit(force, 'N')} at "
-        f"{_stroke(flexure.best)}, static friction holds {with_unit(static, 'N')}. The joint can use its stroke only "
-        f"up to about {with_unit(flexure.best.stroke * static / force, 'm')}."
-    ]
+    if static is not None and force > static:
+        yield (
+            f"The cart breaks away inside the stroke: the leaves push with {with_unit(force, 'N')} at "
+            f"{_stroke(flexure.best)}, static friction holds {with_unit(static, 'N')}. The joint can use its stroke "
+            f"only up to about {with_unit(flexure.best.stroke * static / force, 'm')}."
+        )
 
 
-def _against(evaluation: Evaluation) -> list[str]:
-    """Warn of modes in which the sensor moves opposite to the actuator; empty without any."""
+def _against(evaluation: Evaluation) -> Iterator[str]:
+    """Yield modes in which the sensor moves opposite to the actuator, if there are any."""
     modes = [mode for mode in evaluation.modes if evaluation.interferes(mode) and mode.actuator * mode.sensor < 0]
-    if not modes:
-        return []
     named = listed([f"{mode.name} ({with_unit(mode.frequency, 'Hz')})" for mode in modes], "and")
-    return [
-        f"In {named} actuator and sensor move in opposite directions. A controller cannot damp that by phase, and "
-        "[parasitic], which describes only the size of a mode, makes the loop look better than it is: actuate and "
-        "measure at the same point."
-    ]
+    if modes:
+        yield (
+            f"In {named} actuator and sensor move in opposite directions. A controller cannot damp that by phase, and "
+            "[parasitic], which describes only the size of a mode, makes the loop look better than it is: actuate and "
+            "measure at the same point."
+        )
 
 
-def _differences(flexure: BothModels) -> list[str]:
-    """Say where the two models differ so much that the closed forms do not apply.
+def _differences(flexure: BothModels) -> Iterator[str]:
+    """Yield where the two models differ so much that the closed forms do not apply.
 
-    The list is empty if they agree, or if the beam model found no solution.
+    Nothing is yielded if they agree, or if the beam model found no solution.
     """
-    if flexure.beams is None:
-        return []
-    shares = {name: get(flexure.closed) / get(flexure.beams) - 1 for name, get in _COMPARED.items()}
+    beams = flexure.beams or flexure.closed
+    shares = {name: get(flexure.closed) / get(beams) - 1 for name, get in _COMPARED.items()}
     far = [f"{name} by {percent(share, signed=True)}" for name, share in shares.items() if abs(share) > AGREE]
-    if not far:
-        return []
-    return [
-        f"The closed forms differ from the beam model in {listed(far, 'and')}: there the leaves are outside the range "
-        "of the closed forms, and the beam model applies."
-    ]
+    if far:
+        yield (
+            f"The closed forms differ from the beam model in {listed(far, 'and')}: there the leaves are outside the "
+            "range of the closed forms, and the beam model applies."
+        )
 
 
 _COMPARED: Mapping[str, Callable[[Evaluation], float]] = {

@@ -2,14 +2,6 @@
 
 from friso.interface.question import MACHINE, Choices, Question
 
-
-def listed_kinds() -> list[tuple[str, str]]:
-    """Return the kinds of experiment that `--as` takes, with one line on each."""
-    from friso.identification.kinds import KINDS
-
-    return [(name, KINDS.one_line(name)) for name in KINDS]
-
-
 QUESTION = Question(
     __name__,
     100,
@@ -19,6 +11,6 @@ QUESTION = Question(
     metavars={"logs": "LOG...", "stage": "STAGE.toml"},
     folder="identified",
     details=True,
-    choices=Choices("Kinds of experiment (--as)", listed_kinds),
+    choices=Choices.of_registry("Kinds of experiment (--as)", "friso.identification.kinds:KINDS"),
     runner="friso.cli.runs.identify",
 )

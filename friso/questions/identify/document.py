@@ -17,7 +17,7 @@ from friso.questions.identify.estimates import key_document
 from friso.questions.identify.kind_view import view_of
 from friso.questions.identify.laws import laws_document
 from friso.questions.identify.words import headline, prediction_view
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 
 
 def identify_document(
@@ -49,11 +49,10 @@ def _log(file: LogFile) -> dict[str, Any]:
     """Return for the document which kind of log a file holds and why, and what was read."""
     return {
         "file": str(file.path),
-        "kind": file.kind,
-        "reason": file.reason,
+        **entries(file, "kind", "reason"),
         "mapping_file": None if file.mapping_file is None else str(file.mapping_file),
         **_content(file.source),
-        "read": list(file.source.read),
+        **entries(file.source, "read"),
     }
 
 
@@ -64,9 +63,8 @@ def _content(source: Source) -> dict[str, Any]:
     return {
         "roles": {role: unit_shown(source.unit(role)) for role in source.signals},
         "samples": len(source.time),
-        "sample_time_s": source.sample_time,
+        **entries(source, "sample_time_s", "warnings"),
         "segments": len(source.segments),
-        "warnings": list(source.warnings),
     }
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from friso.axis import axis_shown, unit_shown
 from friso.identification.estimate import Estimate
 from friso.identification.stage_file import estimate_text
+from friso.shown.documents import entries
 
 
 def ends_document(estimate: Estimate) -> dict[str, Any]:
     """Return the ends of an interval, None where one is infinite."""
-    return {"value": estimate.value, "low": estimate.low, "high": estimate.high}
+    return entries(estimate, "value", "low", "high")
 
 
 def estimate_document(estimate: Estimate) -> dict[str, Any]:
@@ -30,6 +31,11 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
         "reason": axis_shown().text(estimate.reason) or None,
     }
     return {"name": estimate.name, **about}
+
+
+def estimates_document(result: object, *names: str) -> dict[str, Any]:
+    """Return estimates among the attributes of a result, by name, for the document."""
+    return {name: estimate_document(getattr(result, name)) for name in names}
 
 
 def key_document(estimate: Estimate) -> dict[str, Any]:

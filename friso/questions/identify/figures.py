@@ -10,7 +10,8 @@ import numpy as np
 from friso.identification.method import Identification, Prediction
 from friso.questions.identify.kind_view import view_of
 from friso.questions.identify.words import labels, ordered, prediction_view
-from friso.shown.drawing.figure import BLUE, ORANGE, Axis, Figure, Markers, Panel, Series, Symbol
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series, Symbol
+from friso.shown.drawing.palette import BLUE, ORANGE
 
 SHORT = {
     "masses.cart": "cart",

@@ -15,7 +15,8 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.questions.identify.numbers import name_of, with_interval
 from friso.registry import Registry
-from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, ORANGE
 
 Facts = tuple[tuple[str, str], ...]
 """Values in words, with their names."""

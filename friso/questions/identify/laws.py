@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.quantities import percent
+from friso.shown.documents import entries
 
 if TYPE_CHECKING:
     from friso.identification.laws.comparison import LawComparison, LawPrediction
@@ -66,14 +67,11 @@ def laws_document(comparison: LawComparison) -> dict[str, Any]:
     supported = [law.law for law in comparison.supported]
     return {
         "supported": supported,
-        "logs": list(comparison.logs),
-        "left_out": dict(comparison.left_out),
+        **entries(comparison, "logs", "left_out"),
         "laws": [
             {
-                "law": prediction.law,
+                **entries(prediction, "law", "error", "errors"),
                 "supported": prediction.law in supported,
-                "error": prediction.error,
-                "errors": prediction.errors.tolist(),
                 "mass_kg": prediction.fit.mass,
                 "keys": dict(prediction.fit.keys),
             }

@@ -12,19 +12,10 @@ from friso.axis import axis_shown
 from friso.identification.method import Identification, Prediction
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import with_origins
+from friso.questions.identify import words
 from friso.questions.identify.figures import identify_figures
 from friso.questions.identify.kind_view import view_of
-from friso.questions.identify.words import (
-    COLUMNS,
-    estimate_rows,
-    headline,
-    labels,
-    prediction_line,
-    read_rows,
-    summaries,
-)
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.stage.correlations import correlations_file, correlations_text
 
@@ -41,36 +32,23 @@ def identify_files(
     stage, correlations = identification.stage, None
     if stage is not None and identification.correlations.keys:
         correlations = correlations_text(identification.correlations, stage)
-    figures = identify_figures(identification, predictions)
-    images = pictures(figures)
+    several = zip(identification.experiments, words.labels(identification), strict=True)
+    report = Report.of_stage(
+        "identify",
+        stage,
+        identify_figures(identification, predictions),
+        ", ".join(file.path.name for file in logs),
+        verdicts=words.headline(identification),
+        columns=words.COLUMNS,
+        rows=words.estimate_rows(identification),
+        files=words.read_rows(logs),
+        parts=words.summaries(identification),
+        predicted=[words.prediction_line(prediction) for prediction in predictions],
+        warnings=[axis_shown().text(warning) for warning in identification.warnings],
+        opening=[f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several],
+    )
     return {
         STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
         correlations_file(Path(STAGE)).name: correlations,
-        "identify.html": identify_html(identification, logs, predictions, figures),
-        **images,
+        **report.files(),
     }
-
-
-def identify_html(
-    identification: Identification,
-    files: Sequence[LogFile],
-    predictions: Sequence[Prediction],
-    figures: Sequence[Figure],
-) -> str:
-    """Return the whole page of an identification and its figures."""
-    several = zip(identification.experiments, labels(identification), strict=True)
-    opening = [f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several]
-    return Report.of_stage(
-        "identify",
-        identification.stage,
-        figures,
-        ", ".join(file.path.name for file in files),
-        verdicts=headline(identification),
-        columns=COLUMNS,
-        rows=estimate_rows(identification),
-        files=read_rows(files),
-        parts=summaries(identification),
-        predicted=[prediction_line(prediction) for prediction in predictions],
-        warnings=[axis_shown().text(warning) for warning in identification.warnings],
-        opening=opening,
-    ).html()

@@ -16,6 +16,7 @@ from friso.identification.logs.mapping import Mapping
 from friso.identification.method import Prediction, around, axis_of_all, check_predictions, nothing_learnt
 from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_usable
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
+from friso.interface import inputs
 from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import (
     LOGGER,
@@ -28,10 +29,6 @@ from friso.interface.inputs import (
     RoleScales,
     StageLike,
     TimeLike,
-    changes_of,
-    stage_of,
-    tables_of,
-    text_of,
 )
 from friso.intervals import Span
 from friso.platform.system import shell_word
@@ -197,25 +194,25 @@ def identify(
     if stage is None and laws:
         wanted = "the stage, for its masses and what lies before its guide"
         raise InputError("--laws", "no stage", wanted, "--stage stage.toml")
-    tables = {} if stage is None else tables_of(stage)
+    tables = {} if stage is None else inputs.tables_of(stage)
     lacking = [name for name in TOLD_BY_LOGS if name not in tables] if "controller" in tables else []
-    assumed = None if stage is None or lacking else stage_of(stage, set)
+    assumed = None if stage is None or lacking else inputs.stage_of(stage, set)
     beside = None if stage is None else axis_written(tables)
     if axis is None and beside is not None and beside != LINEAR:
         axis = beside.name
     settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
     paths, other_paths = paths_of(logs), paths_of(predict)
-    inputs, unusable = read_usable(paths, options, folder, other_paths)
+    held, unusable = read_usable(paths, options, folder, other_paths)
     predicted_files = [per_unit_of_force(file, beside) for file in read_all(other_paths, options, folder)]
-    inputs = [per_unit_of_force(file, beside) for file in inputs]
-    sources = [(file.source, file.kind) for file in inputs]
-    inputs = [*inputs, *predicted_files]
+    held = [per_unit_of_force(file, beside) for file in held]
+    sources = [(file.source, file.kind) for file in held]
+    held = [*held, *predicted_files]
     made_up: list[str] = []
     if stage is not None and lacking:
         made = around(sources)
-        assumed = stage_of(stage, set) if made is None else _whole(stage, tables, made, set)
+        assumed = inputs.stage_of(stage, set) if made is None else _whole(stage, tables, made, set)
         made_up = [] if made is None else _made_up(lacking, made, set)
-    axis_kind = axis_of_all([file.source for file in inputs], assumed)
+    axis_kind = axis_of_all([file.source for file in held], assumed)
     speak_of(axis_kind)
     others = _logs_to_predict(predicted_files)
     check_predictions(sources, others, assumed)
@@ -226,18 +223,18 @@ def identify(
     result = identification(sources, assumed, settings, progress, made_up)
     if laws and assumed is not None:
         result = with_laws(result, [source for source, _ in sources], assumed, progress)
-    reused = [file.reused for file in inputs if file.reused]
+    reused = [file.reused for file in held if file.reused]
     left_out = [f"left out: {_in_one_line(error)}" for error in unusable]
     result = replace(result, warnings=(*left_out, *reused, *_taken_from_logs(made_up), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
     if keep is not None and not result.failed and not nothing_learnt(result.estimates, False):
-        keep({file.path: _worth_keeping(file, result) for file in inputs})
+        keep({file.path: _worth_keeping(file, result) for file in held})
     checked = None
     if check and result.stage is not None:
         from friso.questions.check.question import checked_stage
 
         checked = checked_stage(result.stage, result.correlations, progress=progress)
-    return IdentifyAnswer(result, inputs=inputs, predictions=predictions, axis_kind=axis_kind, checked=checked)
+    return IdentifyAnswer(result, inputs=held, predictions=predictions, axis_kind=axis_kind, checked=checked)
 
 
 def _worth_keeping(file: LogFile, result: Identification) -> Mapping:
@@ -261,7 +258,7 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
     The user's `changes` are made last. Raises InputError if the file or the changes make no usable stage.
     """
     try:
-        return changed(completed(tables, made), changes_of(changes))
+        return changed(completed(tables, made), inputs.changes_of(changes))
     except InputError as error:
         raise error if isinstance(source, Stage | Keyed) else error.found_in(str(source)) from None
 
@@ -271,7 +268,7 @@ def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]
 
     `lacking` names these tables. Keys that the user sets are left out.
     """
-    keys_set = changes_of(changes)
+    keys_set = inputs.changes_of(changes)
     keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]
     return [key for key in keys if key not in keys_set]
 
@@ -294,7 +291,7 @@ def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, perio
     """
     values = []
     for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
-        text = None if value is None else text_of(value, quantity.unit)
+        text = None if value is None else inputs.text_of(value, quantity.unit)
         try:
             values.append(None if text is None else float(quantity.read(text)))
         except InputError as error:
@@ -319,12 +316,12 @@ def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:
         LOGGER.info(f"{name}: at first {', '.join(shown)}, by the inverse model", extra={"meanwhile": True})
 
 
-def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:
+def _logs_to_predict(held: Sequence[LogFile]) -> list[Log]:
     """Return the logs to be predicted.
 
     Raises InputError if one of the files holds a frequency response instead.
     """
-    logs = [item.source for item in inputs if isinstance(item.source, Log)]
-    if len(logs) < len(inputs):
+    logs = [item.source for item in held if isinstance(item.source, Log)]
+    if len(logs) < len(held):
         raise InputError("predict", "a measured frequency response", "a log over time", "predict=other.mat")
     return logs

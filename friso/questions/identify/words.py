@@ -18,7 +18,7 @@ from friso.identification.ways import ways_to_show
 from friso.questions.identify.kind_view import Facts, PredictionView, view_of
 from friso.questions.identify.laws import TITLE, how, law_facts, law_sentence
 from friso.questions.identify.numbers import interval_text, name_of, value_text, with_interval, within
-from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
+from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
 
 if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
@@ -246,13 +246,6 @@ def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tupl
     return rows
 
 
-def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
-    """Return all lines: the answer, the estimates, the experiments, and what was read."""
-    rows = estimate_rows(identification)
-    estimates = ["", *_aligned(rows)] if rows else []
-    return [*sentences(identification, predictions), *estimates, *details(identification, files)]
-
-
 def sentences(identification: Identification, predictions: Sequence[Prediction]) -> list[str]:
     """Return the answer, how well other logs are predicted, and notes."""
     lines = [sentence for _, sentence in headline(identification)]
@@ -272,10 +265,3 @@ def details(identification: Identification, files: Sequence[LogFile]) -> list[st
     for title, read, warned in read_rows(files):
         lines += ["", title, *(f"  {text}" for text in read), *(f"  note: {text}" for text in warned)]
     return lines
-
-
-def _aligned(rows: Sequence[EstimateRow]) -> list[str]:
-    """Align quantity, value and interval in columns; how they were determined is left out."""
-    table = [COLUMNS[:-1], *(row.texts[:-1] for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]

@@ -10,20 +10,12 @@ from collections.abc import Sequence
 from friso.identification.contents import LogContent
 from friso.questions.logs.figures import logs_figures
 from friso.questions.logs.words import COLUMNS, channel_rows, conclusions, next_command, open_questions
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 
 
 def logs_files(contents: Sequence[LogContent]) -> dict[str, Content]:
     """Return the page, and every figure in all formats."""
-    figures = logs_figures(contents)
-    images = pictures(figures)
-    return {"logs.html": logs_html(contents, figures), **images}
-
-
-def logs_html(contents: Sequence[LogContent], figures: Sequence[Figure]) -> str:
-    """Return the whole page of files of logs and their figures."""
     files = [
         {
             "name": content.path.name,
@@ -36,13 +28,12 @@ def logs_html(contents: Sequence[LogContent], figures: Sequence[Figure]) -> str:
         }
         for number, content in enumerate(contents, 1)
     ]
-    return Report(
+    return Report.of_stage(
         "logs",
+        None,
+        logs_figures(contents),
         ", ".join(content.path.name for content in contents),
-        figures,
-        values={
-            "verdicts": [sentence for content in contents for sentence in conclusions(content)],
-            "columns": COLUMNS,
-            "files": files,
-        },
-    ).html()
+        verdicts=[sentence for content in contents for sentence in conclusions(content)],
+        columns=COLUMNS,
+        files=files,
+    ).files()

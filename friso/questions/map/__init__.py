@@ -2,14 +2,6 @@
 
 from friso.interface.question import WHERE, Choices, Question
 
-
-def listed_metrics() -> list[tuple[str, str]]:
-    """Return what `--metric` takes, with one line on each."""
-    from friso.studies.metric import METRICS
-
-    return [(name, METRICS.one_line(name)) for name in METRICS]
-
-
 QUESTION = Question(
     __name__,
     40,
@@ -19,6 +11,6 @@ QUESTION = Question(
     function_name="sweep",
     metavars={"stage": "STAGE.toml|STORE", "rtol": "NUMBER|auto", "verify": "SHARE", "out": "STORE"},
     defaults={"verify": 0.05},
-    choices=Choices("Metrics (--metric)", listed_metrics),
+    choices=Choices.of_registry("Metrics (--metric)", "friso.studies.metric:METRICS"),
     runner="friso.cli.runs.map",
 )

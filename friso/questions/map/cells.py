@@ -9,32 +9,17 @@ import json
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
-from friso.questions.map.words import (
-    FAILED,
-    INVALID,
-    NOT_RUN,
-    QUIET,
-    categories_of,
-    in_order,
-    no_number,
-    quantity,
-    unit_of,
-    variable,
-    word_category,
-    words_of,
-)
+from friso.questions.map import words as map_words
+from friso.questions.map.words import quantity, variable
 from friso.shown.drawing.colours import ramp
 from friso.shown.drawing.figure import Array, Axis, Category
 from friso.shown.drawing.prefixes import choose
 from friso.studies.cells import INFERRED
 from friso.studies.metric import metrics, worded
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SAMPLE = "sample"  # dimension of sampled maps, which have no grid
 
@@ -152,7 +137,7 @@ def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
     A logarithmic axis that includes 0 gets cells of equal width, each named by its value.
     """
     coordinate = runs[key]
-    unit, log = unit_of(coordinate), coordinate.attrs.get("scale") == "log"
+    unit, log = map_words.unit_of(coordinate), coordinate.attrs.get("scale") == "log"
     if coordinate.dtype.kind not in "iuf":
         words = tuple(_word(str(key), value) for value in coordinate.values)
         return _axis_of_words(key, words, np.arange(len(words)))
@@ -174,7 +159,7 @@ def _sampled(runs: xr.Dataset, key: Hashable) -> CellAxis:
     if coordinate.dtype.kind in "iuf":
         values = np.asarray(coordinate.values, dtype=float)
         log = coordinate.attrs.get("scale") == "log" and bool(np.all(values > 0))
-        return CellAxis(str(key), quantity(key), unit_of(coordinate), log, values, (), places)
+        return CellAxis(str(key), quantity(key), map_words.unit_of(coordinate), log, values, (), places)
     words, positions = np.unique([_word(str(key), value) for value in coordinate.values], return_inverse=True)
     return CellAxis(str(key), quantity(key), "", False, positions.astype(float), tuple(map(str, words)), places)
 
@@ -209,11 +194,11 @@ def look(runs: xr.Dataset, metric: str) -> Look:
     if metric not in coloured(runs):
         raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(coloured(runs))}")
     if metric in worded():
-        codes, words = words_of(runs, metric)
+        codes, words = map_words.words_of(runs, metric)
         template = runs[metric]
         numbers = template.copy(data=np.full(template.shape, np.nan))
-        word_categories = [word_category(metric, word) for word in words]
-        categories = in_order(word_categories)
+        word_categories = [map_words.word_category(metric, word) for word in words]
+        categories = map_words.in_order(word_categories)
         table = np.array([categories.index(category) for category in word_categories], dtype=float)
         return Look(variable(metric), "", None, False, (), categories, numbers, template.copy(data=table[codes]))
     values = np.asarray(runs[metric].values, dtype=float)
@@ -221,7 +206,7 @@ def look(runs: xr.Dataset, metric: str) -> Look:
     numbers = np.where(np.isnan(codes), values, np.nan)
     limits, log, colours = _range(metric, numbers)
     arrays = (runs[metric].copy(data=numbers), runs[metric].copy(data=codes))
-    return Look(variable(metric), unit_of(runs[metric]), limits, log, colours, categories, *arrays)
+    return Look(variable(metric), map_words.unit_of(runs[metric]), limits, log, colours, categories, *arrays)
 
 
 def coloured(runs: xr.Dataset) -> list[str]:
@@ -244,7 +229,7 @@ def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, 
     if metric and metric.limits:
         return metric.limits, False, ()
     if metric and metric.counts:
-        return None, False, (QUIET, *ramp(max(1, int(high)))[::-1])
+        return None, False, (map_words.QUIET, *ramp(max(1, int(high)))[::-1])
     positive = finite[finite > 0]
     if low >= 0 and positive.size and high > 1e3 * float(positive.min()):
         return (max(float(positive.min()), 1e-6 * high), high), True, ()
@@ -261,8 +246,8 @@ def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[
     status = _texts(runs, "status", dims)
     pairs = [_state(word, reason) for word in outcome[1] for reason in status[1]]
     places, words = _texts(runs, metrics()[metric].reasons if metric in metrics() else "", dims)
-    none = [no_number(metric, word) for word in words]
-    categories = in_order(category for category in (*pairs, *none) if category is not None)
+    none = [map_words.no_number(metric, word) for word in words]
+    categories = map_words.in_order(category for category in (*pairs, *none) if category is not None)
     table = np.array([np.nan if category is None else categories.index(category) for category in pairs], dtype=float)
     codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape)
     reasons = np.array([categories.index(category) for category in none], dtype=float)[places]
@@ -276,7 +261,7 @@ def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.
     """
     if name not in runs:
         return np.zeros((), dtype=int), [None]
-    return words_of(runs.transpose(*dims), name)
+    return map_words.words_of(runs.transpose(*dims), name)
 
 
 def _state(outcome: str | None, status: str | None) -> Category | None:
@@ -286,13 +271,13 @@ def _state(outcome: str | None, status: str | None) -> Category | None:
     """
     reason = status or ""
     if reason.startswith(INFERRED):
-        return categories_of("outcome", True).get(outcome or "") or Category("inferred", "#eeeeee")
+        return map_words.categories_of("outcome", True).get(outcome or "") or Category("inferred", "#eeeeee")
     if outcome == "" or reason.startswith("not run"):
-        return NOT_RUN
+        return map_words.NOT_RUN
     if outcome == "invalid" or reason.startswith("invalid"):
-        return INVALID
+        return map_words.INVALID
     if outcome == "failed" or (outcome is None and reason not in ("", "done")):
-        return FAILED
+        return map_words.FAILED
     return None
 
 

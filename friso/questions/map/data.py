@@ -8,30 +8,27 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from friso.axis import unit_shown
 from friso.errors import InputError
 from friso.hunting.measures import BANDS
-from friso.questions.check.traces import common_range
+from friso.questions.check.figures import common_range
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, coloured, look, pick, plane_first
 from friso.questions.map.figures import edge_of_hunting
 from friso.questions.map.places import SHOWN
 from friso.questions.map.words import variable, words_of
 from friso.shown.drawing.colours import scale
-from friso.shown.drawing.drawable import colour_prefix
+from friso.shown.drawing.drawable import colour_prefix, prefixed
 from friso.shown.drawing.figure import Array, Cloud
 from friso.shown.drawing.prefixes import choose
 from friso.stage import Stage, loads
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import worded
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from friso.studies.traces import Traces
+from friso.studies.traces import Traces
 
 MOST = 250_000  # most cells in a page: more take a browser seconds to open and colour
 
@@ -173,14 +170,9 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
     colouring = look(runs, name)
     numbers = colouring.numbers.values.ravel().astype(float)
     none = np.zeros(numbers.size)
-    field = Cloud(
-        none, none, numbers, colouring.quantity, colouring.unit, colouring.limits, colouring.log, colouring.colours
-    )
+    field = Cloud(none, none, numbers, *colouring.scale[:-1])
     factor, unit = colour_prefix(field)
-    limits = None if colouring.limits is None else (colouring.limits[0] * factor, colouring.limits[1] * factor)
-    scaled = scale(
-        Cloud(none, none, numbers * factor, colouring.quantity, unit, limits, colouring.log, colouring.colours)
-    )
+    scaled = scale(prefixed(field))
     codes = cells.take(colouring.codes)
     stored = colouring.numbers if name in worded() else runs[name]
     categories = [{"label": category.label, "colour": category.colour} for category in colouring.categories]

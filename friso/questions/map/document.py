@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from friso.questions.map.findings import headline, loop_first
 from friso.questions.map.words import text_counts, word_counts
 from friso.shown.documents import plain_json
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from friso.studies.study import Study
+from friso.studies.study import Study
 
 
 def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str) -> dict[str, Any]:

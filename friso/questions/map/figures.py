@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from friso.hunting.criteria import ATTRACTED, UNDECIDED
 from friso.hunting.criteria import VERDICTS as VERDICT_WORDS
@@ -15,11 +16,9 @@ from friso.questions.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, loo
 from friso.questions.map.findings import statement
 from friso.questions.map.words import variable
 from friso.shown.drawing.drawable import cell_edges
-from friso.shown.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Cloud, Figure, Map, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK
 from friso.studies.metric import metrics
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SLICES = 9  # largest number of panels of a map over more than two axes
 RED = "#e3001b"  # the evaluation marker of the thesis

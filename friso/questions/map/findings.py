@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from friso.axis import axis_shown
 from friso.hunting.criteria import ATTRACTED, CREEPS, RESTS, SWINGS
 from friso.quantities import percent
+from friso.questions.map import words as map_words
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
-from friso.questions.map.words import (
-    AT_ONCE,
-    INVALID,
-    NOT_RUN,
-    failures,
-    grouped,
-    in_sentence,
-    tallied,
-    tally,
-    text_counts,
-    word_counts,
-)
+from friso.questions.map.words import failures, grouped
 from friso.shares import share_interval
 from friso.shown.drawing.prefixes import listed, percentage
 from friso.shown.loop_words import unstable_loop
+from friso.stage import Stage
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import MapFinding, metrics, worded
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from friso.stage import Stage
-    from friso.studies.study import Study
+from friso.studies.study import Study
 
 _NO_RESULT = {"failed": "the run was not completed", "invalid": "these values are not a valid stage"}
 
@@ -51,7 +36,7 @@ def headline(runs: xr.Dataset, name: str) -> str:
     asked = asked if asked in runs else "outcome"
     if asked not in runs:
         return ""
-    counts = {} if every[asked].counts else text_counts(runs, asked)
+    counts = {} if every[asked].counts else map_words.text_counts(runs, asked)
     findings = [one for one in every[asked].findings if not one.if_any or any(map(counts.get, one.words))]
     word, sentence = every[asked].doubt or ("", "")
     doubts = []
@@ -63,7 +48,7 @@ def headline(runs: xr.Dataset, name: str) -> str:
 def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
     """Say in which fraction of the map a finding holds, and in which range of each axis."""
     holds, completed = _flags(runs, name, finding.words)
-    open_words = _open_words(name) & {*text_counts(runs, name)} if finding.words else set()
+    open_words = _open_words(name) & {*map_words.text_counts(runs, name)} if finding.words else set()
     if not completed.any():
         return f"No cell of the map has a {'certain ' * bool(open_words)}result."
     if not holds.any() or np.array_equal(holds, completed):
@@ -101,7 +86,7 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
     """
     values = runs[name]
     holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
-    rows = max(1, AT_ONCE // max(1, int(np.prod(values.shape[1:]))))
+    rows = max(1, map_words.AT_ONCE // max(1, int(np.prod(values.shape[1:]))))
     without = ["", *_NO_RESULT, *_open_words(name)]
     for first in range(0, len(values), rows):
         part = np.asarray(values[first : first + rows].values)
@@ -126,7 +111,7 @@ def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
 
 def _range(axis: CellAxis, box: np.ndarray) -> str:
     """Write in words the range of an axis that is marked in `box`."""
-    name, inside = in_sentence(axis.key), axis.positions[box]
+    name, inside = map_words.in_sentence(axis.key), axis.positions[box]
     if axis.words:
         return f"{name} {listed([axis.words[int(k)] for k in np.unique(inside)], 'or')}"
     low, high = (axis.value(int(np.flatnonzero(axis.positions == end)[0])) for end in (inside.min(), inside.max()))
@@ -174,11 +159,11 @@ def statement(runs: xr.Dataset, metric: str) -> str:
 
 def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
     """Return the meaning of each word that occurs in a map."""
-    texts = {name: {word.text: word.meaning for word in metrics()[name].words} for name in tallied()}
+    texts = {name: {word.text: word.meaning for word in metrics()[name].words} for name in map_words.tallied()}
     return [
         (word, axis_shown().text(text))
         for name, meanings_ in texts.items()
-        for word in word_counts(runs, name)
+        for word in map_words.word_counts(runs, name)
         if (text := (meanings_ | _NO_RESULT).get(word))
     ]
 
@@ -207,14 +192,14 @@ def caveats(runs: xr.Dataset, name: str) -> list[str]:
 def _extent(runs: xr.Dataset) -> str:
     """Say how many runs were made at which tolerance, and with which results."""
     cells = int(np.prod(list(runs.sizes.values())))
-    status = text_counts(runs, "status")
+    status = map_words.text_counts(runs, "status")
     inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
-    words = word_counts(runs, "outcome")
-    idle = sum(words.get(category.label, 0) for category in (INVALID, NOT_RUN))
+    words = map_words.word_counts(runs, "outcome")
+    idle = sum(words.get(category.label, 0) for category in (map_words.INVALID, map_words.NOT_RUN))
     text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
     if inferred:
         text += f", {grouped(inferred)} cells inferred from their neighbours"
-    listing = "; ".join(filter(None, (tally(runs, name) for name in tallied())))
+    listing = "; ".join(filter(None, (map_words.tally(runs, name) for name in map_words.tallied())))
     return f"{text}: {listing}." if listing else f"{text}."
 
 
@@ -223,7 +208,7 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
 
     An unstable loop comes first, then the fraction of the map that swings or hunts.
     """
-    words = "; ".join(filter(None, (tally(runs, name) for name in tallied())))
+    words = "; ".join(filter(None, (map_words.tally(runs, name) for name in map_words.tallied())))
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
@@ -283,7 +268,7 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))
     ends = [(k, k + 1) for k in differ[differ < at][-1:] if words[k] in (*ATTRACTED, *_QUIET)]
     ends += [(k - 1, k) for k in differ[differ > at][:1] if words[k] in (*ATTRACTED, *_QUIET)]
-    name, sides = in_sentence(axis.key), ("above", "below")
+    name, sides = map_words.in_sentence(axis.key), ("above", "below")
     return [f"{name} {axis.value(low)} to {axis.value(high)} ({sides[int(low < at)]} yours)" for low, high in ends]
 
 

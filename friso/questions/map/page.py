@@ -8,7 +8,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from friso.hunting.criteria import PEAK_RULE
 from friso.questions.map.cells import SAMPLE, axes_of
@@ -17,16 +18,12 @@ from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import caveats, failures, headline, meanings, own_place, verification
 from friso.questions.map.places import SHOWN, with_places
 from friso.questions.map.words import grouped, tallied, tally, variable
+from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
 from friso.shown.drawing.packing import packed_json
 from friso.shown.files import Content
 from friso.shown.pages import Report, print_image, script
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from friso.shown.drawing.figure import Figure
-    from friso.studies.traces import Traces
+from friso.studies.traces import Traces
 
 FORMS = (*FORMATS, "html")
 """Suffixes of the files of a map."""

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel
+from friso.shown.drawing.palette import GREY, INK
+from friso.stage import Stage
 from friso.studies.axes import SCALINGS
-
-if TYPE_CHECKING:
-    from friso.stage import Stage
 
 SHOWN = "this machine"
 """Label of the machine that a figure is about; any other machine is grey."""

@@ -17,22 +17,9 @@ import numpy as np
 
 from friso.axis import speak_of
 from friso.errors import InputError, StoreError
+from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import (
-    LOGGER,
-    Address,
-    AxisPoints,
-    Changes,
-    Links,
-    MetricName,
-    StageLike,
-    Tolerance,
-    mention_sampling,
-    mention_unstable_loop,
-    read_stage,
-    tolerance_of,
-    wrong,
-)
+from friso.interface.inputs import LOGGER, Address, AxisPoints, Changes, Links, MetricName, StageLike, Tolerance
 from friso.interface.output_folder import check_file, refuse_place, write
 from friso.platform.extras import need
 from friso.platform.system import MOST_PROCESSES, cause_of, path_of, shell_word, usable_cores
@@ -308,9 +295,9 @@ def sweep(
             study, metric = stored_study(store, metric, None if yes else LARGE)
         else:
             metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
-            chosen = read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
+            chosen = inputs.read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
             if runs_as_built(chosen, [metric]):
-                mention_sampling(chosen)
+                inputs.mention_sampling(chosen)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
             study = study if store is None else as_stored(study, store, metric, overwrite)
@@ -318,12 +305,12 @@ def sweep(
         if store is None:
             for path in exports:
                 check_file("export", path, overwrite)
-            mention_unstable_loop(study.stage)
+            inputs.mention_unstable_loop(study.stage)
             runs, can_note = run_in_memory([study], crew, share, progress)[0], False
         else:
             example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
-            mention_unstable_loop(study.stage)
+            inputs.mention_unstable_loop(study.stage)
             runs, can_note = _filled(study, store, crew, share, overwrite, metric, beside, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
     if store is None:
@@ -365,7 +352,7 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
     tried is taken. The choice is logged.
     """
     if entry != "auto":
-        return tolerance_of(entry)
+        return inputs.tolerance_of(entry)
     rtol, shares, cells = loosest_rtol(study, crew)
     surviving = f"of {cells} cells, " + ", ".join(
         f"{percent(share, 3)} at {rtol_:g}" for rtol_, share in shares.items()
@@ -390,7 +377,7 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
     most = min(usable_cores(), MOST_PROCESSES)
     if workers is not None and not 1 <= workers <= most:
         expected = f"1 worker or more, up to the {most} cores that may be used"
-        raise wrong("workers", str(workers), expected, "1")
+        raise inputs.wrong("workers", str(workers), expected, "1")
     if scheduler is not None:
         from friso.studies.execute import connected
 
@@ -456,7 +443,7 @@ def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
     for path in files:
         refuse_place("export", path)
         if path.suffix not in (".nc", ".csv") or path.is_dir():
-            raise wrong("export", str(path), "a file that ends in .nc or .csv", "map.nc")
+            raise inputs.wrong("export", str(path), "a file that ends in .nc or .csv", "map.nc")
         if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
-            raise wrong("export", str(path), "a file in an existing folder that can be written", "map.nc")
+            raise inputs.wrong("export", str(path), "a file in an existing folder that can be written", "map.nc")
     return files

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.shown.drawing.figure import GREY, INK, MAUVE, ORANGE, PINK, VERMILLION, Category
+from friso.shown.drawing.figure import Category
+from friso.shown.drawing.palette import GREY, INK, MAUVE, ORANGE, PINK, VERMILLION
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.stage.tables import friction_laws
 from friso.studies.axes import SCALINGS

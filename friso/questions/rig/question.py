@@ -4,17 +4,9 @@ from __future__ import annotations
 
 from friso.axis import speak_of
 from friso.equations.as_built import whole_samples
+from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import (
-    LOGGER,
-    Changes,
-    ExperimentName,
-    Seed,
-    StageLike,
-    mention_sampling,
-    mention_unstable_loop,
-    stage_of,
-)
+from friso.interface.inputs import LOGGER, Changes, ExperimentName, Seed, StageLike
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
@@ -65,17 +57,17 @@ def rig(
     >>> friso.rig("stiffness", friso.example("thesis_drive"))  # doctest: +SKIP
     """
     run = RIG_EXPERIMENTS[RIG_EXPERIMENTS.checked(experiment, "EXPERIMENT", "friso rig {} rig.toml")]
-    chosen = stage_of(stage, set)
+    chosen = inputs.stage_of(stage, set)
     speak_of(chosen.axis_kind)
     _announce(chosen)
-    mention_unstable_loop(chosen)
+    inputs.mention_unstable_loop(chosen)
     return RigAnswer(run(chosen, seed, progress))
 
 
 def _announce(stage: Stage) -> None:
     """Warn before the run of assumptions about the drive and of uncertain keys."""
     if stage.drive is None or stage.drive.sample_time is None:
-        mention_sampling(stage)
+        inputs.mention_sampling(stage)
     samples = whole_samples(as_built_keys(stage))
     if samples >= MANY:
         LOGGER.warning(

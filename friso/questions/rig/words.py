@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from friso.questions.rig.outcome_view import view_of
+from friso.shown.documents import entries, plain_json
+from friso.shown.drawing.figure import Figure
 from friso.studies.rig.outcome import Outcome
 
 
@@ -30,3 +34,22 @@ def _failures(outcome: Outcome) -> list[str]:
 def details(outcome: Outcome) -> list[str]:
     """Return the seed of the noise, and notes on the experiment."""
     return [f"seed of the noise: {outcome.seed}", *(f"note: {note}" for note in outcome.notes)]
+
+
+def rig_document(outcome: Outcome) -> dict[str, Any]:
+    """Return the results of an experiment, and its logs with the seeds of their noise."""
+    logs = [{**entries(log, "name", "seed", "interval_s"), "failure": log.failure or None} for log in outcome.logs]
+    return plain_json(
+        {
+            "conclusion": sentences(outcome)[0],
+            "stage": outcome.stage.name,
+            **entries(outcome, "experiment", "seed", "notes"),
+            "logs": logs,
+            "results": view_of(outcome.experiment).numbers(outcome),
+        }
+    )
+
+
+def rig_figures(outcome: Outcome) -> list[Figure]:
+    """Return the figures of an experiment, arranged as in the thesis."""
+    return view_of(outcome.experiment).figures(outcome)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from friso.questions.check.figures import response_figure
 from friso.shown.files import Content, image_files
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def simulate_files(response: xr.Dataset, stem: str) -> dict[str, Content]:

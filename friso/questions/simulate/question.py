@@ -11,20 +11,11 @@ from friso.engine.arrays import Status
 from friso.engine.simulate import SIMULATION_RTOL
 from friso.errors import InputError
 from friso.hunting.measures import Measures, measured_run
+from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import (
-    Changes,
-    StageLike,
-    TimeLike,
-    Tolerance,
-    mention_unstable_loop,
-    read_stage,
-    seconds_of,
-    stage_of,
-    stem_of,
-    tolerance_of,
-)
+from friso.interface.inputs import Changes, StageLike, TimeLike, Tolerance
 from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT, is_as_built
 
@@ -111,7 +102,7 @@ class SimulateAnswer(Answer):
 
     def document(self) -> dict[str, Any]:
         """Return what the run does, and how the solver fared, as a document."""
-        from friso.questions.simulate.document import simulate_document
+        from friso.questions.simulate.words import simulate_document
 
         return simulate_document(self.result, self.measures, self.stage.name, self.sentences()[0], self.dwells)
 
@@ -170,8 +161,10 @@ def simulate(
     >>> response["position"].attrs["units"]
     'm'
     """
-    interval = None if sample_time is None else seconds_of(sample_time, "sample_time")
-    tolerance = None if rtol is None else tolerance_of(rtol)
+    interval = (
+        None if sample_time is None else inputs.quantity_of(sample_time, "sample_time", Quantity("s", positive, "1 ms"))
+    )
+    tolerance = None if rtol is None else inputs.tolerance_of(rtol)
     if cell is None:
         source: Any = stage
         if isinstance(stage, list | tuple) and len(stage) == 1:
@@ -181,7 +174,7 @@ def simulate(
                 "STAGE.toml", " ".join(map(str, source or [])), "one stage file", "friso simulate rig.toml"
             )
         left_out = AS_BUILT if continuous else ()
-        chosen, name, usual = read_stage(source, set, leaves_out=left_out), stem_of(source), None
+        chosen, name, usual = inputs.read_stage(source, set, leaves_out=left_out), inputs.stem_of(source), None
     else:
         from friso.studies.cells import runs_as_built
 
@@ -195,7 +188,7 @@ def simulate(
         usual = study.rtol if continuous else None
     from friso.engine.simulate import simulate as simulated
 
-    mention_unstable_loop(chosen)
+    inputs.mention_unstable_loop(chosen)
     if is_as_built(chosen) and not continuous:
         from friso.virtual_rig.response import response as run_as_built
 
@@ -220,4 +213,4 @@ def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str
     if not inside:
         raise InputError(f"--cell {store}", " ".join(numbers), f"one number per axis: {sizes}", "3 4")
     name = f"{store.with_suffix('').name}_cell_{'_'.join(numbers)}"
-    return stage_of(study.cell_stage(index), changes), name, study
+    return inputs.stage_of(study.cell_stage(index), changes), name, study

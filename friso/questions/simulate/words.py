@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.hunting.criteria import CREEPS, REST_BAND, RESTS, SWINGS
+from friso.hunting.criteria import CREEPS, OUTCOME_CRITERION, REST_BAND, RESTS, SWINGS
 from friso.hunting.measures import BANDS, LAST_QUARTER, Measures
+from friso.shown.documents import dwells_document, plain_json
 from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
 from friso.shown.motion_words import off_its_reference
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+
+    from friso.hunting import Dwell
+
 
 GROWN = 1.1
 """Ratio of errors in the last quarter of a run and before it, above which the run counts as diverging."""
@@ -86,3 +97,27 @@ def _settling(measures: Measures) -> str:
 def _value(array: np.ndarray) -> float:
     """Return the only number of an array."""
     return float(array[0])
+
+
+def simulate_document(
+    response: xr.Dataset, measures: Measures, name: str, conclusion: str, dwells: Sequence[Dwell]
+) -> dict[str, Any]:
+    """Return the JSON document of a run: what it does, and how the solver fared.
+
+    `name` is the name of the stage.
+    """
+    into_1um, into_10um = measures.settling_time
+    return plain_json(
+        {
+            "conclusion": conclusion,
+            "stage": name,
+            "outcome": measures.outcome[0],
+            "criterion": OUTCOME_CRITERION,
+            "peak_to_peak_m": measures.peak_to_peak[0],
+            "period_s": measures.period[0],
+            "settling_time_s": into_1um[0],
+            "settling_time_10um_s": into_10um[0],
+            **({"dwells": dwells_document(dwells)} if dwells else {}),
+            "solver": {key: response.attrs[key] for key in ("status", "steps", "rejected", "rtol")},
+        }
+    )

@@ -8,7 +8,7 @@ from typing import Any
 from friso.questions.tune.words import answer, changes, failing, unsure_why, why_unmet
 from friso.remedies.method import Advice
 from friso.remedies.verified import Performance, RemedyOutcome
-from friso.shown.documents import plain_json
+from friso.shown.documents import entries, plain_json
 
 
 def tune_document(tuning: Advice) -> dict[str, Any]:
@@ -24,20 +24,13 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
             "conclusion": first,
             "details": [*further, *failing(tuning)],
             "stage": tuning.stage.name,
-            "interrupted": tuning.interrupted,
-            "needed": tuning.needed,
+            **entries(tuning, "interrupted", "needed", "seed"),
             "least_change": tuning.least.remedy.name if tuning.least else None,
-            "seed": tuning.seed,
             "machines": tuning.machines.count,
             "goal": {
-                "within_m": goal.within,
+                **entries(goal, "within_m", "settle_s", "force_limit_n", "bandwidth_limit_hz", "distance", "share"),
                 "moves": None if goal.moves is None else asdict(goal.moves),
-                "settle_s": goal.settle,
-                "force_limit_n": goal.force_limit,
-                "bandwidth_limit_hz": goal.bandwidth_limit,
                 "modulus_margin": goal.margin,
-                "distance": goal.distance,
-                "share": goal.share,
             },
             "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict, "doubts": [*tuning.unmet]},
             "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},

@@ -14,22 +14,8 @@ from friso.frequency.members import limit_cases
 from friso.frequency.system import DriveTiming
 from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    SKY,
-    VERMILLION,
-    Axis,
-    Dash,
-    Figure,
-    Markers,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Axis, Dash, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER

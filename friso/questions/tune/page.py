@@ -11,8 +11,7 @@ from friso.questions.tune.gain_words import gain_facts
 from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.questions.tune.words import COLUMNS, answer, assumptions, failing, rows, window_facts
 from friso.remedies.method import Advice
-from friso.shown.drawing.figure import Figure
-from friso.shown.files import Content, pictures
+from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.correlations import correlations_file, correlations_text
@@ -24,14 +23,43 @@ OF_LEAVES = "-of-leaf-springs"
 """Suffix of stage files with joints made of leaf springs."""
 
 
+class Behind(NamedTuple):
+    """A part of the page that can be folded: title, sentences and facts.
+
+    `open` is true if it is unfolded at first.
+    """
+
+    title: str
+    sentences: Sequence[str]
+    facts: Sequence[tuple[str, str]] = ()
+    open: bool = False
+
+
 def tune_files(tuning: Advice) -> dict[str, Content]:
     """Return the stage files, the page, and every figure in all formats.
 
     `tuned.toml` is the least change that works.
     """
-    figures = tune_figures(tuning)
-    images = pictures(figures)
-    return {**stage_files(tuning), "tune.html": page(tuning, figures), **images}
+    behind = [
+        Behind("What does not work, and why", failing(tuning), open=True),
+        Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),
+        Behind(
+            "Where each number may lie on the machines of the search, the others as tuned", (), window_facts(tuning)
+        ),
+        Behind("What matters for the edge of hunting", sensitivity_sentences(tuning)),
+        Behind("What is assumed, and how machines were drawn", assumptions(tuning)),
+    ]
+    report = Report.of_stage(
+        "tune",
+        tuning.stage,
+        tune_figures(tuning),
+        sentences=answer(tuning),
+        details=[more for more in behind if more.sentences or more.facts],
+        columns=COLUMNS,
+        rows=rows(tuning),
+        computed=f", seed {tuning.seed}",
+    )
+    return {**stage_files(tuning), **report.files()}
 
 
 def stage_files(tuning: Advice) -> dict[str, Content]:
@@ -57,38 +85,3 @@ def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Con
         name: tuning.complete(stage).to_toml(),
         beside: correlations_text(correlations, stage) if correlations.keys else None,
     }
-
-
-class Behind(NamedTuple):
-    """A part of the page that can be folded: title, sentences and facts.
-
-    `open` is true if it is unfolded at first.
-    """
-
-    title: str
-    sentences: Sequence[str]
-    facts: Sequence[tuple[str, str]] = ()
-    open: bool = False
-
-
-def page(tuning: Advice, figures: Sequence[Figure]) -> str:
-    """Return the page with its figures."""
-    behind = [
-        Behind("What does not work, and why", failing(tuning), open=True),
-        Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),
-        Behind(
-            "Where each number may lie on the machines of the search, the others as tuned", (), window_facts(tuning)
-        ),
-        Behind("What matters for the edge of hunting", sensitivity_sentences(tuning)),
-        Behind("What is assumed, and how machines were drawn", assumptions(tuning)),
-    ]
-    return Report.of_stage(
-        "tune",
-        tuning.stage,
-        figures,
-        sentences=answer(tuning),
-        details=[more for more in behind if more.sentences or more.facts],
-        columns=COLUMNS,
-        rows=rows(tuning),
-        computed=f", seed {tuning.seed}",
-    ).html()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from friso.errors import InputError
+from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import (
     LOGGER,
@@ -23,12 +24,6 @@ from friso.interface.inputs import (
     Seed,
     StageLike,
     TimeLike,
-    choice,
-    correlations_of,
-    mention_unstable_loop,
-    read_stage,
-    text_of,
-    wrong,
 )
 from friso.platform.extras import install, missing
 from friso.platform.system import shell_word
@@ -64,15 +59,6 @@ class TuneAnswer(Answer):
     def interrupted(self) -> bool:
         """Tell whether Ctrl-C ended the search, so that the answer is the best so far."""
         return self.result.interrupted
-
-    def details(self) -> Sequence[str]:
-        """Return gains for drives, where the numbers may lie, what matters most, and assumptions."""
-        from friso.questions.tune.gain_words import gain_lines
-        from friso.questions.tune.sensitivity_words import sensitivity_sentences
-        from friso.questions.tune.words import assumptions, window_lines
-
-        advice = self.result
-        return [*gain_lines(advice), *window_lines(advice), *sensitivity_sentences(advice), *assumptions(advice)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the commands that design or check the leaf springs of an isolator.
@@ -148,14 +134,14 @@ def tune(
     >>> import friso
     >>> friso.tune(friso.example("thesis_rig"), only="controller", within="2 um")  # doctest: +SKIP
     """
-    chosen = read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
+    chosen = inputs.read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
     goal = _goal(chosen, within, settle, moves, force_limit, bandwidth_limit, margin, only, keep)
-    correlations = correlations_of(stage, chosen)
+    correlations = inputs.correlations_of(stage, chosen)
     if missing("design"):
         LOGGER.warning(f"no leaf springs are sized for a joint: that takes {install('design')}")
     from friso.remedies.method import tune as tuned
 
-    begins, answered = partial(mention_unstable_loop, chosen), partial(_mention, chosen, goal)
+    begins, answered = partial(inputs.mention_unstable_loop, chosen), partial(_mention, chosen, goal)
     advice = tuned(chosen, goal, seed, correlations, progress=progress, begins=begins, answered=answered)
     return TuneAnswer(advice)
 
@@ -189,18 +175,14 @@ def _goal(
     """
     for name, part in (("only", only), ("keep", keep)):
         if part is not None:
-            choice(part, name, get_args(Changeable), f"{name}=controller")
+            inputs.choice(part, name, get_args(Changeable), f"{name}=controller")
     if only is not None and only == keep:
         raise InputError("keep", str(keep), f"something else than --only {only}, or nothing is left to change", "")
 
     def read(name: str, value: float | str | None, unit: str, example: str, bound: Bound = positive) -> float | None:
         """Read an option as a number in SI; None if it is not given."""
         quantity = Quantity(unit, bound, example).on(stage.axis_kind)
-        text = None if value is None else text_of(value, quantity.unit)
-        try:
-            return None if text is None else float(quantity.read(text))
-        except InputError as error:
-            raise wrong(name, error.actual, error.expected, error.example) from None
+        return None if value is None else inputs.quantity_of(value, name, quantity)
 
     return Goal(
         within=read("within", within, "m", "1 um", _IN_POSITION) or Goal.within,
@@ -226,9 +208,11 @@ def _moves(text: str, stage: Stage) -> MoveRange:
     try:
         low, high = (float(length.read(part.strip())) for part in (first, last))
     except InputError:
-        raise wrong("moves", quoted(text), "smallest and largest move, FIRST..LAST, with units", example) from None
+        raise inputs.wrong(
+            "moves", quoted(text), "smallest and largest move, FIRST..LAST, with units", example
+        ) from None
     if low > high:
-        raise wrong("moves", quoted(text), "the smallest move first", example)
+        raise inputs.wrong("moves", quoted(text), "the smallest move first", example)
     return replace(stated, smallest=low, largest=high)
 
 
@@ -239,5 +223,5 @@ def _margin(number: float | str) -> float:
     except ValueError:
         margin = np.nan
     if not 0 < margin < 1:
-        raise wrong("margin", quoted(number), "a modulus margin between 0 and 1", "0.5")
+        raise inputs.wrong("margin", quoted(number), "a modulus margin between 0 and 1", "0.5")
     return margin

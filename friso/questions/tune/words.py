@@ -21,7 +21,9 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
+from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
+from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.remedies.catalogue import BANDWIDTH
 from friso.remedies.least import LEAST, ChangeSize
 from friso.remedies.machines import Goal
@@ -217,13 +219,13 @@ def goal_words(goal: Goal) -> str:
     )
 
 
-def _interrupted(tuning: Advice) -> list[str]:
-    """Say that the search was interrupted and the answer is the best so far; or say nothing."""
-    if not tuning.interrupted:
-        return []
-    return [
-        "Interrupted: this is the best so far. Options that are not named were not tried, and one may be unfinished."
-    ]
+def _interrupted(tuning: Advice) -> Iterator[str]:
+    """Yield that the search was interrupted and the answer is the best so far; or nothing."""
+    if tuning.interrupted:
+        yield (
+            "Interrupted: this is the best so far. Options that are not named were not tried, and one may be "
+            "unfinished."
+        )
 
 
 def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
@@ -706,3 +708,8 @@ def sentences(tuning: Advice) -> list[str]:
 def tables(tuning: Advice) -> list[AnswerTable]:
     """Return the table in which remedies and the stage as it is stand side by side."""
     return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]
+
+
+def details(tuning: Advice) -> list[str]:
+    """Return gains for drives, where the numbers may lie, what matters most, and assumptions."""
+    return [*gain_lines(tuning), *window_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)]

@@ -17,7 +17,8 @@ from matplotlib.patches import Patch
 
 from friso.shown.drawing.colours import ColourScale, painted, scale
 from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
-from friso.shown.drawing.figure import GREY, INK, Array, Coloured, Figure, Map, Panel
+from friso.shown.drawing.figure import Array, Coloured, Figure, Map, Panel
+from friso.shown.drawing.palette import GREY, INK
 
 LINE = 0.17  # [inch] one line of the legend or the note
 LETTERS = 15.5  # to the inch, at their size

@@ -17,26 +17,19 @@ from threading import RLock
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib import ticker
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
-from matplotlib.ticker import (
-    FuncFormatter,
-    Locator,
-    LogLocator,
-    MaxNLocator,
-    MultipleLocator,
-    NullFormatter,
-    ScalarFormatter,
-)
 from matplotlib.transforms import Bbox
 
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.shown.drawing.drawable import drawable, word_ticks
-from friso.shown.drawing.figure import GREY, INK, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.images import FORMATS
 from friso.shown.drawing.matplotlib_maps import LINE, add_colour_bars, add_footer, draw_coloured, footer_height
+from friso.shown.drawing.palette import GREY, INK
 
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
@@ -317,26 +310,26 @@ def _ticks(axes: Axes, panel: Panel, width: float) -> None:
             positions, words = word_ticks(declared)
             axis.set_ticks(positions, words, parse_math=False)
         elif declared.log:
-            _decades(axis, MaxNLocator(nbins=most, steps=steps))
+            _decades(axis, ticker.MaxNLocator(nbins=most, steps=steps))
         else:
-            plain = ScalarFormatter(useOffset=False)
+            plain = ticker.ScalarFormatter(useOffset=False)
             plain.set_scientific(False)
-            even = MaxNLocator(nbins=most, steps=steps)
+            even = ticker.MaxNLocator(nbins=most, steps=steps)
             axis.set_major_formatter(plain)
-            axis.set_major_locator(MultipleLocator(declared.step) if declared.step else even)
+            axis.set_major_locator(ticker.MultipleLocator(declared.step) if declared.step else even)
 
 
-def _decades(axis: Any, even: Locator) -> None:
+def _decades(axis: Any, even: ticker.Locator) -> None:
     """Set the ticks of a logarithmic axis.
 
     They stand at powers of ten, also at 2 and 5 over a few decades, and evenly within one decade.
     """
     low, high = axis.get_view_interval()
     few = high < 1000 * low
-    fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
-    axis.set_major_locator(fine if few else LogLocator(numticks=8))
-    axis.set_major_formatter("{x:g}" if few else FuncFormatter(_power_of_ten))
-    axis.set_minor_formatter(NullFormatter())
+    fine = even if high < 10 * low else ticker.LogLocator(subs=(1.0, 2.0, 5.0))
+    axis.set_major_locator(fine if few else ticker.LogLocator(numticks=8))
+    axis.set_major_formatter("{x:g}" if few else ticker.FuncFormatter(_power_of_ten))
+    axis.set_minor_formatter(ticker.NullFormatter())
 
 
 def _power_of_ten(value: float, _: int | None = None) -> str:

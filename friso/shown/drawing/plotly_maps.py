@@ -12,7 +12,8 @@ import numpy as np
 
 from friso.shown.drawing.colours import ColourScale, painted, scale
 from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
-from friso.shown.drawing.figure import GREY, INK, Array, Axis, Coloured, Figure, Map, Panel
+from friso.shown.drawing.figure import Array, Axis, Coloured, Figure, Map, Panel
+from friso.shown.drawing.palette import GREY, INK
 
 BAR = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
 LINE = 17  # [px] one line of the note

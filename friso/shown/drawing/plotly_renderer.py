@@ -19,20 +19,11 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
+from friso.shown.drawing import plotly_maps
 from friso.shown.drawing.drawable import drawable, word_ticks
-from friso.shown.drawing.figure import GREY, INK, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.packing import packed, packed_json
-from friso.shown.drawing.plotly_maps import (
-    BAR,
-    DASHES,
-    KEY_ROW,
-    SYMBOLS,
-    bar_panels,
-    coloured_traces,
-    footer,
-    key_rows,
-    key_traces,
-)
+from friso.shown.drawing.palette import GREY, INK
 
 WIDE, NARROW = 540, 290  # [px] for all columns of axes: the least of a wide page, and of a telephone
 TITLE, SPACE = 17, 18  # [px] a line of the title, and what lies about it and the legend
@@ -142,7 +133,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     row = header + plot + FOOTER
     height = row * prepared.rows
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the earlier numbers
-    below, legend, note = footer(prepared, key, width)
+    below, legend, note = plotly_maps.footer(prepared, key, width)
     layout: dict[str, Any] = {
         "height": height + TOP + below,
         "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": below},
@@ -153,7 +144,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     }
     traces: list[Any] = []
     links: dict[Axis, str] = {}
-    with_bar, shared_bar = bar_panels(prepared.panels)
+    with_bar, shared_bar = plotly_maps.bar_panels(prepared.panels)
     for number, panel in enumerate(prepared.panels):
         top = height - (number // prepared.columns) * row
         y_domain = ((top - header - plot) / height, (top - header) / height)
@@ -162,7 +153,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
         if shared_bar and number in with_bar:
             bar = {"x": 1.0, "y": (FOOTER + height - header) / 2 / height, "len": 1 - (FOOTER + header) / height}
         elif number in with_bar:
-            x_domain = (x_domain[0], x_domain[1] - BAR)
+            x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, links)
         if heads[number].rows:
@@ -170,7 +161,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
         elif heads[number].lines:
             layout["annotations"].append(heads[number].alone(x_domain[0], y_domain[1]))
         traces += _traces(panel, number, bar)
-    return {"data": traces + key_traces(prepared, key), "layout": layout}
+    return {"data": traces + plotly_maps.key_traces(prepared, key), "layout": layout}
 
 
 @dataclass(frozen=True)
@@ -192,7 +183,7 @@ class _Head:
         width of the whole figure. Beside other panels, entries that need several rows are therefore stacked.
         """
         labels, own = _labels(panel), width // panels
-        rows = key_rows(labels, own)
+        rows = plotly_maps.key_rows(labels, own)
         stacked = panels > 1 and rows > 1
         lines = textwrap.wrap(panel.title, int(own / TITLE_LETTER))
         return cls(tuple(lines), len(labels) if stacked else rows, stacked)
@@ -200,7 +191,7 @@ class _Head:
     @property
     def height(self) -> int:
         """Return the height of title and legend [px]."""
-        return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
+        return TITLE * len(self.lines) + plotly_maps.KEY_ROW * self.rows + SPACE
 
     def over(self, left: float, top: float) -> dict[str, Any]:
         """Return the legend as plotly takes it, with the title above the legend's entries.
@@ -326,7 +317,7 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     key = bool(_labels(panel))
     named = place | {"legend": f"legend{suffix}"}
     return [
-        *coloured_traces(panel, place, bar),
+        *plotly_maps.coloured_traces(panel, place, bar),
         *(_area(band, named | {"showlegend": key and bool(band.label)}) for band in panel.bands),
         *(_line(line, panel, named | {"showlegend": key and bool(line.label)}) for line in panel.series),
         *(_points(marker, panel, named | {"showlegend": key and bool(marker.label)}) for marker in panel.markers),
@@ -342,14 +333,14 @@ def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
     """Return the trace of a line, on the axes in `place`."""
-    style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
+    style = {"color": line.colour, "width": line.width, "dash": plotly_maps.DASHES[line.dash], "simplify": False}
     drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
     return {**drawn, **_text(line.label, panel), **place}
 
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
     """Return the trace of single points, on the axes in `place`."""
-    style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
+    style = {"color": marker.colour, **plotly_maps.SYMBOLS[marker.symbol]}
     drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
     return {**drawn, **_text(marker.label, panel), **place}
 

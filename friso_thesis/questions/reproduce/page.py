@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from friso.shown.drawing import plotly_renderer
-from friso.shown.drawing.figure import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLION, Figure
+from friso.shown.drawing.figure import Figure
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLION
 from friso.shown.files import Content, pictures
 from friso.shown.pages import Report, print_image
 from friso.version import VERSION

@@ -8,7 +8,8 @@ import numpy as np
 
 from friso.quantities import percent
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import BLUE, GREEN, GREY, ORANGE, VERMILLION, Axis, Figure, Limit, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Limit, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.outcome import Outcome
 from friso_thesis.studies.rig.in_position import BITS, CASES, SETTLING, SOURCES, InPosition, Standstill

@@ -9,7 +9,8 @@ import numpy as np
 from friso.quantities import percent
 from friso.questions.rig.experiments.hunting import CRITERIA, runs_document, share_document
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Map, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.rig.outcome import Outcome

@@ -12,7 +12,8 @@ from friso.questions.map.words import QUIET
 from friso.questions.rig.experiments.hunting import CRITERIA, runs_document, share_document
 from friso.questions.rig.outcome_view import OutcomeView
 from friso.shown.drawing.colours import ramp
-from friso.shown.drawing.figure import INK, Axis, Figure, Map, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Map, Panel, Series
+from friso.shown.drawing.palette import INK
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.outcome import Outcome
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover

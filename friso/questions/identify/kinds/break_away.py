@@ -9,10 +9,12 @@ import numpy as np
 
 from friso.identification.experiments.break_away import BreakAway
 from friso.identification.kind import Source
-from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.estimates import estimates_document
 from friso.questions.identify.kind_view import AREA, WAYS, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import INK, Axis, Band, Figure, Limit, Markers, Panel
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Markers, Panel
+from friso.shown.drawing.palette import INK
 from friso.shown.drawing.prefixes import range_with_unit
 
 
@@ -31,11 +33,9 @@ def _facts(result: BreakAway) -> Facts:
 
 def _numbers(result: BreakAway) -> dict[str, Any]:
     """Return static friction with all ramps, for the document."""
-    several = {"static": result.static, "forward": result.forward, "backward": result.backward}
-    estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
-    ramps = result.ramps
-    readings = {"forces_n": ramps.forces, "rates_n_per_s": ramps.rates, "directions": ramps.directions}
-    return {**estimates, **readings, "warnings": list(result.warnings)}
+    estimates = estimates_document(result, "static", "forward", "backward")
+    readings = entries(result.ramps, "forces_n", "rates_n_per_s", "directions")
+    return {**estimates, **readings, **entries(result, "warnings")}
 
 
 def _figures(result: BreakAway, logs: Sequence[Source], name: str) -> list[Figure]:

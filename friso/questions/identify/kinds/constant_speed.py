@@ -7,28 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from friso.identification.estimate import Estimate
 from friso.identification.experiments.constant_speed import FrictionAtSpeeds
 from friso.identification.readings.common import stribeck_curve
 from friso.identification.readings.friction_position import FrictionPosition
 from friso.identification.readings.friction_velocity import Direction, FrictionVelocity
-from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.estimates import estimate_document, estimates_document
 from friso.questions.identify.kind_view import WAYS, Facts, KindView
 from friso.questions.identify.numbers import digits, estimates_in_words, with_interval, within
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PINK,
-    SKY,
-    VERMILLION,
-    Array,
-    Axis,
-    Figure,
-    Markers,
-    Panel,
-    Series,
-)
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Array, Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, ORANGE, PINK, SKY, VERMILLION
 
 
 def _facts(result: FrictionAtSpeeds) -> Facts:
@@ -51,7 +39,7 @@ def _facts(result: FrictionAtSpeeds) -> Facts:
 
 def _direction_text(direction: Direction) -> str:
     """Write the friction of one direction in words."""
-    several = (*_friction(direction).values(),)
+    several = [getattr(direction, name) for name in _FRICTION]
     visible = [estimate for estimate in several if estimate.determined]
     reasons = {estimate.reason: None for estimate in several if not estimate.determined}
     names = [within(estimate.name) for estimate in several if not estimate.determined]
@@ -64,37 +52,24 @@ def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
     sides = {**result.velocity.directions, "both": result.velocity.both}
     passes = [
         {
-            "velocity_m_per_s": stretch.velocity,
-            "mean": estimate_document(stretch.mean),
-            "spread_n": stretch.spread,
-            "correlation_length": estimate_document(stretch.correlation_length),
-            "steady": stretch.steady,
+            **entries(stretch, "velocity_m_per_s", "spread_n", "steady"),
+            **estimates_document(stretch, "mean", "correlation_length"),
         }
         for stretch in result.position.passes
     ]
     return {
-        "directions": {name: _direction_numbers(side) for name, side in sides.items()},
+        "directions": {name: estimates_document(side, *_FRICTION) for name, side in sides.items()},
         "bias": estimate_document(result.velocity.bias),
-        "velocities_m_per_s": result.velocity.velocities,
-        "forces_n": result.velocity.forces,
-        "unsteady_m_per_s": result.velocity.unsteady,
+        **entries(result.velocity, "velocities_m_per_s", "forces_n", "unsteady_m_per_s"),
         "passes": passes,
         "repeatability": estimate_document(result.position.repeatability),
-        "separated": result.position.separated,
-        "verdict": result.position.verdict,
+        **entries(result.position, "separated", "verdict"),
         "warnings": [*result.velocity.warnings, *result.position.warnings],
     }
 
 
-def _direction_numbers(direction: Direction) -> dict[str, Any]:
-    """Return the friction of one direction, for the document."""
-    return {name: estimate_document(estimate) for name, estimate in _friction(direction).items()}
-
-
-def _friction(direction: Direction) -> dict[str, Estimate]:
-    """Return the estimates of one direction by name."""
-    names = ("coulomb", "viscous", "static", "stribeck_velocity", "stribeck_exponent")
-    return {name: getattr(direction, name) for name in names}
+_FRICTION = ("coulomb", "viscous", "static", "stribeck_velocity", "stribeck_exponent")
+"""Names of the estimates of one direction."""
 
 
 def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:

@@ -10,12 +10,182 @@ import numpy as np
 from friso.identification.response.analysis import Bench
 from friso.identification.response.departure import Drag
 from friso.identification.response.mass_line import StraightLine
+from friso.identification.response.response import FrequencyResponse
 from friso.quantities import percent
-from friso.questions.identify.estimates import estimate_document
-from friso.questions.identify.kind_view import Facts, KindView, PredictionView
-from friso.questions.identify.numbers import digits, name_of, with_interval
-from friso.questions.identify.response_figures import response_figures
+from friso.questions.bode.figures import phases
+from friso.questions.identify.estimates import estimate_document, estimates_document
+from friso.questions.identify.kind_view import AREA, Facts, KindView, PredictionView
+from friso.questions.identify.numbers import digits, name_of, unit_of, with_interval
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit
+
+FACTOR_COLOURS = (GREEN, BLUE, PINK)
+
+
+def response_figures(bench: Bench, name: str) -> list[Figure]:
+    """Return all figures of one bench; their names begin with `name`."""
+    figures = [_bode(bench, name), *_levels(bench, name)]
+    if bench.departs is not None:
+        figures.append(_departure(bench, name))
+    if bench.explanation is not None:
+        figures.append(_amplitudes(bench, name))
+    return figures
+
+
+def _bode(bench: Bench, name: str) -> Figure:
+    """Draw magnitudes above phases, with a column for each output."""
+    outputs = [response for response in (bench.driven, bench.other) if response is not None]
+    columns = [_column(bench, response, number == 0) for number, response in enumerate(outputs)]
+    panels = tuple(column[row] for row in range(2) for column in columns)
+    caption = "Measured with its 95 % band; fits drawn over the band in which they were fitted."
+    if bench.lines:
+        caption += f" Mass line: {' and '.join(with_interval(line.value) for line in bench.lines)}."
+    if bench.departs is not None and bench.departs.frequency.determined:
+        caption += " Below their band the response departs from the linear model."
+    return Figure(f"{name}_bode", "Frequency response", caption, panels, columns=len(outputs))
+
+
+def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel, Panel]:
+    """Draw magnitude and phase of one output; `driven` is true for the driven mass."""
+    hertz = response.frequency
+    inside = hertz[(hertz >= bench.band[0]) & (hertz <= bench.band[1])]
+    fine = np.geomspace(inside[0], inside[-1], 400)
+    curves: list[tuple[str, str, Dash, Array]] = []
+    if bench.two_masses is not None:
+        curves.append(("two masses", BLUE, "solid", bench.two_masses.predict(fine, driven)))
+    if driven and bench.modes is not None:
+        curves.append(("modes", ORANGE, "dashed", bench.modes.predict(fine)))
+    (angle,) = phases([response.response])
+    aligned = [_phase_turns(hertz, angle, fine, np.degrees(np.unwrap(np.angle(curve[3])))) for curve in curves]
+    band = response.band()
+    half = np.degrees((band.phase_high - band.phase_low) / 2)
+    lowest = 0.3 * float(np.abs(response.response).min())
+    area = Band(hertz, np.maximum(band.magnitude_low, lowest), band.magnitude_high, "", AREA)
+    measured = Series(hertz, np.abs(response.response), "measured", GREY, width=1.1)
+    lines = tuple(Series(fine, np.abs(values), label, colour, dash, 1.5) for label, colour, dash, values in curves)
+    masses = tuple(_mass_line(line, hertz, i == 0) for i, line in enumerate(bench.lines)) if driven else ()
+    frequency = Axis.of_frequency(hertz)
+    gain = Axis("Magnitude", _unit(response), log=True, prefixed=False)
+    above = Panel(_title(response), frequency, gain, (measured, *lines, *masses), bands=(area,))
+    phase = Series(hertz, angle, "", GREY, width=1.1)
+    fits = tuple(
+        Series(fine, values, "", colour, dash, 1.5)
+        for (_, colour, dash, _), values in zip(curves, aligned, strict=True)
+    )
+    bounded = np.clip(half, 0, 60)
+    shade = Band(hertz, angle - bounded, angle + bounded, "", AREA)
+    below = Panel("", frequency, Axis("Phase", "°", step=90.0), (phase, *fits), bands=(shade,))
+    return above, below
+
+
+def _phase_turns(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
+    """Return phases of a fit [deg], shifted by whole turns to lie near the measured phases.
+
+    The fit is given at frequencies `fine`, the measurement at `hertz`.
+    """
+    off = np.interp(fine, hertz, measured) - fitted
+    return fitted + 360 * np.round(np.median(off) / 360)
+
+
+def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
+    """Draw a mass line over its band and an octave to each side; the legend names it if `named`."""
+    reach = np.array([max(line.low / 2, hertz[0]), min(line.high * 2, hertz[-1])])
+    label = line.kind if named else ""
+    return Series(reach, line.level.value / (2 * np.pi * reach) ** 2, label, INK, "dotted", 1.6)
+
+
+def _unit(response: FrequencyResponse, power: str = "") -> str:
+    """Return the unit of a response: output per input, times `power`, such as "/s^2"."""
+    return unit_of(f"{response.channels.output_unit}{power}/{response.channels.input_unit}")
+
+
+def _title(response: FrequencyResponse) -> str:
+    """Write which output over which input a response is."""
+    return f"{response.channels.output} over {response.channels.input}".replace("_", " ")
+
+
+def _around(*several: Array) -> tuple[float, float]:
+    """Return limits of a logarithmic axis a little beyond all values above 0."""
+    values = np.concatenate([estimate[np.isfinite(estimate) & (estimate > 0)] for estimate in several])
+    return float(values.min()) / 1.2, float(values.max()) * 1.2
+
+
+def _levels(bench: Bench, name: str) -> list[Figure]:
+    """Draw response, noise and distortion, if the record shows noise or distortion."""
+    outputs = [response for response in (bench.driven, bench.other) if response is not None]
+    panels = tuple(_level_panel(response) for response in outputs)
+    if min(len(panel.series) for panel in panels) < 2:
+        return []
+    caption = (
+        "Standard deviations of the mean response. Noise differs from period to period; nonlinear distortion, such as "
+        "that of friction, from realisation to realisation."
+    )
+    return [Figure(f"{name}_levels", "Noise and distortion", caption, panels, columns=len(panels))]
+
+
+def _level_panel(response: FrequencyResponse) -> Panel:
+    """Draw the magnitudes of response, noise and distortion of one output."""
+    rows = [("response", GREY, np.abs(response.response)), ("noise", BLUE, response.noise)]
+    rows.append(("nonlinear distortion", VERMILLION, response.distortion))
+    if not np.isfinite(response.noise).any():
+        rows.append(("deviation", INK, response.deviation))
+    lines = tuple(
+        Series(response.frequency, np.where(values > 0, values, np.nan), label, colour, width=1.2)
+        for label, colour, values in rows
+        if np.nan_to_num(values).max() > 0
+    )
+    gain = Axis("Magnitude", _unit(response), log=True, prefixed=False)
+    return Panel(_title(response), Axis.of_frequency(response.frequency), gain, lines)
+
+
+def _departure(bench: Bench, name: str) -> Figure:
+    """Draw the ratio of measured to modelled response, and where it departs from 1."""
+    departs = bench.departs
+    assert departs is not None
+    limits = _around(departs.excess)
+    line, bands = Series(departs.lines, departs.excess, "", GREY), ()
+    if departs.frequency.determined:
+        ends = np.array([departs.frequency.low, departs.frequency.high])
+        bands = (Band(ends, np.full(2, limits[0]), np.full(2, limits[1]), "", AREA),)
+    ratio = Axis("|G / G model|", "", limits, log=True)
+    panel = Panel("", Axis.of_frequency(departs.lines), ratio, (line,), limits=(Limit((1.0,), "", INK),), bands=bands)
+    text = with_interval(departs.frequency)
+    caption = f"The driven mass's response over that of the two-mass model; departure: {text}."
+    if departs.differ:
+        caption += " Below, realisations differ by more than noise: the machine is nonlinear there."
+    return Figure(f"{name}_departure", "Departure from the linear model", caption, (panel,))
+
+
+def _amplitudes(bench: Bench, name: str) -> Figure:
+    """Draw measured and simulated accelerations per input at low frequency."""
+    assert bench.explanation is not None
+    assert bench.drag is not None
+    top = max(response.frequency[-1] for response in bench.explanation.responses.values())
+    high = 2 * bench.departs.frequency.high if bench.departs else top
+    measured = _rising(bench.driven, high)
+    lines = [Series(*measured, "measured", INK, width=1.8)]
+    for (factor, response), colour in zip(bench.explanation.responses.items(), FACTOR_COLOURS, strict=False):
+        label = "simulated" if factor == 1 else f"simulated, {factor:g} times the input"
+        lines.append(Series(*_rising(response, high), label, colour, "solid" if factor == 1 else "dashed"))
+    level = Limit((1 / bench.drag.mass.value,), "mass line", GREY, "dotted")
+    limits, unit = _around(*(line.y for line in lines)), _unit(bench.driven, "/s^2")
+    size = Axis("Acceleration per input", unit, limits, log=True, prefixed=False)
+    panel = Panel("", Axis.of_frequency(measured[0]), size, tuple(lines), limits=(level,))
+    caption = (
+        f"A mass with a Coulomb friction of {with_interval(bench.drag.coulomb)} on a spring, simulated with the "
+        f"recorded input, a smaller and a larger one: it accounts for {percent(1 - bench.explanation.left, 3)} of the "
+        "departure. The response depends on the size of the input: it is not linear."
+    )
+    return Figure(f"{name}_amplitudes", "Friction at low frequency", caption, (panel,))
+
+
+def _rising(response: FrequencyResponse, high: float) -> tuple[Array, Array]:
+    """Return the frequencies [Hz] up to `high`, and the size of acceleration over input at each."""
+    chosen = (response.frequency > 0) & (response.frequency <= high)
+    hertz = response.frequency[chosen]
+    return hertz, np.abs(response.response[chosen]) * (2 * np.pi * hertz) ** 2
 
 
 def _sentences(bench: Bench) -> tuple[str, ...]:
@@ -129,17 +299,13 @@ def _numbers(bench: Bench) -> dict[str, Any]:
 
 def _line_numbers(line: StraightLine) -> dict[str, Any]:
     """Return a straight line fitted to a frequency response, for the document."""
-    band = {"kind": line.kind, "low_hz": line.low, "high_hz": line.high, "sign": line.sign}
-    return {**band, "level": estimate_document(line.level), "value": estimate_document(line.value)}
+    band = {"low_hz": line.low, "high_hz": line.high, **estimates_document(line, "level", "value")}
+    return band | entries(line, "kind", "sign")
 
 
 def _drag_numbers(drag: Drag) -> dict[str, Any]:
     """Return mass, damping, stiffness and Coulomb friction at low frequency, for the document."""
-    several = {"mass": drag.mass, "damping": drag.damping, "stiffness": drag.stiffness, "coulomb": drag.coulomb}
-    return {
-        **{name: estimate_document(estimate) for name, estimate in several.items()},
-        "warnings": list(drag.warnings),
-    }
+    return estimates_document(drag, "mass", "damping", "stiffness", "coulomb") | entries(drag, "warnings")
 
 
 VIEW = KindView[Bench](

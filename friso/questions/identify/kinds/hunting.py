@@ -8,7 +8,9 @@ from typing import Any
 from friso.identification.experiments.hunting import HuntingLog
 from friso.identification.kind import Source
 from friso.questions.identify.kind_view import TIME, Facts, KindView
-from friso.shown.drawing.figure import INK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.palette import INK, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 
 
@@ -33,18 +35,9 @@ def _facts(result: HuntingLog) -> Facts:
 
 def _numbers(result: HuntingLog) -> dict[str, Any]:
     """Return the cycles and the predicted one, for the document."""
-    predicted = result.predicted and {"amplitude_m": result.predicted.amplitude, "period_s": result.predicted.period}
-    return {
-        "cycles": result.count,
-        "period_s": result.period,
-        "period_deviation_s": result.period_deviation,
-        "amplitude_m": result.amplitude,
-        "amplitude_deviation_m": result.amplitude_deviation,
-        "above_m": result.above,
-        "below_m": result.below,
-        "predicted": predicted,
-        "warnings": list(result.warnings),
-    }
+    numbers = entries(result, "period_s", "period_deviation_s", "amplitude_m", "amplitude_deviation_m", "warnings")
+    predicted = result.predicted and entries(result.predicted, "amplitude_m", "period_s")
+    return {**numbers, **entries(result, "above_m", "below_m"), "cycles": result.count, "predicted": predicted}
 
 
 def _figures(result: HuntingLog, logs: Sequence[Source], name: str) -> list[Figure]:

@@ -8,19 +8,215 @@ from typing import Any
 import numpy as np
 
 from friso.axis import axis_shown, unit_shown
-from friso.identification.inverse_model import InverseModel
+from friso.identification.inverse_model import InverseModel, motion
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
 from friso.identification.output_error.identifiable import Profile
+from friso.identification.output_error.parameters import FitParameter
+from friso.identification.output_error.problem import Simulated
 from friso.identification.output_error.settings import settings
+from friso.identification.quality import steady_friction
+from friso.identification.readings.common import cart, low_pass, on_bearing
+from friso.identification.settings import identification_settings
 from friso.quantities import percent
 from friso.questions.identify.estimates import ends_document
-from friso.questions.identify.kind_view import Facts, KindView, PredictionView
-from friso.questions.identify.moves_figures import FORCE, moves_figures, record_panels
-from friso.questions.identify.numbers import digits, estimates_in_words, with_interval, within
-from friso.shown.documents import unit_suffix
-from friso.shown.drawing.figure import Figure
+from friso.questions.identify.kind_view import TIME, Facts, KindView, PredictionView
+from friso.questions.identify.numbers import digits, estimates_in_words, name_of, unit_of, with_interval, within
+from friso.shown.documents import entries, unit_suffix
+from friso.shown.drawing.figure import Array, Axis, Band, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREY, INK, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit
+
+FORCE = "force"
+"""Name of the figure that opens the page."""
+
+WORST = 5.0
+"""Upper end of the axis of a profile, in units of the misfit at the ends of the 95 % interval."""
+
+WIDE = 8.0
+"""Ratio of its ends above which a profile has a logarithmic axis."""
+
+LONG = 40.0
+"""Length of the force record at the head of the page, in periods of the motion's bandwidth."""
+
+PALE = "#dbe9f4"
+
+
+def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
+    """Return all figures of one log of moves; their names begin with `name`."""
+    flat = moves.fit.problem.flat
+    apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a separate cart, whose speed must be measured
+    friction = [_friction(moves, name)] if not apart or cart(moves.log) is not None else []
+    return [_force(moves, name), _traces(moves, name), _residual(moves, name), *friction, *_profiles(moves, name)]
+
+
+def _force(moves: IdentifiedMoves, name: str) -> Figure:
+    """Draw measured and simulated force where the stage moves most."""
+    stretch = _liveliest(moves)
+    log, part = moves.log, moves.part
+    time, force = log.time[part][stretch], log["force"][part][stretch]
+    if moves.loop is None:
+        simulated, word = force - moves.fit.residual[stretch], "needed"
+    else:
+        extra = log["disturbance"][part][stretch] if "disturbance" in log else 0.0
+        simulated, word = moves.simulated.force[stretch] + extra, "simulated"
+    caption = "The force as measured and as the identified machine needs it, where the log moves most."
+    panel = Panel("", TIME, Axis("Force", moves.force_unit), _both(time, force, simulated, word))
+    return Figure(f"{name}_{FORCE}", "Measured and simulated force", caption, (panel,))
+
+
+def _liveliest(moves: IdentifiedMoves) -> slice:
+    """Return the samples of the stretch of a log with the most motion, a few periods long."""
+    position = moves.log["position"][moves.part]
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
+    length = min(len(position), max(2, round(LONG / (moves.inverse.bandwidth * moves.log.sample_time))))
+    first = int(np.argmax(way[length - 1 :] - way[: len(way) - length + 1]))
+    return slice(first, first + length)
+
+
+def _traces(moves: IdentifiedMoves, name: str) -> Figure:
+    """Draw the record as measured and simulated over time."""
+    if moves.loop is not None:
+        caption = "The identified machine in closed loop on the logged reference; the measured motion does not enter."
+        caption += "" if moves.fit.problem.closed else " Its values were fitted along the logged position instead."
+        panels = record_panels(moves.log, moves.part, moves.simulated)
+        return Figure(f"{name}_traces", "Measured and simulated", caption, panels)
+    time, force = moves.log.time[moves.part], moves.log["force"][moves.part]
+    caption = (
+        "The force that the identified machine needs to move as measured, and its difference from the measured force."
+    )
+    panels = (
+        Panel("", TIME, Axis("Force", moves.force_unit), _both(time, force, force - moves.fit.residual, "needed")),
+        _difference(time, moves.fit.residual, moves.force_unit),
+    )
+    return Figure(f"{name}_traces", "Measured and simulated force", caption, panels)
+
+
+def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, ...]:
+    """Draw position, force and the residuals of both, as measured and as simulated.
+
+    `part` selects samples of the log, and `simulated` is their simulation in closed loop.
+    """
+    time, position, force = log.time[part], log["position"][part], log["force"][part]
+    expected = simulated.force + (log["disturbance"][part] if "disturbance" in log else 0.0)
+    apart = Series(time, position - simulated.position, "", VERMILLION, width=1.0)
+    return (
+        Panel("", TIME, Axis("Position", "m"), _both(time, position, simulated.position, "simulated")),
+        Panel("", TIME, Axis("Measured − simulated", "m"), (apart,)),
+        Panel("", TIME, Axis("Force", log.unit("force")), _both(time, force, expected, "simulated")),
+        _difference(time, force - expected, log.unit("force")),
+    )
+
+
+def _both(time: Array, measured: Array, simulated: Array, word: str) -> tuple[Series, ...]:
+    """Draw a signal over time as measured and as simulated; `word` names the simulated one."""
+    return Series(time, measured, "measured", GREY, width=2.0), Series(time, simulated, word, VERMILLION, width=0.8)
+
+
+def _difference(time: Array, left: Array, unit: str) -> Panel:
+    """Draw the residual `left` of a signal, measured minus simulated [unit], over time [s]."""
+    return Panel("", TIME, Axis("Measured − simulated", unit), (Series(time, left, "", VERMILLION, width=0.9),))
+
+
+def _residual(moves: IdentifiedMoves, name: str) -> Figure:
+    """Draw the residual force over position and speed."""
+    moved = motion(
+        moves.log["position"][moves.part],
+        moves.log.sample_time,
+        identification_settings.smoothing_bandwidths * moves.inverse.bandwidth,
+    )
+    left, axis = moves.fit.residual, Axis("Residual force", moves.force_unit)
+    panels = (
+        Panel("", Axis("Position", "m"), axis, (Series(moved.position, left, "", VERMILLION, width=0.5),)),
+        Panel("", Axis("Velocity", "m/s"), axis, (Series(moved.velocity, left, "", VERMILLION, width=0.5),)),
+    )
+    caption = (
+        "Measured minus simulated force. A pattern over position comes from the rail or the screw (cogging, pitch), "
+        "one over velocity from friction that the model lacks."
+    )
+    return Figure(f"{name}_residual", "Residual force", caption, panels, columns=2)
+
+
+def _friction(moves: IdentifiedMoves, name: str) -> Figure:
+    """Draw the force without the inertial force over velocity, and the identified friction."""
+    flat = moves.flat
+    masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
+    step, cutoff = moves.log.sample_time, identification_settings.smoothing_bandwidths * moves.inverse.bandwidth
+    moved, stage = (
+        motion(position[moves.part], step, cutoff) for position in (on_bearing(moves.log), moves.log["position"])
+    )
+    force = low_pass(moves.log["force"][moves.part], step, cutoff)
+    friction = force - masses[0] * moved.acceleration - masses[1] * stage.acceleration
+    inner = slice(
+        identification_settings.samples_of_an_edge, -identification_settings.samples_of_an_edge
+    )  # the filter has transients at the ends of a record
+    loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
+    top = float(np.abs(moved.velocity).max())
+    reach = 1.1 * float(np.percentile(np.abs(friction), 99.5))
+    low, high = moves.covered.gap
+    sides = [(low, min(high, top)), (-min(high, top), -low)] if moves.covered.steady.size else []
+    bands = tuple(
+        Band(np.array(ends), np.full(2, -reach), np.full(2, reach), "no steady motion" if i == 0 else "", PALE)
+        for i, ends in enumerate(sides)
+    )
+    speeds = np.concatenate([-np.geomspace(top, top / 1e4, 200), [np.nan], np.geomspace(top / 1e4, top, 200)])
+    curve = Series(speeds, steady_friction(flat, speeds), "identified", BLUE, width=1.8)
+    axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", moves.force_unit, (-reach, reach))
+    unshown = any(estimate.name == "friction.static" and not estimate.determined for estimate in moves.estimates)
+    caption = (
+        f"Loops: measured force less mass times acceleration, both below {digits(cutoff, 'Hz')}; they open where the "
+        "motion reverses."
+    )
+    if sides:
+        caption += f" Shaded: {range_with_unit(low, high, 'm/s')}, without steady motion"
+        caption += ", where a Stribeck effect would not show." if unshown else "."
+    panel = Panel("", *axes, (loops, curve), bands=bands)
+    return Figure(f"{name}_friction", "Friction over velocity", caption, (panel,))
+
+
+def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
+    """Draw how much worse the fit becomes as one parameter is varied.
+
+    The list is empty if that was not computed.
+    """
+    best = moves.fit.cost
+    parameters = {parameter.name: parameter for parameter in moves.fit.problem.parameters}
+    fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}
+    if not moves.profiles:
+        return []
+    panels = tuple(_profile(profile, parameters[key], best, key in fitted) for key, profile in moves.profiles.items())
+    caption = (
+        "How much worse the best fit gets with one parameter held and the others refitted; 1 is the end of "
+        f"the 95 % interval (shaded), drawn up to {WORST:g}. Where a curve stays below 1 to the end of its range, the "
+        "record does not determine the parameter."
+    )
+    if any((profile.cost < best - (profile.limit - best)).any() for profile in moves.profiles.values()):
+        caption += (
+            " Below 0 the fit is better than the one chosen: the parameter has no effect of its own in this motion and "
+            "makes up for other errors of the model."
+        )
+    return [Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)]
+
+
+def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
+    """Draw how much worse the fit becomes as one parameter is varied; 1 is the limit accepted.
+
+    The interval of the parameter is shaded. `best` is the cost of the best fit. `fitted` is true if the fit could
+    determine the parameter, which sets the colour.
+    """
+    worse = (profile.cost - best) / (profile.limit - best)
+    log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]
+    lowest = min(-0.2, 1.2 * float(worse.min()))
+    y = Axis("Worse by", "", (lowest, WORST))
+    unit = unit_of(parameter.unit)
+    ends = (float(profile.values[0]), float(profile.values[-1]))
+    x = Axis(name_of(profile.name), unit, ends, log=log, prefixed=log or unit.startswith("m"))
+    shade = Band(np.array([profile.low, profile.high]), np.full(2, lowest), np.full(2, WORST), "", PALE)
+    colour = BLUE if fitted else ORANGE
+    line = Series(profile.values, np.where(np.isfinite(worse), worse, np.nan), "", colour)
+    points = Markers(profile.values, np.where(worse <= WORST, worse, np.nan), "", colour)
+    return Panel("", x, y, (line,), (points,), (Limit((1.0,), "", INK),), bands=(shade,))
+
 
 FALLING = "viscous friction below zero: friction falls as the speed rises (Stribeck effect), which this model lacks"
 """Meaning of a negative viscous friction of the inverse model."""
@@ -131,10 +327,7 @@ def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
     """Return the residual force, for the document."""
     residual = moves.residual
     return {
-        "rms_n": residual.rms,
-        "mean_n": residual.mean,
-        "correlation_time_s": residual.correlation_time,
-        "white": residual.white,
+        **entries(residual, "rms_n", "mean_n", "correlation_time_s", "white"),
         "explained_by_position": residual.by_position,
         "explained_by_velocity": residual.by_velocity,
     }
@@ -142,8 +335,8 @@ def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 def _profile_numbers(profile: Profile) -> dict[str, Any]:
     """Return how much worse the fit becomes as one parameter is varied, for the document."""
-    ends = {"low": profile.low, "high": profile.high, "open_low": profile.open_low, "open_high": profile.open_high}
-    return {**ends, "values": profile.values, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
+    ends = entries(profile, "low", "high", "open_low", "open_high", "values")
+    return {**ends, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
 
 
 def _headline(moves: IdentifiedMoves) -> str:

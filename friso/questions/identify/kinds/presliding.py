@@ -8,10 +8,12 @@ from typing import Any
 from friso.identification.experiments.presliding import Presliding
 from friso.identification.kind import Source
 from friso.quantities import percent
-from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.estimates import estimates_document
 from friso.questions.identify.kind_view import TIME, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, ORANGE
 
 
 def _facts(result: Presliding) -> Facts:
@@ -28,12 +30,8 @@ def _facts(result: Presliding) -> Facts:
 
 def _numbers(result: Presliding) -> dict[str, Any]:
     """Return the mass, and stiffness and damping of the bristles, for the document."""
-    several = {"stiffness": result.stiffness, "damping": result.damping, "mass": result.mass}
-    return {
-        **{name: estimate_document(estimate) for name, estimate in several.items()},
-        "unexplained": result.unexplained,
-        "warnings": list(result.warnings),
-    }
+    estimates = estimates_document(result, "stiffness", "damping", "mass")
+    return estimates | entries(result, "unexplained", "warnings")
 
 
 def _figures(result: Presliding, logs: Sequence[Source], name: str) -> list[Figure]:

@@ -14,7 +14,9 @@ from friso.quantities import percent
 from friso.questions.identify.estimates import estimate_document
 from friso.questions.identify.kind_view import TIME, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, ORANGE
 
 POINTS, CURVE = 5000, 200
 """Numbers of points drawn: of a record of slow sliding, and of the curve at steady velocities."""
@@ -32,7 +34,7 @@ def _facts(result: SlowSliding) -> Facts:
 def _numbers(result: SlowSliding) -> dict[str, Any]:
     """Return Coulomb and static friction and the Stribeck velocity, for the document."""
     named = {estimate.name.removeprefix("friction."): estimate_document(estimate) for estimate in result.estimates}
-    return {**named, "unexplained": result.unexplained, "warnings": list(result.warnings)}
+    return named | entries(result, "unexplained", "warnings")
 
 
 def _figures(result: SlowSliding, logs: Sequence[Source], name: str) -> list[Figure]:

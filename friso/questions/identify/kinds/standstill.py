@@ -10,7 +10,9 @@ import numpy as np
 from friso.identification.experiments.standstill import StandstillResult
 from friso.identification.kind import Source
 from friso.questions.identify.kind_view import TIME, Facts, KindView
-from friso.shown.drawing.figure import BLUE, GREEN, INK, ORANGE, PINK, VERMILLION, Axis, Figure, Panel, Series
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, INK, ORANGE, PINK, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 
 _COLOURS = (INK, VERMILLION, BLUE, GREEN, ORANGE, PINK)
@@ -27,14 +29,11 @@ def _facts(result: StandstillResult) -> Facts:
 
 def _numbers(result: StandstillResult) -> dict[str, Any]:
     """Return RMS, peak, drift and ratios of every log, for the document."""
-    return {
-        "logs": [
-            {"name": row.name, "rms_m": row.rms, "peak_m": row.peak, "drift_m": row.drift, "rms_ratio": rms,
-             "peak_ratio": peak}
-            for row, (rms, peak) in zip(result.logs, result.ratios, strict=True)
-        ],
-        "warnings": list(result.warnings),
-    }  # fmt: skip
+    logs = [
+        {**entries(row, "name", "rms_m", "peak_m", "drift_m"), "rms_ratio": rms, "peak_ratio": peak}
+        for row, (rms, peak) in zip(result.logs, result.ratios, strict=True)
+    ]
+    return {"logs": logs, "warnings": result.warnings}
 
 
 def _figures(result: StandstillResult, logs: Sequence[Source], name: str) -> list[Figure]:

@@ -9,10 +9,12 @@ import numpy as np
 
 from friso.identification.experiments.steps import StepStiffness
 from friso.identification.kind import Source
-from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.estimates import estimates_document
 from friso.questions.identify.kind_view import AREA, TIME, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK
 
 
 def _facts(result: StepStiffness) -> Facts:
@@ -35,11 +37,11 @@ def _sentences(result: StepStiffness) -> tuple[str, ...]:
 def _numbers(result: StepStiffness) -> dict[str, Any]:
     """Return the stiffness, and the times at rest from which it follows, for the document."""
     windows = [
-        {"start_s": w.start, "end_s": w.end, "deflection_m": w.position, "force_n": w.force} for w in result.windows
+        {**entries(window, "force_n"), "start_s": window.start, "end_s": window.end, "deflection_m": window.position}
+        for window in result.windows
     ]
-    several = {"stiffness": result.stiffness, "up": result.up, "down": result.down, "hysteresis": result.hysteresis}
-    estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
-    return {**estimates, "windows": windows, "cart_fixed": result.cart_fixed, "warnings": list(result.warnings)}
+    estimates = estimates_document(result, "stiffness", "up", "down", "hysteresis")
+    return {**estimates, "windows": windows, **entries(result, "cart_fixed", "warnings")}
 
 
 def _figures(result: StepStiffness, logs: Sequence[Source], name: str) -> list[Figure]:

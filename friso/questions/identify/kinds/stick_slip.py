@@ -11,10 +11,12 @@ import numpy as np
 from friso.identification.experiments.stick_slip import StickSlip
 from friso.identification.kind import Source
 from friso.identification.logs.log import Log
-from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.estimates import estimates_document
 from friso.questions.identify.kind_view import TIME, WAYS, Facts, KindView
 from friso.questions.identify.numbers import with_interval
-from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import GREY, INK
 from friso.shown.drawing.prefixes import range_with_unit
 
 
@@ -37,17 +39,9 @@ def _facts(result: StickSlip) -> Facts:
 
 def _numbers(result: StickSlip) -> dict[str, Any]:
     """Return static friction with all slips, for the document."""
-    several = {
-        "static": result.static,
-        "forward": result.forward,
-        "backward": result.backward,
-        "break_away_forward": result.break_away_forward,
-        "break_away_backward": result.break_away_backward,
-        "offset": result.offset,
-        "stiffness": result.stiffness,
-    }
-    estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
-    return {**estimates, "slips": len(result.times), "spread_n": list(result.spread), "warnings": list(result.warnings)}
+    sides = estimates_document(result, "forward", "backward", "break_away_forward", "break_away_backward")
+    estimates = estimates_document(result, "static", "offset", "stiffness")
+    return {**sides, **estimates, "slips": len(result.times), **entries(result, "spread_n", "warnings")}
 
 
 def _figures(result: StickSlip, logs: Sequence[Source], name: str) -> list[Figure]:

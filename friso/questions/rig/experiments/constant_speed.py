@@ -11,7 +11,9 @@ from friso.identification.estimate import Estimate
 from friso.questions.identify.kinds.slow_sliding import slow_sliding_caption, slow_sliding_panels
 from friso.questions.identify.numbers import with_interval
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, ORANGE, PINK, VERMILLION
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.studies.rig.experiments.constant_speed import ConstantSpeedResult, Passes
 from friso.studies.rig.many_speeds import ManySpeeds, PlaceOnRail, Slow
@@ -173,11 +175,10 @@ def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
     velocity = place.velocity
     both = (velocity.both.coulomb, velocity.both.viscous, velocity.both.static, velocity.both.stribeck_velocity)
     return {
-        "velocities_m_per_s": velocity.velocities.tolist(),
-        "forces_n": velocity.forces.tolist(),
-        "friction_n": place.friction.tolist(),
-        "true_speeds_m_per_s": place.speeds.tolist(),
-        "true_dynamic_friction_n": place.true.tolist(),
+        **entries(velocity, "velocities_m_per_s", "forces_n"),
+        **entries(place, "friction_n"),
+        "true_speeds_m_per_s": place.speeds,
+        "true_dynamic_friction_n": place.true,
         **_estimates_document(both),
     }
 
@@ -186,7 +187,9 @@ def _estimates_document(estimates: Sequence[Estimate]) -> dict[str, Any]:
     """Return identified estimates with intervals, and the reason for each that is missing."""
     return {
         "shown": {
-            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in estimates if e.determined
+            estimate.name: entries(estimate, "value", "low", "high", "unit")
+            for estimate in estimates
+            if estimate.determined
         },
         "not_shown": {estimate.name: estimate.reason for estimate in estimates if not estimate.determined},
     }
@@ -196,8 +199,7 @@ def _numbers(passes: Passes) -> dict[str, Any]:
     """Return friction along the rail with the joint in one state."""
     coulomb = passes.velocity.both.coulomb
     return {
-        "separated": passes.place.separated,
-        "verdict": passes.place.verdict,
+        **entries(passes.place, "separated", "verdict"),
         "repeatability": passes.place.repeatability.value,
         "passes": [
             {"velocity_m_per_s": record.velocity, "mean_force_n": record.mean.value, "deviation_n": record.spread}

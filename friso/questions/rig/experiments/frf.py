@@ -13,22 +13,8 @@ from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
 from friso.questions.bode.figures import phases
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    INK,
-    LIGHT,
-    ORANGE,
-    PINK,
-    SKY,
-    VERMILLION,
-    Array,
-    Axis,
-    Figure,
-    Limit,
-    Panel,
-    Series,
-)
+from friso.shown.drawing.figure import Array, Axis, Figure, Limit, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, INK, LIGHT, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import listed, pretty, with_unit
 from friso.studies.rig.experiments.frf import RATIOS, Frf, MeasuredLoop, Plant, crossing_near_target
 from friso.studies.rig.outcome import Outcome

@@ -15,22 +15,9 @@ from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.quantities import percent
 from friso.questions.rig.outcome_view import OutcomeView
 from friso.shares import Share
-from friso.shown.drawing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    SKY,
-    VERMILLION,
-    Axis,
-    Band,
-    Figure,
-    Limit,
-    Panel,
-    Series,
-)
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
 from friso.studies.rig.moves_on_rails import BAND, RailRuns
@@ -249,10 +236,9 @@ CRITERIA = {"outcome": OUTCOME, "band_m": BAND, "distinct_peaks": DISTINCT_CRITE
 def runs_document(runs: RailRuns) -> dict[str, Any]:
     """Return the outcomes of runs as arrays of the shape of the runs."""
     return {
-        "distinct_peaks": runs.peaks.tolist(),
-        "outcome": runs.outcome.tolist(),
+        **entries(runs, "outcome", "period_s"),
+        "distinct_peaks": runs.peaks,
         "peak_to_peak_m": runs.swing,
-        "period_s": runs.period,
     }
 
 
@@ -271,8 +257,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     started = {"displacements_m": moves.displacements}
     return {
         "criteria": {**CRITERIA, "distinct_peaks": axis_shown().text(DISTINCT_CRITERION)},
-        "distance_m": moves.distance,
-        "crossovers_hz": moves.crossovers,
+        **entries(moves, "distance_m", "crossovers_hz"),
         "rail_seeds": moves.rails,
         "cases": cases,
         "releases": started | runs_document(moves.started),

@@ -9,7 +9,8 @@ from friso.quantities import percent
 from friso.questions.identify.kinds.presliding import presliding_caption, presliding_panels
 from friso.questions.identify.numbers import with_interval
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.experiments.presliding import LOOPS, Bristles
 from friso.studies.rig.outcome import Outcome

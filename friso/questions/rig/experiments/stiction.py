@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import BLUE, GREEN, INK, VERMILLION, Array, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Array, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, GREEN, INK, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit, with_unit
 from friso.studies.rig.experiments.stiction import SPEEDS, Stiction
 from friso.studies.rig.outcome import Outcome

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from friso.questions.rig.outcome_view import OutcomeView
-from friso.shown.drawing.figure import BLUE, LIGHT, VERMILLION, Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, LIGHT, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit, with_unit
 from friso.studies.rig.experiments.stiffness import Stiffness
 from friso.studies.rig.outcome import Outcome
