@@ -6,7 +6,7 @@ The sentences say what is kept, what is not, and what measurements leave open.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from friso.quantities import percent
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage.stage import declared_keys
-from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
 
 SHOWN: Mapping[MeasuredKind, str] = {
     "curve": "steady friction over speed",
