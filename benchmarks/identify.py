@@ -38,7 +38,7 @@ from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, 
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from machines import Machine, break_aways, creeping, drawn, moves, shaken, speeds, steps
@@ -206,7 +206,7 @@ def shown_by(log: Log, machine: Machine) -> set[str]:
     spread = noise * np.sqrt(np.diag(np.linalg.pinv((slopes / size).T @ (slopes / size)))) / size
     scale = np.array([1.0 if p.logarithmic else max(abs(t), 1e-12) for p, t in zip(parameters, truth, strict=True)])
     keys = {MASS: "masses.cart", RATIO: "friction.static"}
-    good = COVERAGE * spread < VISIBLE * scale
+    good = NORMAL_COVERAGE * spread < VISIBLE * scale
     return {keys.get(name, name) for name, fine in zip(names, good, strict=True) if fine}
 
 

@@ -18,7 +18,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.stage import Stage, load
-from friso.studies.rig.moves_on_rails import INTERVAL, move, with_joint
+from friso.studies.rig.moves_on_rails import LONGEST_INTERVAL, move, with_joint
 from friso.virtual_rig.run import run
 from friso.virtual_rig.settings import RigSettings
 
@@ -31,14 +31,14 @@ WANTED = 60.0
 def sampled(stage: Stage) -> Callable[[], object]:
     """Return a function that runs the move of the stage with its drive on many rails."""
     rails = {"rail.seed": np.arange(1.0, RUNS + 1)}
-    return lambda: list(run(stage, move(stage), range(RUNS), INTERVAL, rails, threads=1))
+    return lambda: list(run(stage, move(stage), range(RUNS), LONGEST_INTERVAL, rails, threads=1))
 
 
 def continuous(stage: Stage) -> Callable[[], object]:
     """Return a function that runs the stage's own motion as often without a drive."""
     shape, options = (
         kernel(structure(stage.flat())),
-        RunOptions(rtol=RigSettings.current().rig_rtol, interval=INTERVAL, threads=1),
+        RunOptions(rtol=RigSettings.current().rig_rtol, interval=LONGEST_INTERVAL, threads=1),
     )
     return lambda: list(run_chunks(shape, stage.flat(), RUNS, options))
 

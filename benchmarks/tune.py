@@ -30,7 +30,7 @@ from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import machines_of_search, tune
 from friso.remedies.search import Budget, Search
 from friso.remedies.trials import modulus_margins, moves_of_points
-from friso.remedies.verified import ONE, Performance, moving
+from friso.remedies.verified import NO_VARIABLES, Performance, moving
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
 
@@ -205,7 +205,7 @@ def findings() -> None:
     for hertz, (_, stage) in product(CROSSOVERS, stages.items()):
         step = {"kind": "step", "size": "1 mm", "duration": "20 s"}
         steps = Remedy.settled_on("", stage.replace({"motion": step, "controller.crossover": f"{hertz} Hz"}))
-        columns.append(moves_of_points(steps, ONE, alone, Goal()).settling[0])
+        columns.append(moves_of_points(steps, NO_VARIABLES, alone, Goal()).settling[0])
     names = [f"{name}, {hertz} Hz [s]" for hertz, name in product(CROSSOVERS, stages)]
     print_table(("step [m]", *names), [tuple(f"{value:.3g}" for value in row) for row in zip(*columns, strict=True)])
 

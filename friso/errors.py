@@ -5,7 +5,7 @@ from typing import Self
 
 from friso.escapes import escaped, one_line
 
-_LONGEST = 1200
+LONGEST_LINE = 1200
 """Largest number of characters shown of a line."""
 
 
@@ -68,7 +68,7 @@ class InputError(ValueError):
 
 def shortened(text: str) -> str:
     """Return a text with overlong lines cut."""
-    return "\n".join(line if len(line) <= _LONGEST else f"{line[:_LONGEST]}..." for line in text.split("\n"))
+    return "\n".join(line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..." for line in text.split("\n"))
 
 
 def _dotted(table: str, key: str) -> str:

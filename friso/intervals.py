@@ -19,13 +19,13 @@ IntervalForm = Literal["value", "tolerance", "range"]
 
 _MARKS = ("..", "+/-", "±")
 
-COVERAGE = 1.959963984540054
+NORMAL_COVERAGE = 1.959963984540054
 """Half-width of a 95 % interval of a normal distribution, in standard deviations."""
 
-WIDE = 10.0
+WIDE_RATIO = 10.0
 """Ratio of the ends of a range above which its order of magnitude counts as the uncertain quantity."""
 
-_BESIDE = 1e-6
+BESIDE_CENTRE = 1e-6
 """Half-width of the neighbourhood of a range's centre in which some number must be allowed, relative to the range.
 
 A key that takes whole numbers fails the test."""
@@ -55,7 +55,7 @@ class Interval:
     @property
     def wide(self) -> bool:
         """Tell whether the range spans orders of magnitude, so that its logarithm is taken as uniform."""
-        return self.form == "range" and self.low > 0 and self.high > WIDE * self.low
+        return self.form == "range" and self.low > 0 and self.high > WIDE_RATIO * self.low
 
     def at(self, share: Any) -> Any:
         """Return the values at fractions `share`, from 0 to 1, of the way from low to high."""
@@ -144,7 +144,7 @@ def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
         if not all(of.bound.holds(value) for value in values):
             raise _Refused(_reach(interval, of))
         if interval.low < interval.high and not any(
-            of.bound.holds(interval.at(0.5 + side)) for side in (-_BESIDE, _BESIDE)
+            of.bound.holds(interval.at(0.5 + side)) for side in (-BESIDE_CENTRE, BESIDE_CENTRE)
         ):
             raise _Refused("no number near the centre is allowed")
     except _Refused as refused:

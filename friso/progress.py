@@ -38,7 +38,11 @@ def share_of(progress: Progress, number: int, count: int) -> Progress:
     """
 
     def report(done: int, total: int, label: str, /) -> None:
-        progress(PERCENT * number + (PERCENT * done // total if total else 0), PERCENT * count, label)
+        progress(
+            STEPS_OF_A_PIECE * number + (STEPS_OF_A_PIECE * done // total if total else 0),
+            STEPS_OF_A_PIECE * count,
+            label,
+        )
 
     return report
 
@@ -51,12 +55,12 @@ def between(progress: Progress, first: float, last: float, label: str = "") -> P
 
     def report(done: int, total: int, piece: str, /) -> None:
         share = first + (last - first) * (done / total if total else 0.0)
-        progress(round(FINELY * share), FINELY, label or piece)
+        progress(round(FINE_STEPS * share), FINE_STEPS, label or piece)
 
     return report
 
 
-PERCENT, FINELY = 100, 1000
+STEPS_OF_A_PIECE, FINE_STEPS = 100, 1000
 """Steps into which one of several equal pieces, and a piece of its own size, are divided."""
 
 
@@ -79,14 +83,14 @@ class Tally:
 
 def together(progress: Progress, count: int) -> list[Progress]:
     """Return the progresses of `count` equal pieces of work that run in parallel."""
-    tally = Tally(progress, PERCENT * count)
+    tally = Tally(progress, STEPS_OF_A_PIECE * count)
 
     def piece() -> Progress:
         before = 0
 
         def report(done: int, total: int, label: str, /) -> None:
             nonlocal before
-            now = PERCENT * done // total if total else 0
+            now = STEPS_OF_A_PIECE * done // total if total else 0
             tally.add(now - before, label)
             before = now
 

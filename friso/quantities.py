@@ -28,7 +28,7 @@ NOTHING = "–"
 """Text in place of a missing value."""
 
 
-ROUNDING = 1e-9
+ZERO_SHARE = 1e-9
 """Fraction below which a value counts as 0."""
 
 
@@ -39,7 +39,7 @@ def percent(share: float, digits: int = 2, signed: bool = False) -> str:
     """
     if not math.isfinite(share):
         return NOTHING
-    share = share if abs(share) > ROUNDING else 0.0
+    share = share if abs(share) > ZERO_SHARE else 0.0
     number, plus = float(f"{100 * share:.{digits}g}"), "+" if signed else ""
     if 0 < abs(number) < 1e-4:  # which g would write with an exponent
         return f"{number:{plus}.{digits - 1 - math.floor(math.log10(abs(number)))}f} %"
@@ -93,7 +93,7 @@ def quoted(value: Any, hint: str = "") -> str:
     return f"{text} ({hint})" if hint else text
 
 
-LARGEST = 1e30
+LARGEST_VALUE = 1e30
 """Bound on SI values: larger than any value of a machine, and small enough for squares and products."""
 
 BEYOND = "too large: beyond 1e30 in SI"
@@ -111,7 +111,7 @@ class Bound:
 
         Numbers larger than any machine has are not.
         """
-        return (abs(value) <= LARGEST) & self.test(value)
+        return (abs(value) <= LARGEST_VALUE) & self.test(value)
 
 
 positive = Bound("greater than 0", lambda value: value > 0)
@@ -243,7 +243,7 @@ class Number:
         """
         is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
         if not is_number or not self.bound.holds(entry):
-            beyond = is_number and LARGEST < abs(entry) < math.inf
+            beyond = is_number and LARGEST_VALUE < abs(entry) < math.inf
             raise InputError("", quoted(entry, BEYOND if beyond else ""), self.expected, self.written_example)
         return entry
 
@@ -260,7 +260,7 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _FACTOR = r"[^\W\d_]\w*(?: ?(?:\^|\*\*) ?-?[0-9]|⁻?[¹²³⁴])?"
 _GROUP = rf"(?:{_FACTOR}|\({_FACTOR}(?: ?[*/·. ] ?{_FACTOR})*\))"
 _UNIT = re.compile(rf"(?:1 ?/ ?)?{_GROUP}(?: ?[*/·. ] ?{_GROUP})*")
-_LONGEST = 100
+LONGEST_QUANTITY = 100
 
 
 def _read(entry: Any, si_unit: str, motor: Motor | None) -> Value:
@@ -279,9 +279,9 @@ def _read(entry: Any, si_unit: str, motor: Motor | None) -> Value:
     if bare == 0 and not re.search("[1-9]", re.split("[eE]", number)[0]):
         return Value(0.0, entry)
     magnitude = abs(bare) * float(factor)
-    if magnitude > LARGEST:
+    if magnitude > LARGEST_VALUE:
         raise _Refused(BEYOND)
-    if magnitude < 1 / LARGEST:
+    if magnitude < 1 / LARGEST_VALUE:
         raise _Refused("too small: below 1e-30 in SI")
     return Value(float(Fraction(number) * Fraction(repr(factor))), entry)
 
@@ -292,7 +292,7 @@ def _split(entry: str) -> tuple[str, str]:
     Raises _Refused for a text without either, or too long a text.
     """
     text = " ".join(entry.split())
-    if len(text) > _LONGEST:
+    if len(text) > LONGEST_QUANTITY:
         raise _Refused("too long")
     match = _NUMBER.match(text)
     if match is None:
@@ -310,9 +310,9 @@ def in_unit_of(before: Any, entry: Any) -> Any:
 
     `entry` is the number or entry. A unit that is only wrong in its capitals is corrected.
     """
-    bare = isinstance(entry, int | float) and not isinstance(entry, bool) and abs(entry) < LARGEST
+    bare = isinstance(entry, int | float) and not isinstance(entry, bool) and abs(entry) < LARGEST_VALUE
     text = repr(entry) if bare else entry.strip() if isinstance(entry, str) else ""
-    number = _NUMBER.match(text) if len(text) <= _LONGEST else None
+    number = _NUMBER.match(text) if len(text) <= LONGEST_QUANTITY else None
     if number is None or not isinstance(before, str):
         return entry
     try:
@@ -342,7 +342,7 @@ def _why_no_number(text: str) -> str:
 
 
 def _checked_unit(text: str) -> str:
-    if len(text) > _LONGEST or not _UNIT.fullmatch(text):
+    if len(text) > LONGEST_QUANTITY or not _UNIT.fullmatch(text):
         raise _Refused(f"{quoted(text)} is not a unit")
     return text
 

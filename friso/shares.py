@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-DOUBT = 0.05
+DOUBT_PROBABILITY = 0.05
 """Probability outside an interval."""
 
 
@@ -57,6 +57,6 @@ def share_interval(hits: int, count: int) -> tuple[float, float]:
     """
     from scipy.special import betaincinv
 
-    low = betaincinv(hits, count - hits + 1, DOUBT / 2) if hits else 0.0
-    high = betaincinv(hits + 1, count - hits, 1 - DOUBT / 2) if hits < count else 1.0
+    low = betaincinv(hits, count - hits + 1, DOUBT_PROBABILITY / 2) if hits else 0.0
+    high = betaincinv(hits + 1, count - hits, 1 - DOUBT_PROBABILITY / 2) if hits < count else 1.0
     return float(low), float(high)

@@ -114,7 +114,7 @@ def unhurried() -> Iterator[None]:
     """Suppress lines of progress, so that what commands say does not depend on how long they take."""
     from friso.cli import progress
 
-    with patched({progress: {"LINES": TIMEOUT_MAX}}):
+    with patched({progress: {"LINE_INTERVAL": TIMEOUT_MAX}}):
         yield
 
 

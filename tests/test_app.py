@@ -39,7 +39,7 @@ from friso.app import machine as machines
 from friso.app.connections import Connection
 from friso.app.gate import Access
 from friso.app.ghosts import ghosts_of
-from friso.app.kept import MOST, KeptAnswers
+from friso.app.kept import KEPT_ANSWERS, KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
 from friso.app.questions import QUESTIONS
@@ -159,14 +159,14 @@ def is_closed(connection: socket.socket) -> bool:
 
 
 def test_half_sent_requests_keep_nobody_out_and_end_soon(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    held = half_sent(served.port, 3 * connections.MOST)
+    held = half_sent(served.port, 3 * connections.MOST_CONNECTIONS)
     try:
         assert served.request("GET", "/begin")[0] == 200
-        assert all(map(is_closed, held[: 2 * connections.MOST]))  # those that came first made way
+        assert all(map(is_closed, held[: 2 * connections.MOST_CONNECTIONS]))  # those that came first made way
     finally:
         for one in held:
             one.close()
-    monkeypatch.setattr(connections, "HEADERS", 0.05)
+    monkeypatch.setattr(connections, "HEADERS_TIME", 0.05)
     (one,) = half_sent(served.port, 1)
     with one:
         for _ in range(3):
@@ -185,8 +185,8 @@ def test_whoever_has_no_key_and_reads_slowly_is_cut_off_and_a_question_is_not(
         yield {"kind": "answer"}
 
     monkeypatch.setitem(QUESTIONS, "machine", long)  # type: ignore[arg-type]
-    monkeypatch.setattr(connections, "HEADERS", 0.05)
-    monkeypatch.setattr(connections, "SENDING", 0.1)
+    monkeypatch.setattr(connections, "HEADERS_TIME", 0.05)
+    monkeypatch.setattr(connections, "SENDING_TIME", 0.1)
     with ThreadPoolExecutor(1) as pool, contextlib.ExitStack() as opened:
         answer = pool.submit(served.ask, "machine", RIG)
         assert begun.wait(60)
@@ -283,7 +283,7 @@ def test_a_token_for_once_is_taken_soon_or_never_and_the_browser_that_took_it_ma
     access = Access.at("127.0.0.1", 8000)
     token = access.token_for_once()
     key = access.session_of(token)
-    monkeypatch.setattr(gate, "FRESH", 0.0)
+    monkeypatch.setattr(gate, "TOKEN_LIFE", 0.0)
     assert (access.session_of(token, key), access.has(key)) == ("", True)  # out of its history
     assert access.session_of(access.token_for_once()) == ""
     assert (access.session_of(token), access.has(key)) == ("", False)  # however late another comes
@@ -864,7 +864,7 @@ def test_an_answer_is_there_at_once_for_whoever_comes_back_with_what_was_noted()
     with pytest.raises(Overtaken), ended_by(work.flag):
         kept.answer(question, other, work)
     work = Work(lambda part: None)
-    for crossover in range(MOST):
+    for crossover in range(KEPT_ANSWERS):
         kept.answer(question, replace(rig, changed=f'{{"controller.crossover": "{9 + crossover} Hz"}}'), work)
     assert kept.answer(question, rig, work) is not first
 

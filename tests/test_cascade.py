@@ -392,7 +392,7 @@ COARSE_LIMITS = FrequencySettings(crossover_steps=21, search_biases=3)
 
 @pytest.mark.thorough
 def test_compare(whole: Stage) -> None:
-    with COARSE_LIMITS.in_use(), patched({study: {"FOLLOWED": 6, "LONGER": 3}}):
+    with COARSE_LIMITS.in_use(), patched({study: {"FOLLOWED_MACHINES": 6, "LONGER_FACTOR": 3}}):
         comparison = compare(whole, 20, 1)
     assert {"a", "c", "d", "e", "f"} <= {result.option.letter for result in comparison.results}
     assert all(comparison_sentences(comparison))

@@ -89,7 +89,7 @@ def test_a_wait_is_told_where_no_terminal_shows_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The line appears even while nothing is reported."""
-    monkeypatch.setattr("friso.cli.progress.LINES", 0.01)
+    monkeypatch.setattr("friso.cli.progress.LINE_INTERVAL", 0.01)
     with ProgressBar("first") as bar:
         _until_told(capsys, "friso: first")
         bar(0, 12, "cells")

@@ -41,14 +41,22 @@ from friso.stage.lists import element_keys
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import difference, linear_loops, median, quantile_interval
-from friso.studies.compare.options import DEADBAND, MODEL_ERROR, OPTIONS, CompareOptions, Option, linear_flat, options
+from friso.studies.compare.options import (
+    DEADBAND_SHARE,
+    MODEL_ERROR,
+    OPTIONS,
+    CompareOptions,
+    Option,
+    linear_flat,
+    options,
+)
 from friso.studies.compare.study import Comparison, NeededBandwidth, OptionResult, compare
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
 """A drive that costs a fifth, with the same equations: one sample of delay."""
 
-QUICK = {study: {"FOLLOWED": 6, "LONGER": 3}}
+QUICK = {study: {"FOLLOWED_MACHINES": 6, "LONGER_FACTOR": 3}}
 COUNT = 20
 RIGID = {"joint": None, "parasitic": None}
 
@@ -156,7 +164,7 @@ def test_the_seven_options(every: CompareOptions, machines: Machines) -> None:
     stages = {option.letter: option.stage.flat() for option in every.options}
     assert "".join(stages) == "abcdefg"
     assert [letter for letter, flat in stages.items() if not flat["joint.locked"]] == ["c", "g"]
-    assert stages["d"]["drive.integrator_deadband"] == pytest.approx(DEADBAND * 1e-6)
+    assert stages["d"]["drive.integrator_deadband"] == pytest.approx(DEADBAND_SHARE * 1e-6)
     assert [letter for letter, flat in stages.items() if flat["drive.integrator_reset"]] == ["e"]
     ahead = every.options[5].changes
     assert {*ahead} == {"drive.feedforward_coulomb", "drive.feedforward_viscous"}
@@ -172,7 +180,7 @@ def test_faster_up_to_the_margin(every: CompareOptions, letter: str) -> None:
     assert option.stage.flat()["controller.crossover"] == pytest.approx(8 * option.factor)
     own = linear_flat(option.stage, option.stage.flat())
     margin = crossover.settled_margin(own)
-    assert margin == pytest.approx(crossover.WANTED, abs=0.01)
+    assert margin == pytest.approx(crossover.COMFORTABLE_MARGIN, abs=0.01)
     beyond = crossover.settled_margin({**own, "controller.crossover": 1.1 * own["controller.crossover"]})
     assert beyond < margin - 0.01
 

@@ -90,7 +90,7 @@ def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small() -> Iterator[None]:
-    with SMALL.in_use(), patched({controller: {"RATIOS": np.array([0.1, 0.7])}}):
+    with SMALL.in_use(), patched({controller: {"DAMPING_RATIOS": np.array([0.1, 0.7])}}):
         yield
 
 

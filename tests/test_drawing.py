@@ -40,7 +40,7 @@ from friso.quantities import percent
 from friso.questions.check.figures import check_figures
 from friso.shown import pages
 from friso.shown.drawing import images, matplotlib_renderer, plotly_maps, plotly_renderer
-from friso.shown.drawing.drawable import BUCKETS, KEPT, drawable, thin
+from friso.shown.drawing.drawable import KEPT_PER_BUCKET, MOST_BUCKETS, drawable, thin
 from friso.shown.drawing.figure import Axis, Category, Figure, Map, Panel, Series
 from friso.shown.drawing.palette import GREY
 from friso.shown.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
@@ -139,8 +139,8 @@ def test_thinning_keeps_order_ends_extremes_and_gaps(y, buckets, loop):
         assert np.nanmax(kept_y) == np.nanmax(y)
     assert kept_x.min() == (x + label).min()
     assert kept_x.max() == (x + label).max()
-    if len(y) > KEPT * buckets:
-        assert len(kept_y) <= (KEPT + 1) * buckets + 2
+    if len(y) > KEPT_PER_BUCKET * buckets:
+        assert len(kept_y) <= (KEPT_PER_BUCKET + 1) * buckets + 2
 
 
 @settings(max_examples=30)
@@ -149,7 +149,7 @@ def test_a_spike_of_one_sample_survives_where_it_is(place, height, sign):
     y = np.sin(np.linspace(0, 50, 200_000))
     y[place] = sign * height
     x, kept = thin(np.arange(200_000.0), y)
-    assert len(kept) <= (KEPT + 1) * BUCKETS
+    assert len(kept) <= (KEPT_PER_BUCKET + 1) * MOST_BUCKETS
     assert kept[x == place] == pytest.approx(sign * height)
 
 
@@ -410,9 +410,11 @@ def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
     narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
     (note,) = (text["text"].split("<br>") for text in narrow["annotations"])
     assert all(len(narrow[name]["title"]["text"].split("<br>")) > 1 for name in ("legend", "legend2"))
-    assert max(map(len, note)) < plotly_renderer.NARROW / 6
+    assert max(map(len, note)) < plotly_renderer.NARROW_HEIGHT / 6
     assert narrow["height"] > wide["height"]
-    assert narrow["height"] - 2 * (plotly_renderer.PLOT + plotly_renderer.FOOTER) >= 8 * plotly_maps.KEY_ROW
+    assert (
+        narrow["height"] - 2 * (plotly_renderer.PLOT_HEIGHT + plotly_renderer.FOOTER_HEIGHT) >= 8 * plotly_maps.KEY_ROW
+    )
 
 
 def test_a_title_stands_upon_the_legend_or_upon_the_axes() -> None:
@@ -448,7 +450,7 @@ def test_the_note_of_a_map_stands_below_all_rows_of_its_key() -> None:
     assert rows == [1, 2]
     assert narrow["height"] - wide["height"] == plotly_maps.KEY_ROW
     titled = plotly_renderer.parts(replace(figure, panels=(replace(figure.panels[0], title="A title"),)))["layout"]
-    assert titled["height"] - wide["height"] == plotly_renderer.TITLE
+    assert titled["height"] - wide["height"] == plotly_renderer.TITLE_HEIGHT
 
 
 def test_maps_stand_below_each_other_on_a_narrow_page() -> None:

@@ -29,7 +29,7 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.flexure.document import flexure_document
 from friso.questions.flexure.drawing import drawing_svg
 from friso.questions.flexure.figures import VIEWS, best_view, flexure_figures, modes_figure
-from friso.questions.flexure.layout import SCALES, WIDTH, block_size
+from friso.questions.flexure.layout import SCALES, SHEET_WIDTH, block_size
 from friso.questions.flexure.page import flexure_files
 from friso.questions.flexure.question import EXAMPLE
 from friso.questions.flexure.table import rows
@@ -394,7 +394,7 @@ def test_the_drawing_is_xml_with_all_dimensions(stage: Stage, changes: dict[str,
     places = _places(svg)
     height = float(ElementTree.fromstring(svg).get("viewBox", "").split()[3])
     assert (places >= 0).all()
-    assert (places <= [WIDTH, height]).all()
+    assert (places <= [SHEET_WIDTH, height]).all()
     assert height < 297
     assert "<script" not in svg
 

@@ -339,7 +339,7 @@ def test_lateral_load_without_dimensions() -> None:
     m = 1 - np.arange(1, n) / n
     second = (2 * np.eye(n - 1) - np.eye(n - 1, k=1) - np.eye(n - 1, k=-1)) * n**2
     loads = np.linalg.eigvals(np.linalg.solve(second, np.diag(m**2) - np.outer(m, m) / n)).real
-    assert 1 / np.sqrt(np.max(loads)) == pytest.approx(closed_forms.LATERAL, rel=1e-3)
+    assert 1 / np.sqrt(np.max(loads)) == pytest.approx(closed_forms.LATERAL_BUCKLING, rel=1e-3)
 
 
 def lateral_load_without_warping(springs: Mechanism) -> float:
@@ -358,7 +358,7 @@ def lateral_load_without_warping(springs: Mechanism) -> float:
     bent = (1 - x) * twist
     mean = bent @ weights
     largest = np.max(eigh((bent * weights) @ bent.T - np.outer(mean, mean), stiff, eigvals_only=True))
-    return float(closed_forms.lateral_load(springs) / closed_forms.LATERAL / np.sqrt(largest))
+    return float(closed_forms.lateral_load(springs) / closed_forms.LATERAL_BUCKLING / np.sqrt(largest))
 
 
 def lateral_load_by_beams(springs: Mechanism) -> float:

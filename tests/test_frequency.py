@@ -22,7 +22,7 @@ from friso.equations.roles import Role
 from friso.equations.structure import Structure, structure
 from friso.errors import InputError
 from friso.frequency.bode import bode
-from friso.frequency.crossover import WANTED, limits, settled_members
+from friso.frequency.crossover import COMFORTABLE_MARGIN, limits, settled_members
 from friso.frequency.family import impedance, loops, plants, scan_stability, spectral_abscissa
 from friso.frequency.loops import closed_loop, open_loop, poles, response
 from friso.frequency.margins import margins, of_loop, with_resonances
@@ -498,7 +498,7 @@ def test_limits_are_where_the_margins_say(rig: Stage, locked: bool) -> None:
             if not np.isclose(end, loop_limits.searched).any():
                 at = {**flat, "controller.crossover": end}
                 least = min(margins(at, members[k]).modulus_margin for k in range(len(members)))
-                assert least == pytest.approx(WANTED, rel=0.01)
+                assert least == pytest.approx(COMFORTABLE_MARGIN, rel=0.01)
 
 
 def test_the_stribeck_range_is_unstable_and_told(rig: Stage) -> None:

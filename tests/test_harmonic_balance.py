@@ -12,7 +12,7 @@ from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains
 
 from friso.errors import InputError
 from friso.frequency.describing import balance
-from friso.frequency.describing.balance import FREQUENCIES, receptance, single_harmonic
+from friso.frequency.describing.balance import DEFAULT_FREQUENCIES, receptance, single_harmonic
 from friso.frequency.describing.function import dynamic_stiffness
 from friso.frequency.describing.multi import DONE, OPEN, REST, HarmonicSeries, OneStateLaw, balanced, friction_answer
 from friso.frequency.settings import FrequencySettings
@@ -106,11 +106,11 @@ def test_frequencies_are_close_enough_for_the_loop() -> None:
         answer = receptance(locked.flat(), frequencies)[0]
         return float(np.degrees(np.max(np.abs(np.angle(answer[1:] / answer[:-1])))))
 
-    fine = balance._Loop(locked, 1e-9).refined(FREQUENCIES)
-    assert turn(FREQUENCIES) > 140
+    fine = balance._Loop(locked, 1e-9).refined(DEFAULT_FREQUENCIES)
+    assert turn(DEFAULT_FREQUENCIES) > 140
     assert turn(fine) < 90
-    assert set(FREQUENCIES) <= set(fine)
-    assert len(fine) < len(FREQUENCIES) + 10
+    assert set(DEFAULT_FREQUENCIES) <= set(fine)
+    assert len(fine) < len(DEFAULT_FREQUENCIES) + 10
 
 
 def test_multi_harmonic_balance_finds_it_too() -> None:
@@ -231,10 +231,10 @@ def test_where_the_integrator_can_drive_the_loop_is_a_spring_too() -> None:
     that friction would have to be a negative one, which it is by far too little there."""
     for crossover in (4.0, 6.0, 8.0, 9.5):
         flat = hunting(crossover).flat()
-        loop = -1 / receptance(flat, FREQUENCIES)[0]
+        loop = -1 / receptance(flat, DEFAULT_FREQUENCIES)[0]
         feeds = np.imag(loop) < 0
         spring = np.min(np.real(loop[feeds]))
-        amplitudes, frequencies = map(np.ravel, np.meshgrid(np.geomspace(1e-8, 1, 31), FREQUENCIES[feeds]))
+        amplitudes, frequencies = map(np.ravel, np.meshgrid(np.geomspace(1e-8, 1, 31), DEFAULT_FREQUENCIES[feeds]))
         assert spring > 0
         assert np.min(np.real(dynamic_stiffness(flat, amplitudes, frequencies))) > -spring / 10
 

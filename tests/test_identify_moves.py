@@ -44,7 +44,7 @@ from friso.identification.quality import Quality
 from friso.identification.readings.common import record
 from friso.identification.settings import DoubtSettings
 from friso.identification.stage_file import made_up
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 from friso.progress import silent
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
@@ -373,12 +373,12 @@ def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
     fitted, bandwidth = rigid(log)
     off = np.log(fitted.value(MASS) / sum(TWO_MASSES))
     assert (off < 0) == behind
-    assert abs(off) > COVERAGE * np.sqrt(fitted.covariance[0, 0])
+    assert abs(off) > NORMAL_COVERAGE * np.sqrt(fitted.covariance[0, 0])
     case = fit_case(log, fitted, bandwidth)
     (unspoilt,) = coupling.find(case)
     (spoiled,) = coupling.find(replace(case, quality=replace(WELL, spoilt=True), leading=None))
     assert unspoilt.fit is not None
-    assert COVERAGE * np.sqrt(unspoilt.fit.covariance[0, 0]) > 1.5 * abs(off)
+    assert NORMAL_COVERAGE * np.sqrt(unspoilt.fit.covariance[0, 0]) > 1.5 * abs(off)
     assert unspoilt.size == pytest.approx(off, rel=0.3)
     wording(unspoilt.words)
     assert {*unspoilt.refuses} == {*spoiled.refuses} == {*BRISTLES}
@@ -405,7 +405,7 @@ def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, 
     wording(doubt.words)
     assert doubt.fit is not None
     off = np.log(fitted.value(MASS) / sum(TWO_MASSES))
-    assert abs(off) < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
+    assert abs(off) < NORMAL_COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
     assert not [*load_friction.find(replace(fit_case(log, fitted, bandwidth), leading=None))]
 
 
@@ -455,7 +455,7 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wordi
         assert nameless.fit is not None
     assert doubt.fit is not None
     off = abs(np.log(fitted.value(MASS) / mass))
-    assert off < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
+    assert off < NORMAL_COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
 
 
 def test_an_integrated_velocity_shows_a_step_test() -> None:
@@ -516,7 +516,7 @@ def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(lat
     assert finding.size == pytest.approx(late * log.sample_time, rel=0.2)
     names = [fitted.problem.parameters[number].name for number in fitted.free]
     off = [np.log(fitted.value(name) / true) for name, true in zip(names[1:3], FRICTION, strict=True)]
-    assert (COVERAGE * np.sqrt(np.diag(finding.fit.covariance))[1:3] > np.abs(off)).all()
+    assert (NORMAL_COVERAGE * np.sqrt(np.diag(finding.fit.covariance))[1:3] > np.abs(off)).all()
     wording(finding.words)
     (spoiled,) = delay.find(replace(case, quality=replace(WELL, spoilt=True), leading=None))
     assert not spoiled.words
@@ -560,7 +560,7 @@ def test_an_interval_holds_what_inputs_that_a_log_allows_as_well_make_of_it() ->
     """
     moved = [np.array([1.0, 0.0]), np.array([0.0, 3.0])]
     wider = fitting._reaching_over(np.diag([0.25, 0.0]), moved)
-    assert COVERAGE * np.sqrt(np.diag(wider)) == pytest.approx([0.5 * COVERAGE + 1.0, 3.0])
+    assert NORMAL_COVERAGE * np.sqrt(np.diag(wider)) == pytest.approx([0.5 * NORMAL_COVERAGE + 1.0, 3.0])
 
 
 def test_static_friction_of_one_direction_is_named_and_intervals_reach_to_what_either_shows() -> None:
@@ -579,7 +579,7 @@ def test_static_friction_of_one_direction_is_named_and_intervals_reach_to_what_e
     assert wider.inner == pytest.approx(both.inner)
     assert np.all(np.diag(wider.covariance) >= np.diag(both.covariance) * (1 - 1e-9))
     off = abs(both.inner[place] - np.log(machine.flat["friction.stribeck_velocity"]))
-    assert off < COVERAGE * np.sqrt(wider.covariance[place, place])
+    assert off < NORMAL_COVERAGE * np.sqrt(wider.covariance[place, place])
     assert apart.words
     assert apart.spoils
     assert apart.size < both.left

@@ -23,7 +23,7 @@ from friso.identification.sources import recognised
 from friso.progress import silent
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import with_friction
-from friso.studies.rig.experiments.presliding import GENTLE, TURNS, loop_log, presliding_log, run_experiment
+from friso.studies.rig.experiments.presliding import GENTLE, LOOP_COUNT, loop_log, presliding_log, run_experiment
 from friso.studies.rig.outcome import excite, locked_stage, rig_log, travel
 
 DT, SECONDS = 5e-4, 6.0
@@ -228,7 +228,7 @@ def test_loops_before_sliding_close_under_gms_and_drift_under_lugre() -> None:
     drift = {}
     for machine in (stage, with_friction(stage, "gms", friction_law("gms").keeping(measured, 2))):
         log = loop_log(machine, "loop", 0.02, 1, 0.5)
-        turns = np.reshape(log.logged["position"], (TURNS, -1))
+        turns = np.reshape(log.logged["position"], (LOOP_COUNT, -1))
         assert np.max(np.abs(log.logged["disturbance"])) == pytest.approx(1.5, rel=1e-3)
         drift[machine.flat()["friction.model"]] = abs(turns[-1].mean() - turns[-2].mean()) / np.ptp(turns[-1])
     assert drift["lugre"] > 2 * drift["gms"]  # the integrator moves the loop, too

@@ -58,7 +58,7 @@ from friso.identification.stage_file import (
     origins,
     with_origins,
 )
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 from friso.progress import silent
 from friso.questions.identify.numbers import interval_text, value_text
 
@@ -710,7 +710,7 @@ def test_errors_of_rounding_last_as_long_as_a_force_stays() -> None:
     wide = as_far_off_as_repeated(sure, log, log.segments[0], 5.0, digit / math.sqrt(12), silent)
     off = abs(fitted.value("friction.viscous") - VISCOUS)
     assert off > VISCOUS / 2
-    assert wide.deviation[fitted.fitted.index("friction.viscous")] > off / COVERAGE
+    assert wide.deviation[fitted.fitted.index("friction.viscous")] > off / NORMAL_COVERAGE
 
 
 def test_starts_are_tried_all_over_a_long_record() -> None:

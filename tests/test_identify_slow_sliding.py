@@ -177,7 +177,7 @@ def test_friction_without_a_falling_curve_is_not_slid_on_the_rig() -> None:
 
 @pytest.fixture
 def one_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(many_speeds, "PLACES", 1)
+    monkeypatch.setattr(many_speeds, "SHARED_PLACES", 1)
     monkeypatch.setattr(many_speeds, "SLOW_PLACES", 2)
 
 

@@ -139,7 +139,7 @@ def test_ctrl_c_that_came_during_an_import_is_not_too_late_for_files(
     """Which are put in place at once after it."""
     (tmp_path / "half_there_at_last.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(interrupts, "_AGAIN", 0.3)
+    monkeypatch.setattr(interrupts, "IMPORT_CHECK_INTERVAL", 0.3)
     with pytest.raises(KeyboardInterrupt), interrupts.raising():
         _import_and_put_in_place(tmp_path / "a.txt")
     assert not (tmp_path / "a.txt").exists()
@@ -181,7 +181,7 @@ def answer():
         time.sleep(1)
         print("the best so far")
 
-interrupts.PATIENCE = 0.2
+interrupts.ENDING_TIME = 0.2
 Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM)).start()
 open("endless.py", "w").write("import time\\ntime.sleep(60)\\n")
 sys.path.insert(0, "")

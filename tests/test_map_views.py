@@ -26,8 +26,8 @@ from snapshots import Snapshots
 import friso
 from friso.axis import ROTARY, speaking_of
 from friso.questions.map.cells import axes_of, look, pick
-from friso.questions.map.data import MOST, NONE
-from friso.questions.map.figures import SLICES, map_figure, map_panel
+from friso.questions.map.data import MISSING_HEIGHT, MOST_CELLS
+from friso.questions.map.figures import MOST_SLICES, map_figure, map_panel
 from friso.questions.map.findings import headline, statement, verification
 from friso.questions.map.page import map_files, map_html, marked_figure
 from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of, no_number, quantity
@@ -323,7 +323,7 @@ def test_further_axes_become_slices_on_one_scale():
     }
     runs = made_up(axes)
     figure = map_figure(runs, "peaks", marker={CROSSOVER: 6.0, STROKE: 0.0, LOCKED: False})
-    assert len(figure.panels) == 8 <= SLICES
+    assert len(figure.panels) == 8 <= MOST_SLICES
     titles = [panel.title for panel in figure.panels]
     assert titles[:2] == ["Joint locked, Mass 1", "Joint locked, Mass 3"]
     assert figure.caption == "Not shown: Mass 2, 4, 6."
@@ -497,7 +497,9 @@ def test_the_page_colours_cells_as_the_figure_does():
         shown = look(runs, name)
         item = {item["name"]: item for item in page_data(map_html(runs, name, RERUN))["variables"]}[name]
         codes = unpacked(item["codes"], "u1").astype(float)
-        assert np.array_equal(np.where(codes == NONE, np.nan, codes), shown.codes.values.ravel(), equal_nan=True)
+        assert np.array_equal(
+            np.where(codes == MISSING_HEIGHT, np.nan, codes), shown.codes.values.ravel(), equal_nan=True
+        )
         assert item["kinds"] == [{"label": category.label, "colour": category.colour} for category in shown.categories]
         drawn = scale(only_map(drawable(map_figure(runs, name))))
         assert (item["low"], item["high"]) == pytest.approx((drawn.low, drawn.high))
@@ -556,7 +558,7 @@ def test_a_page_too_large_is_thinned_and_says_so():
     page = map_html(runs, "peaks", RERUN)
     data = page_data(page)
     rows, columns = (np.array(indices) for indices in data["indices"])
-    assert 0.9 * MOST < len(rows) * len(columns) <= MOST
+    assert 0.9 * MOST_CELLS < len(rows) * len(columns) <= MOST_CELLS
     assert f"{len(rows)} of the 1000 " in Page(page).text
     peaks = unpacked(data["variables"][0]["numbers"], "<f4")
     assert np.array_equal(peaks, runs.peaks.values[np.ix_(rows, columns)].ravel())

@@ -144,7 +144,7 @@ COARSE_LIMITS = FrequencySettings(crossover_steps=21, search_biases=3)
 
 @pytest.mark.thorough
 def test_compare(whole: Stage, tmp_path: Path) -> None:
-    with COARSE_LIMITS.in_use(), patched({study: {"FOLLOWED": 6, "LONGER": 3}}):
+    with COARSE_LIMITS.in_use(), patched({study: {"FOLLOWED_MACHINES": 6, "LONGER_FACTOR": 3}}):
         document = answer(tmp_path, whole, "compare", "--machines", 20, "--seed", 1)
     options = document["options"]
     assert {"a", "c", "d", "e", "f"} <= {*options}

@@ -29,7 +29,7 @@ def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
     assert outcome.longest_travel(built) == pytest.approx(0.15)
     assert constant_speed.pass_speeds(built) == pytest.approx((2.5e-3, 10e-3))
     assert outcome.freed(built).flat()["joint.stroke"] == pytest.approx(8e-3)
-    assert np.array(frf.SETTINGS) * outcome.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])
+    assert np.array(frf.CROSSOVER_SETTINGS) * outcome.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])
 
 
 def test_steps_show_the_joint_on_its_cables(built: Stage) -> None:
@@ -62,9 +62,9 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
     built: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Faster passes with a faster controller show it, and the whole curve, though friction varies along the way."""
-    monkeypatch.setattr(outcome, "WAY", 1 / 6)
-    monkeypatch.setattr(constant_speed, "DURATIONS", (48.0, 12.0))
-    monkeypatch.setattr(many_speeds, "PLACES", 1)
+    monkeypatch.setattr(outcome, "WAY_FACTOR", 1 / 6)
+    monkeypatch.setattr(constant_speed, "PASS_DURATIONS", (48.0, 12.0))
+    monkeypatch.setattr(many_speeds, "SHARED_PLACES", 1)
     result = constant_speed.run_experiment(built, 1, silent).result
     free, (place,) = result.cases[0], result.many.places
     assert not free.place.separated
@@ -87,7 +87,7 @@ def test_a_weaker_motor_makes_masses_look_heavier(built: Stage, locked: bool, ma
 def test_the_measured_loop_is_the_one_computed_and_crosses_where_tuned(built: Stage) -> None:
     """Controller times plant, both measured in the same run, against the loop read from the sensitivity alone."""
     stage = outcome.locked_stage(built)
-    _, loops = frf.open_loops(stage, PLACE, 1, frf.SETTINGS)
+    _, loops = frf.open_loops(stage, PLACE, 1, frf.CROSSOVER_SETTINGS)
     for item in loops[2:]:
         assert frf.crossing_near_target(item) == pytest.approx(item.tuned, rel=0.15)
     log = rig_log(outcome.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)

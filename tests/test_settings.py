@@ -1,6 +1,7 @@
 """Settings: every tuning number is a field with its unit and reason, other values can be given for a block of code."""
 
 import ast
+import re
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,19 +76,35 @@ def test_tuning_numbers_are_settings() -> None:
         for path in sorted(root.rglob("*.py")):
             if path.name != "settings.py":
                 parts = path.relative_to(root.parent).parts
-                counts["/".join(parts[:2]) if len(parts) > 2 else parts[0]] += named_numbers(path.read_text("utf-8"))
+                counts["/".join(parts[:2]) if len(parts) > 2 else parts[0]] += len(
+                    named_numbers(path.read_text("utf-8"))
+                )
     assert {room: count for room, count in counts.items() if count} == LITERALS
 
 
-def named_numbers(source: str) -> int:
-    """Return how many names in a module stand for numbers, or for tuples, lists and arrays of numbers alone."""
-    values: list[ast.expr] = []
+def test_names_of_numbers_say_what_they_are() -> None:
+    """One word, such as MOST or NEAR, stands for another number in every module."""
+    short = [
+        f"{path}: {name}"
+        for package in (friso, friso_thesis)
+        for path in Path(str(package.__file__)).parent.rglob("*.py")
+        if path.name != "settings.py"
+        for name in named_numbers(path.read_text("utf-8"))
+        if name.isupper() and not re.search(r"[A-Z]_|\d", name)
+    ]
+    assert short == []
+
+
+def named_numbers(source: str) -> list[str]:
+    """Return the names in a module that stand for numbers, or for tuples, lists and arrays of numbers alone."""
+    pairs: list[tuple[ast.expr, ast.expr]] = []
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            several = isinstance(targets[0], ast.Tuple) and isinstance(node.value, ast.Tuple)
-            values += node.value.elts if several and isinstance(node.value, ast.Tuple) else [node.value]
-    return sum(map(is_number, values))
+            target, value = targets[0], node.value
+            several = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            pairs += zip(target.elts, value.elts, strict=True) if several else [(target, value)]
+    return [ast.unparse(target) for target, value in pairs if is_number(value)]
 
 
 def is_number(value: ast.expr) -> bool:

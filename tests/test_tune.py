@@ -73,7 +73,7 @@ from friso.remedies.sensitivities import Sensitivities, _is_smooth, _of_settling
 from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.verified import (
-    ONE,
+    NO_VARIABLES,
     Performance,
     RemedyOutcome,
     _stiffness,
@@ -549,7 +549,7 @@ def test_looking_further_ends_where_it_takes_too_much_work(
 
     def points() -> Iterator[np.ndarray]:
         while True:
-            moves_of_points(AS_IS(rigid), ONE, machines, goal)
+            moves_of_points(AS_IS(rigid), NO_VARIABLES, machines, goal)
             yield np.zeros(0)
 
     with allowance() as once:
@@ -816,12 +816,16 @@ def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
     unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, seed, tuning.goal.moves)
     assert (
         tuning.present.moves.force
-        == moves_of_points(AS_IS(tuning.stage), ONE, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol).force
+        == moves_of_points(
+            AS_IS(tuning.stage), NO_VARIABLES, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol
+        ).force
     ).all()
     (works,) = tuning.working
     assert works.measured is not None
     assert works.stage is not None
-    on_the_same = moves_of_points(AS_IS(works.stage), ONE, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol)
+    on_the_same = moves_of_points(
+        AS_IS(works.stage), NO_VARIABLES, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol
+    )
     assert np.array_equal(works.measured.moves.settling, on_the_same.settling)
 
 
@@ -889,7 +893,7 @@ def test_no_other_point_is_verified_once_one_took_too_long(
     measured: list[Moves] = []
 
     def verify(search: Search, shares: np.ndarray) -> RemedyOutcome:
-        measured.append(moves_of_points(AS_IS(rigid), ONE, machines, tuning.goal))
+        measured.append(moves_of_points(AS_IS(rigid), NO_VARIABLES, machines, tuning.goal))
         return unsure
 
     monkeypatch.setattr(session, "_verified", verify)
@@ -1018,7 +1022,7 @@ def test_sensitivities_and_gains_are_those_behind_the_drive_as_built(tuning: Adv
     panel = _sensitivity(advice, lines)
     for (own, _, _), series in zip(lines, panel.series, strict=False):
         alone = draw_fleet(own, Correlations(), 1, 1)
-        margin = modulus_margins(AS_IS(own), ONE, alone, stage)[0, 0]
+        margin = modulus_margins(AS_IS(own), NO_VARIABLES, alone, stage)[0, 0]
         assert 1 / np.nanmax(series.y) == pytest.approx(margin, rel=2e-3)
     (gains,) = (line for line in gain_lines(advice) if "N*m/rad" in line)
     assert "bandwidth" in gains

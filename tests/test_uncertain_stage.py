@@ -12,7 +12,7 @@ from refusals import Refused, Wording
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
 from friso.interface.inputs import read_stage
-from friso.intervals import COVERAGE, UncertainValue
+from friso.intervals import NORMAL_COVERAGE, UncertainValue
 from friso.stage import Stage, load, numeric_keys, parse_set, save
 from friso.stage.correlations import (
     Correlations,
@@ -217,7 +217,7 @@ def test_margins_are_those_written(rig: Stage) -> None:
     stage = uncertain(rig, coulomb="1 N +/- 0.1 N", static="2.5 N .. 3.5 N")
     drawn = draw(stage, Correlations(), 4096, seed=1)
     assert drawn.left_out == 0
-    assert kstest(drawn.keys[COULOMB], norm(1, 0.1 / COVERAGE).cdf).statistic < 0.005
+    assert kstest(drawn.keys[COULOMB], norm(1, 0.1 / NORMAL_COVERAGE).cdf).statistic < 0.005
     assert kstest(drawn.keys[STATIC], "uniform", args=(2.5, 1.0)).statistic < 0.005
     assert np.mean(np.abs(drawn.keys[COULOMB] - 1) < 0.1) == pytest.approx(0.95, abs=0.002)
     assert abs(spearmanr(drawn.keys[COULOMB], drawn.keys[STATIC]).statistic) < 0.02
@@ -248,7 +248,7 @@ def test_the_same_seed_gives_the_same_stages(rig: Stage) -> None:
 
 def test_what_reaches_beyond_the_bound_is_cut_off(rig: Stage) -> None:
     drawn = draw(uncertain(rig, viscous="0.5 N*s/m +/- 1 N*s/m"), Correlations(), 2000, seed=5)
-    scale = 1 / COVERAGE
+    scale = 1 / NORMAL_COVERAGE
     share = norm.cdf(-0.5 / scale)
     assert drawn.beyond / (drawn.beyond + 2000) == pytest.approx(share, rel=0.05)
     distribution = truncnorm(-0.5 / scale, np.inf, 0.5, scale)

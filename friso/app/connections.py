@@ -14,13 +14,13 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from friso.app.gate import LET_IN
 
-MOST = 64
+MOST_CONNECTIONS = 64
 """Largest number of connections. Browsers open six to a server, and systems allow a process 256 open files or more."""
 
-HEADERS = 10.0
+HEADERS_TIME = 10.0
 """Time limit [s] for a request up to its body, which a browser sends at once."""
 
-SENDING = 120.0
+SENDING_TIME = 120.0
 """Time limit [s] for a client without a key to read the public files, 5 MB."""
 
 LOGGER = logging.getLogger("friso.app")
@@ -41,9 +41,9 @@ class Connection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin the connection; if too many are open, abort the one that has been idle longest."""
         super().connection_made(transport)
-        self._since, self._timer = self.loop.time(), self.loop.call_later(HEADERS, self._look)
+        self._since, self._timer = self.loop.time(), self.loop.call_later(HEADERS_TIME, self._look)
         held = [one for one in self.connections if isinstance(one, Connection) and not one.transport.is_closing()]
-        if len(held) > MOST:
+        if len(held) > MOST_CONNECTIONS:
             resting = [one for one in held if not one.is_at_work]
             min(resting, key=lambda one: one._since).transport.abort()
 
@@ -68,8 +68,8 @@ class Connection(H11Protocol):
 
     def _look(self) -> None:
         """Close the connection if its time is over; otherwise schedule the next check."""
-        allowed = SENDING if self._is_answering else HEADERS
-        left = HEADERS if self.is_at_work else self._since + allowed - self.loop.time()
+        allowed = SENDING_TIME if self._is_answering else HEADERS_TIME
+        left = HEADERS_TIME if self.is_at_work else self._since + allowed - self.loop.time()
         if left <= 0:
             self.transport.abort()
         else:

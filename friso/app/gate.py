@@ -42,7 +42,7 @@ TWICE = (
     "been first. That browser is shut out: open the address printed above"
 )
 
-FRESH = 60.0
+TOKEN_LIFE = 60.0
 """Time [s] for which a one-time token is valid. The browser that friso starts needs it within seconds."""
 
 LOGGER = logging.getLogger("friso")
@@ -87,7 +87,7 @@ class Access:
         """
         named = (f"[{host}]" if ":" in host else host).lower()
         names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
-        hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP else set())
+        hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP_PORT else set())
         return cls(frozenset(hosts))
 
     def token_for_once(self) -> str:
@@ -119,7 +119,7 @@ class Access:
         for own, (made, session) in self.once.items():
             if not _same(token, own):
                 continue
-            if not session and time.monotonic() - made < FRESH:
+            if not session and time.monotonic() - made < TOKEN_LIFE:
                 session = secrets.token_urlsafe(32)
                 self.once[own] = made, session
                 return session
@@ -134,7 +134,7 @@ class Access:
         return any(_same(key, session) for session in {self.session, *begun} - self.ended)
 
 
-HTTP = 80
+HTTP_PORT = 80
 """Port that browsers leave out of addresses."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")

@@ -15,7 +15,7 @@ from friso.app.machine import Machine
 from friso.app.work import Work
 from friso.interface.answer import Answer
 
-MOST = 4
+KEPT_ANSWERS = 4
 """Number of latest answers that are kept of each function. An answer with a Bode plot takes 20 MB."""
 
 
@@ -48,7 +48,7 @@ class KeptAnswers:
         answer = function(machine.stage, **(options or {}), progress=work.progress)
         with self._turn:
             kept[place] = answer, work.notes[before:]
-            while len(kept) > MOST:
+            while len(kept) > KEPT_ANSWERS:
                 kept.popitem(last=False)
         return answer
 

@@ -15,7 +15,7 @@ from friso.interface.schema import stage_schema
 from friso.quantities import Number, Quantity
 from friso.stage import Stage, loads, numeric_keys
 
-REACH = 10.0
+SLIDER_REACH = 10.0
 """Ratio by which a slider can enlarge and reduce a value."""
 
 
@@ -184,9 +184,9 @@ def _range(field: Quantity | Number, value: float) -> dict[str, Any]:
     The slider reaches from a tenth of the value to ten times the value, within the bounds of the key.
     """
     if value == 0:
-        most = abs(float(field.read(field.example))) * REACH if isinstance(field, Quantity) else 1.0
+        most = abs(float(field.read(field.example))) * SLIDER_REACH if isinstance(field, Quantity) else 1.0
         return {"low": 0.0, "high": most, "log": False}
-    ends = sorted((value / REACH, value * REACH))
+    ends = sorted((value / SLIDER_REACH, value * SLIDER_REACH))
     while not field.bound.holds(ends[1]) and ends[1] > abs(value):
         ends[1] = value + 0.5 * (ends[1] - value) if ends[1] > 1.001 * value else value
     while not field.bound.holds(ends[0]) and ends[0] < value:

@@ -16,7 +16,7 @@ from types import FrameType
 import uvicorn
 from starlette.types import ASGIApp
 
-from friso.app.connections import MOST, Connection, Once, failed
+from friso.app.connections import MOST_CONNECTIONS, Connection, Once, failed
 from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
 from friso.app.work import Workshop
@@ -25,17 +25,17 @@ from friso.interface.starting import example
 from friso.platform.early import SIGNALS
 from friso.stage.files import load, text_of
 
-PORT = 8741
+DEFAULT_PORT = 8741
 """Default port. Browsers keep the contents of a page by its port."""
 
-GRACE = 2
+LONGEST_END = 2
 """Longest wait [s] at the end for questions in progress. When stopped they end within 0.1 s, except in the middle of a
 figure or a solution."""
 
 LOGS = ("uvicorn.error", "asyncio", "friso.app")
 """Loggers whose messages any client can cause."""
 
-TRIES = 20
+FURTHER_PORTS = 20
 """Number of further ports that are tried if the default is taken."""
 
 
@@ -77,7 +77,7 @@ class Server(uvicorn.Server):
     effect.
     """
 
-    def __init__(self, app: ASGIApp, workshop: Workshop, grace: int = GRACE) -> None:
+    def __init__(self, app: ASGIApp, workshop: Workshop, grace: int = LONGEST_END) -> None:
         """Configure the server; `grace` [s] is the longest wait for answers at the end."""
         config = uvicorn.Config(
             app,
@@ -87,7 +87,7 @@ class Server(uvicorn.Server):
             ws="none",
             lifespan="on",
             timeout_graceful_shutdown=grace,
-            backlog=MOST,  # this many are accepted before closed ones have ended
+            backlog=MOST_CONNECTIONS,  # this many are accepted before closed ones have ended
         )
         super().__init__(config)
         self.workshop = workshop
@@ -130,7 +130,7 @@ class Server(uvicorn.Server):
         try:
             await super().shutdown(sockets)
             if cut_off := [*self.server_state.tasks]:
-                await asyncio.wait(cut_off, timeout=GRACE)
+                await asyncio.wait(cut_off, timeout=LONGEST_END)
         finally:
             errors.setLevel(usual)
             for name in LOGS:
@@ -144,7 +144,7 @@ def listening(host: str, port: int | None) -> socket.socket:
     free.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    wanted = [port] if port is not None else [*range(PORT, PORT + TRIES)]
+    wanted = [port] if port is not None else [*range(DEFAULT_PORT, DEFAULT_PORT + FURTHER_PORTS)]
     problem = ""
     for number in wanted:
         listener = socket.socket(family)
@@ -157,4 +157,6 @@ def listening(host: str, port: int | None) -> socket.socket:
         except OSError as error:
             problem = str(error.strerror or error).lower()
             listener.close()
-    raise InputError("--port", f"{wanted[0]} on {host}: {problem}", "a port that is free", f"--port {PORT + TRIES}")
+    raise InputError(
+        "--port", f"{wanted[0]} on {host}: {problem}", "a port that is free", f"--port {DEFAULT_PORT + FURTHER_PORTS}"
+    )

@@ -131,7 +131,7 @@ def _plotly_js() -> bytes:
     return files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
 
 
-CHUNK = 65536
+CHUNK_BYTES = 65536
 """Bytes of a file that are buffered for a slow reader."""
 
 
@@ -143,8 +143,8 @@ def _file(request: Request, content: bytes, kind: str) -> Response:
         return Response(status_code=304, headers=headers)
 
     async def chunks() -> AsyncIterator[bytes]:
-        for start in range(0, len(content), CHUNK):
-            yield content[start : start + CHUNK]
+        for start in range(0, len(content), CHUNK_BYTES):
+            yield content[start : start + CHUNK_BYTES]
 
     headers["Content-Length"] = str(len(content))
     return StreamingResponse(chunks(), headers=headers, media_type=kind)

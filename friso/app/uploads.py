@@ -82,7 +82,7 @@ class Uploads:
 
 _OUTSIDE = re.compile(r"[^\w.+ -]")
 
-LONGEST = 150
+LONGEST_NAME = 150
 """Longest file name in bytes. File systems take 255, and names of accompanying files are longer."""
 
 
@@ -92,5 +92,5 @@ def plain_name(name: str, otherwise: str) -> str:
     The name cannot lead to another folder, hide the file, or read as an option of a command.
     """
     last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
-    plain = last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
+    plain = last.encode()[-LONGEST_NAME:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
     return f"_{plain}" if name_refused(Path(plain)) else plain

@@ -26,10 +26,10 @@ from friso.errors import InputError
 Job = Callable[["Work"], Iterator[dict[str, Any]]]
 """A function that answers a question and yields the parts of its answer."""
 
-OFTEN = 0.1
+REPORT_INTERVAL = 0.1
 """Time [s] between two reports of progress."""
 
-THREADS = 16
+MOST_AT_ONCE = 16
 """Number of questions in progress at one time. Many wait for a kernel, or for earlier computations."""
 
 
@@ -60,7 +60,7 @@ class Work:
         """Report progress. Raises Overtaken once nobody waits for the answer."""
         go_on()
         now = time.monotonic()
-        if now - self.last > OFTEN:
+        if now - self.last > REPORT_INTERVAL:
             self.last = now
             self.put({"kind": "progress", "done": done, "total": total, "label": label})
 
@@ -133,7 +133,7 @@ class Workshop:
     """
 
     def __init__(self) -> None:
-        self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app", initializer=_import_libraries)
+        self.pool = ThreadPoolExecutor(MOST_AT_ONCE, thread_name_prefix="friso-app", initializer=_import_libraries)
         self.quick = ThreadPoolExecutor(2, thread_name_prefix="friso-app-quick")
         self.lanes: dict[tuple[str, str], Work] = {}
 

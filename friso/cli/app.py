@@ -18,7 +18,7 @@ from typer.core import TyperGroup
 
 from friso.cli.arguments import number_refused, parted_path, refuse_empty, with_checked_paths
 from friso.cli.command import COMMANDS, help_class, listed
-from friso.cli.common import INTERRUPTED, say
+from friso.cli.common import INTERRUPTED_STATUS, say
 from friso.cli.terminal import SPELLED, escaping
 from friso.errors import InputError, shortened
 from friso.interface.question import TOPICS
@@ -92,7 +92,7 @@ def command_line(*names: str, for_list: bool = False) -> typer.Typer:
     return app
 
 
-GARBAGE = 20_000, 20, 10
+GARBAGE_THRESHOLDS = 20_000, 20, 10
 """Thresholds of Python's garbage collector.
 
 The defaults take a tenth of the time of imports and figures."""
@@ -103,7 +103,7 @@ def main() -> NoReturn:
 
     Wrong input ends in one message and status 2, never in a traceback.
     """
-    gc.set_threshold(*GARBAGE)
+    gc.set_threshold(*GARBAGE_THRESHOLDS)
     sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()  # a closed stream
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -134,13 +134,13 @@ def _status() -> int:
         signal = signal or interrupts.came() or (2 if isinstance(error, KeyboardInterrupt | typer.Abort) else 0)
         if not signal:
             return _failed(error)
-        status = INTERRUPTED
-    if status == INTERRUPTED:  # typer's word for Ctrl-C too
+        status = INTERRUPTED_STATUS
+    if status == INTERRUPTED_STATUS:  # typer's word for Ctrl-C too
         # Where code from a text was interrupted (a dataclass's, say), python -m ends by SIGINT whatever the status is,
         # unless other such code ran to its end after it.
         exec("")
         say(interrupts.last_word(signal))
-        return 128 + signal if signal else INTERRUPTED
+        return 128 + signal if signal else INTERRUPTED_STATUS
     return status
 
 

@@ -15,7 +15,7 @@ import typer
 from friso.cli.terminal import console, spelled
 from friso.escapes import one_line
 
-INTERRUPTED = 130
+INTERRUPTED_STATUS = 130
 
 Overrides = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: masses.stage="0.6 kg".')
@@ -41,10 +41,10 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, li
     names, *others = map(_narrow, texts)
     room = screen.width - 1
     names = min(names, room // 2)
-    narrow = [names, *(min(width, max(_LEAST, room - names - 2 * _BORDER)) for width in others)]
+    narrow = [names, *(min(width, max(LEAST_WIDTH, room - names - 2 * BORDER_WIDTH)) for width in others)]
     for part in _side_by_side(narrow, room):
         table = Table(title=title or None, title_justify="left")
-        spare = max(0, room - sum(narrow[k] + _BORDER for k in part))
+        spare = max(0, room - sum(narrow[k] + BORDER_WIDTH for k in part))
         for k in part:
             width = min(max(map(len, texts[k])), narrow[k] + spare)
             spare -= width - narrow[k]
@@ -55,10 +55,10 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, li
         title = ""
 
 
-_BORDER = 3
+BORDER_WIDTH = 3
 """Width between two columns of a table, in characters."""
 
-_LEAST = 8
+LEAST_WIDTH = 8
 """Smallest width, in characters, of a column beside the row names."""
 
 
@@ -77,7 +77,7 @@ def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
     """
     parts = [[0]]
     for k in range(1, len(narrow)):
-        if len(parts[-1]) > 1 and sum(narrow[j] + _BORDER for j in [*parts[-1], k]) > room:
+        if len(parts[-1]) > 1 and sum(narrow[j] + BORDER_WIDTH for j in [*parts[-1], k]) > room:
             parts.append([0])
         parts[-1].append(k)
     return parts
@@ -104,7 +104,7 @@ def print_written(files: Iterable[Path]) -> None:
     """Print every file written on a line of its own; many pictures share one line."""
     every = [*files]
     pictures = [file for file in every if file.suffix in _PICTURES]
-    listed = every if len(pictures) <= _FEW else [file for file in every if file not in pictures]
+    listed = every if len(pictures) <= FEW_PICTURES else [file for file in every if file not in pictures]
     for file in listed:
         print(f"wrote {one_line(str(file))}")
     if len(listed) < len(every):
@@ -115,5 +115,5 @@ def print_written(files: Iterable[Path]) -> None:
         print(f"wrote {figures} figures as {forms}")
 
 
-_PICTURES, _FEW = (".png", ".svg", ".pdf"), 6
+_PICTURES, FEW_PICTURES = (".png", ".svg", ".pdf"), 6
 """Suffixes of pictures, and the largest number of pictures listed one by one."""

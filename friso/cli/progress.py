@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Display
     from rich.progress import TaskID
 
-LINES = 10.0
+LINE_INTERVAL = 10.0
 """Time [s] between lines of progress where no terminal shows a bar."""
 
-SHARE, STEPS = 0.05, 100
+ESTIMATED_FROM_SHARE, ESTIMATED_FROM_STEPS = 0.05, 100
 """Work that must be done before the remaining time is estimated.
 
-The work is a fraction of all steps (SHARE), or a number of steps (STEPS) if fewer.
+The work is a fraction of all steps (ESTIMATED_FROM_SHARE), or a number of steps (ESTIMATED_FROM_STEPS) if fewer.
 """
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
     """A progress bar on standard error for as long as the `with` block lasts.
 
-    Where standard error is no terminal, a line is printed every `LINES` seconds.
+    Where standard error is no terminal, a line is printed every `LINE_INTERVAL` seconds.
 
     The bar is a `friso.progress.Progress`. Without a total it shows `label` and only moves. If fewer steps are done
     than before, or the total changes, new work has begun, and its time counts from there. The displayed time left never
@@ -91,7 +91,11 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def _to_go(self) -> str:
         """Return the time left in words; empty until enough is done to estimate it."""
         done = self.done - self.before
-        if not self.total or done < min(SHARE * (self.total - self.before), STEPS) or not done:
+        if (
+            not self.total
+            or done < min(ESTIMATED_FROM_SHARE * (self.total - self.before), ESTIMATED_FROM_STEPS)
+            or not done
+        ):
             return ""
         estimate = (WORK_CLOCK.now() - self.begun) * (self.total - self.done) / done
         seconds = self.shortest = min(self.shortest, estimate)
@@ -101,7 +105,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         """Print a line of progress now and then, until the block ends or the stream is closed."""
         before = ("", 0)
         with suppress(OSError, ValueError):
-            while not self.ended.wait(LINES):
+            while not self.ended.wait(LINE_INTERVAL):
                 with self._turn:
                     news = self.label, 100 * self.done // max(1, self.total)
                 if news != before:

@@ -17,7 +17,14 @@ from friso.design_method.population import Population
 from friso.design_method.settings import settings
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
-from friso.frequency.crossover import WANTED, Range, ranges_below, searched_crossovers, settled_members, shared
+from friso.frequency.crossover import (
+    COMFORTABLE_MARGIN,
+    Range,
+    ranges_below,
+    searched_crossovers,
+    settled_members,
+    shared,
+)
 from friso.frequency.family import controller_response, distance_to_lines, frequency_grid, plants, stability_by_poles
 from friso.frequency.margins import Tuning, tuning
 from friso.frequency.members import Members
@@ -26,7 +33,7 @@ from friso.frequency.system import DriveTiming
 from friso.leaf_springs.evaluation import Evaluation
 from friso.stage import Stage
 
-AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
+AROUND_A_MODE = np.sinh(np.linspace(-7.0, 7.0, 71))
 """Frequencies around a mode at which the loop is evaluated, in units of its half width."""
 
 
@@ -83,7 +90,7 @@ class Modal:
         """Return the crossovers [Hz] with a modulus margin of at least 0.5."""
         return ranges_below(
             np.geomspace(*searched_crossovers(self.flat), frequency_settings.crossover_steps),
-            lambda at: WANTED - self.margin(at),
+            lambda at: COMFORTABLE_MARGIN - self.margin(at),
         )
 
 
@@ -109,12 +116,12 @@ def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming
         for end in searched_crossovers(flat)
     ]
     zeta = float(leaves.mechanism.damping_ratio)
-    about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND) for mode in leaves.modes[1:]]
+    about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND_A_MODE) for mode in leaves.modes[1:]]
     frequencies = np.unique(np.concatenate([*ends, *about]))
     return frequencies[(frequencies > 0) & (frequencies < drive.highest)]
 
 
-RATIOS = np.geomspace(0.02, 0.7, 9)
+DAMPING_RATIOS = np.geomspace(0.02, 0.7, 9)
 """Joint dampings that are tried, as damping ratios of the stage on the joint."""
 
 
@@ -193,5 +200,5 @@ def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
 
 def dampings(flat: Mapping[str, Any]) -> np.ndarray:
     """Return the joint dampings to try [N s/m]: the stage's own, then larger ones, ascending."""
-    tried = RATIOS * 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
+    tried = DAMPING_RATIOS * 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
     return np.append(flat["joint.damping"], tried[tried > flat["joint.damping"]])

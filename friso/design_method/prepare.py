@@ -29,11 +29,11 @@ from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.stage.stage import numeric_keys
 
-STROKE = 1e-3
+FIRST_STROKE = 1e-3
 """Stroke [m] of the joint from which a search starts. `first_force_share` and `first_damping` of the settings give the
 rest."""
 
-STEEL = 190e9
+STEEL_MODULUS = 190e9
 """Young's modulus of spring steel [Pa], the default for leaves and stops."""
 
 
@@ -46,7 +46,7 @@ def split(flat: Mapping[str, Any]) -> dict[str, float]:
     return {"masses.cart": (1 - settings.stage_mass_share) * whole, "masses.stage": settings.stage_mass_share * whole}
 
 
-def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stage:
+def isolated(stage: Stage, stroke: float = FIRST_STROKE, young: float = STEEL_MODULUS) -> Stage:
     """Return the stage with a free joint: its own joint, or one from which a search starts.
 
     The new joint has a stroke [m], and stops whose stiffness follows from Young's modulus `young` [Pa]. The controller

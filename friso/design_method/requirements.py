@@ -21,7 +21,7 @@ from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.joint import first_interfering
-from friso.leaf_springs.mechanism import GRAVITY, Mechanism
+from friso.leaf_springs.mechanism import STANDARD_GRAVITY, Mechanism
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class LeafTask:
         """
         masses = self.spec.masses.stage
         heaviest = masses.high if masses else float(self.flat["masses.stage"])
-        return max(float(self.spec.load.force_x) + GRAVITY * heaviest, self.flat.get("flexure.load", 0.0))
+        return max(float(self.spec.load.force_x) + STANDARD_GRAVITY * heaviest, self.flat.get("flexure.load", 0.0))
 
 
 @dataclass(frozen=True)

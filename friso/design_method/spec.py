@@ -71,7 +71,7 @@ class OneOrMany:
         return core_schema.no_info_plain_validator_function(self.read)
 
 
-GAUGES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.2, 1.5, 2.0)
+STOCK_THICKNESSES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.2, 1.5, 2.0)
 """Thicknesses of spring strip that are usually in stock [mm]."""
 
 
@@ -89,10 +89,12 @@ class Gauges(OneOrMany):
         assert isinstance(self.of, Quantity)
         among = Span(self.of, "0.1 mm .. 0.5 mm").read(entry)
         gauges = [
-            f"{gauge:g} mm" for gauge in GAUGES if among.low <= gauge * 1e-3 * (1 + 1e-9) <= among.high * (1 + 1e-8)
+            f"{gauge:g} mm"
+            for gauge in STOCK_THICKNESSES
+            if among.low <= gauge * 1e-3 * (1 + 1e-9) <= among.high * (1 + 1e-8)
         ]
         if not gauges:
-            expected = f"a range with a usual gauge in it ({', '.join(f'{gauge:g}' for gauge in GAUGES)} mm)"
+            expected = f"a range with a usual gauge in it ({', '.join(f'{gauge:g}' for gauge in STOCK_THICKNESSES)} mm)"
             raise SpecError("", quoted(entry), expected, 'thickness = "0.1 mm .. 0.5 mm"')
         return super().read(gauges)
 

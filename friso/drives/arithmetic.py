@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from math import inf, pi
 from operator import add, mul, neg, pos, sub, truediv
 
-LONGEST = 200
+LONGEST_EXPRESSION = 200
 """Longest arithmetic expression in characters."""
 
 _NAMED: Mapping[str, float] = {
@@ -28,7 +28,7 @@ def number_in(text: str) -> float | None:
 
     Arithmetic with +, -, *, /, brackets, pi and inf is evaluated. Python code is never executed.
     """
-    if len(text) > LONGEST or _OTHER.search(text):
+    if len(text) > LONGEST_EXPRESSION or _OTHER.search(text):
         return None
     try:
         return _worked_out(ast.parse(text.strip(), mode="eval").body)

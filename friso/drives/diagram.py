@@ -12,7 +12,7 @@ from friso.stage.lists import row_keys
 ABOVE, MAIN, BELOW, LAST, LOWEST = range(5)
 """Lines of a drawing, from top to bottom."""
 
-ASIDE = 6
+SUM_DISTANCE = 6
 """Characters between a signal from below and its summing point."""
 
 
@@ -57,7 +57,7 @@ class Canvas:
             self._put(BELOW, place, "| -" if minus else "|")
             if deep:
                 self._put(LAST, place, "|")
-            self._put(LOWEST if deep else LAST, place if minus else place - ASIDE, below)
+            self._put(LOWEST if deep else LAST, place if minus else place - SUM_DISTANCE, below)
 
     def text(self) -> str:
         """Finish the drawing with output filters and force limit, and return its lines as text."""

@@ -63,8 +63,8 @@ class AxisParameters:
             value = float(entry)
         except (TypeError, ValueError, OverflowError):
             raise InputError(name, quoted(str(entry)), "a number", f"{name} = 1.0") from None
-        if abs(value) > MOST or value != value:
-            raise InputError(name, f"{value:g}", f"a number of at most {MOST:g}", f"{name} = 1.0")
+        if abs(value) > LARGEST_PARAMETER or value != value:
+            raise InputError(name, f"{value:g}", f"a number of at most {LARGEST_PARAMETER:g}", f"{name} = 1.0")
         return value
 
     def flag(self, name: str, default: bool = False) -> bool:
@@ -89,7 +89,7 @@ _NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:e[+-]?[0-9]+)?
 Unlike Python, drives accept neither underscores nor digits of other scripts. The pattern matches a run of digits in
 only one way, so that a hundred thousand take no time."""
 
-MOST = 1e30
+LARGEST_PARAMETER = 1e30
 """Largest value of a parameter."""
 
 ENDLESS = ("", "inf", "+inf", "infinity")

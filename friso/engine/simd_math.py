@@ -11,11 +11,11 @@ from math import sqrt
 
 import numpy as np
 
-_ROUNDER = 6755399441055744.0  # 1.5 * 2^52: the low bits of x + 1.5 * 2^52 are a whole number
+_ROUNDING_SHIFT = 6755399441055744.0  # 1.5 * 2^52: the low bits of x + 1.5 * 2^52 are a whole number
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
 _THREE_QUARTERS = 4604930618986332160  # the bits of 0.75
-_TWO52 = 4503599627370496.0
+_TWO_TO_52 = 4503599627370496.0
 _TWO52_BITS = 4841369599423283200
 
 
@@ -35,8 +35,8 @@ def exp(x):
     At -300 it is 1e-130, so that products with it stay normal numbers.
     """
     x = min(max(x, -300.0), 700.0)
-    shifted = x * _LOG2_E + _ROUNDER
-    rounded = shifted - _ROUNDER
+    shifted = x * _LOG2_E + _ROUNDING_SHIFT
+    rounded = shifted - _ROUNDING_SHIFT
     r = (x - rounded * _LN2_HIGH) - rounded * _LN2_LOW
     r2 = r * r
     r4 = r2 * r2
@@ -53,7 +53,7 @@ def log(x):
     bits = bits_of(x)
     exponent_bits = (bits - np.int64(_THREE_QUARTERS)) >> np.int64(52)  # rounds so that 0.75 <= m < 1.5
     m = number_of(bits - (exponent_bits << np.int64(52)))
-    exponent = number_of((exponent_bits + np.int64(2048)) | np.int64(_TWO52_BITS)) - (_TWO52 + 2048.0)
+    exponent = number_of((exponent_bits + np.int64(2048)) | np.int64(_TWO52_BITS)) - (_TWO_TO_52 + 2048.0)
     s = (m - 1.0) / (m + 1.0)
     q = s * s
     p = 1.0 / 15 + q * (1.0 / 17 + q * (1.0 / 19 + q * (1.0 / 21 + q * (1.0 / 23 + q * (1.0 / 25)))))
@@ -81,7 +81,7 @@ def quantised(x, digit):
 
     It is exact for fewer than 2^51 steps.
     """
-    rounded = digit * ((x / digit + _ROUNDER) - _ROUNDER)
+    rounded = digit * ((x / digit + _ROUNDING_SHIFT) - _ROUNDING_SHIFT)
     return rounded if digit > 0.0 else x
 
 
@@ -110,8 +110,8 @@ def gaussian(seed, tick):
     By Box and Muller (1958, doi:10.1214/aoms/1177706645). The number is at most 7.5 in size, and equal on any thread
     and in any order.
     """
-    key = mixed(np.uint64(bits_of(seed + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
-    bits = mixed(key + np.uint64(bits_of(tick + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
+    key = mixed(np.uint64(bits_of(seed + _TWO_TO_52)) * np.uint64(0x9E3779B97F4A7C15))
+    bits = mixed(key + np.uint64(bits_of(tick + _TWO_TO_52)) * np.uint64(0x9E3779B97F4A7C15))
     radius = sqrt(-2.0 * log(uniform(bits & np.uint64(0xFFFFFFFFFF000000))))
     return radius * quarter_sine(abs(uniform(bits << np.uint64(40)) - 0.5) - 0.25)
 
@@ -133,5 +133,5 @@ def sine(turn):
     The absolute error is below 1e-11, plus the rounding of the turn.
     """
     quarter_later = turn + 0.25
-    within = quarter_later - ((quarter_later - 0.5 + _ROUNDER) - _ROUNDER)  # 0 to 1
+    within = quarter_later - ((quarter_later - 0.5 + _ROUNDING_SHIFT) - _ROUNDING_SHIFT)  # 0 to 1
     return quarter_sine(0.25 - abs(within - 0.5))

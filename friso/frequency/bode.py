@@ -108,7 +108,7 @@ def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming)
     return at
 
 
-PRESCRIBED = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+PRESCRIBED_SPEEDS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 """Speeds of the cart [m/s] at which the open loop is shown, from stuck to sliding fast (thesis, Fig. 8)."""
 
 
@@ -175,7 +175,7 @@ class Bode:
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
-        """Return the loops at the speeds `PRESCRIBED` of the cart, with a free limiter if possible."""
+        """Return the loops at the speeds `PRESCRIBED_SPEEDS` of the cart, with a free limiter if possible."""
         return _prescribed(self.stage.flat(), self.omega)
 
     @property
@@ -294,11 +294,11 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
     if flat["friction.model"] == "none":
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
-    states = Members.joined([member(speed, touched=touched) for speed in PRESCRIBED])
+    states = Members.joined([member(speed, touched=touched) for speed in PRESCRIBED_SPEEDS])
     stable = spectral_abscissa(flat, states) < 0
     return tuple(
         Prescribed(speed, response(flat, states[k], DriveTiming.of(flat))(omega), bool(stable[k]))
-        for k, speed in enumerate(PRESCRIBED)
+        for k, speed in enumerate(PRESCRIBED_SPEEDS)
     )
 
 

@@ -31,7 +31,7 @@ from friso.frequency.settings import settings
 from friso.frequency.system import Complex, DriveTiming
 from friso.stage import Stage
 
-GRID = np.geomspace(0.01, 1e4, 800)
+BANDWIDTH_FREQUENCIES = np.geomspace(0.01, 1e4, 800)
 """Frequencies [Hz] at which loops are evaluated for their bandwidth; more lie near resonances of the stage."""
 
 
@@ -75,7 +75,7 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
     gain is a power of frequency in between. If the gains at standstill differ, the larger bandwidth counts.
     """
     flat, sliding = stage.flat(), _sliding(stage.flat())
-    omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
+    omega = with_resonances(2 * np.pi * BANDWIDTH_FREQUENCIES, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
     machines = sliding.repeated(count)
     return np.fmax.reduce([_last_falls(state, machines, omega) for state in gain_states({**flat, **changes})])
 
@@ -101,7 +101,7 @@ def _sliding(flat: Mapping[str, Any]) -> Members:
     return next(case for name, case in limit_cases(flat).items() if not name.startswith("stuck"))
 
 
-EVENLY, NEAR = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
+EVENLY, NEAR_ZERO = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
 """Where a step that contains an end is divided: evenly, and near the zero of a straight line, as fractions of the
 step."""
 
@@ -133,7 +133,7 @@ def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.n
     while np.log(at[-1] / at[0]) > precise:
         with np.errstate(invalid="ignore"):
             zero = np.nan_to_num(values[0] / (values[0] - values[-1]), nan=0.5)
-        shares = np.unique(np.clip(np.append(EVENLY, zero + NEAR), 0.0005, 0.9995))
+        shares = np.unique(np.clip(np.append(EVENLY, zero + NEAR_ZERO), 0.0005, 0.9995))
         places = at[0] * (at[-1] / at[0]) ** shares
         at, values = np.array([at[0], *places, at[-1]]), np.array([values[0], *excess(places), values[-1]])
         k = int(((values < 0) != (values[0] < 0)).argmax())
@@ -141,7 +141,7 @@ def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.n
     return float(np.sqrt(at[0] * at[1]))
 
 
-WANTED = 0.5
+COMFORTABLE_MARGIN = 0.5
 """Modulus margin that counts as comfortable: a peak sensitivity of 2, 6 dB."""
 
 
@@ -181,7 +181,7 @@ def limits(flat: Mapping[str, Any]) -> Limits:
     search = _Search(flat, settled_members(flat))
     ends, crossover = search.ends, _stated(flat)
     stable = search.stable()
-    close = ranges_below(search.at, lambda f: WANTED - search.distance(f).min(axis=1))
+    close = ranges_below(search.at, lambda f: COMFORTABLE_MARGIN - search.distance(f).min(axis=1))
     comfortable = shared(close, stable)
     highest, calm = (range_end(ranges, crossover) for ranges in (stable, comfortable))
     above, beyond = (np.array([end * (1 + settings.crossover_nudge) if end else crossover]) for end in (highest, calm))

@@ -37,7 +37,7 @@ from friso.frequency.system import Complex, DriveTiming, System
 _T = TypeVar("_T")
 
 
-NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+BESIDE_RESONANCE = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Frequencies about a closed-loop resonance at which it is evaluated, in half widths."""
 
 
@@ -161,7 +161,10 @@ def about_resonances(system: Poles) -> np.ndarray:
         return np.full((len(system.closed), 1), np.nan)
     closed = system.in_s
     light = (closed.imag > 0) & (np.abs(closed.real) < settings.light_damping * closed.imag)
-    omega = np.where(light, closed.imag, np.nan)[:, :, None] + NEAR * np.where(light, closed.real, np.nan)[:, :, None]
+    omega = (
+        np.where(light, closed.imag, np.nan)[:, :, None]
+        + BESIDE_RESONANCE * np.where(light, closed.real, np.nan)[:, :, None]
+    )
     return np.clip(omega, 0, system.drive.highest).reshape(len(closed), -1)
 
 

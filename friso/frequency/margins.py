@@ -23,7 +23,7 @@ from friso.frequency.system import Complex, DriveTiming, resonances
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import numeric_keys
 
-AROUND = np.tan(np.linspace(-1.5, 1.5, 15))
+AROUND_RESONANCE = np.tan(np.linspace(-1.5, 1.5, 15))
 """Frequencies about a resonance at which the loop is evaluated, in units of its half width."""
 
 
@@ -115,7 +115,7 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
     `resonant` are poles [rad/s], of which the lightly damped ones count. The shape is (k,).
     """
     light = resonances(np.concatenate([roots.ravel() for roots in resonant]))
-    near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
+    near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND_RESONANCE).ravel()
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
 
@@ -249,7 +249,7 @@ class Tuning:
         return self.margins.crossovers[-1]
 
 
-EXAMPLE, MOST = "friso.tuning(8.0, 0.1, 2.0, 1.7)", 1e30
+EXAMPLE, LARGEST_ARGUMENT = "friso.tuning(8.0, 0.1, 2.0, 1.7)", 1e30
 """Example call, and the largest number of any of its arguments."""
 
 
@@ -268,8 +268,10 @@ def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     """
     arguments = {"crossover": crossover, "alpha": alpha, "beta": beta, "mass": mass}
     for name, value in arguments.items():
-        if not 1 / MOST <= value <= MOST:
-            raise InputError(name, f"{value:g}", f"a number from {1 / MOST:g} to {MOST:g}", EXAMPLE)
+        if not 1 / LARGEST_ARGUMENT <= value <= LARGEST_ARGUMENT:
+            raise InputError(
+                name, f"{value:g}", f"a number from {1 / LARGEST_ARGUMENT:g} to {LARGEST_ARGUMENT:g}", EXAMPLE
+            )
     flat = {"friction.model": "none", "masses.stage": mass, **tuned(crossover, alpha, beta, mass)}
     for key, item in numeric_keys({**flat, "motion.kind": "hold"}).items():
         if key in flat and not item.bound.holds(flat[key]):

@@ -193,7 +193,7 @@ def _printed(flat: Mapping[str, Any], joint: str, limiter: str) -> Any:
     return in_series(joint_value, limiter_value) if joint_value + limiter_value else joint_value
 
 
-BIASES, SPEEDS = 65, 257
+BIAS_COUNT, SPEED_COUNT = 65, 257
 """Bias forces and speeds in a family, for each state of the limiter."""
 
 
@@ -290,7 +290,7 @@ def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
     }
 
 
-def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS) -> Members:
+def family(flat: Mapping[str, Any], biases: int = BIAS_COUNT, speeds_: int = SPEED_COUNT) -> Members:
     """Return states near and between all limit cases of a stage, stuck and sliding.
 
     Stuck ones bear `biases` different bias forces up to nearly break-away, for and against the motion. Sliding ones

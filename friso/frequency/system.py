@@ -117,7 +117,7 @@ SLOW_LOOPS = tuple(f"drive.{name}_sample_time" for name in LOOPS)
 PADE_6 = tuple(comb(6, k) / (comb(12, k) * factorial(k)) for k in range(7))
 """Coefficients of the numerator of Pade's approximation of order 6 to the exponential."""
 
-SCALED = 0.5
+SCALED_NORM = 0.5
 """Norm to which matrices are scaled for the exponential, whose relative error is then below 1e-16."""
 
 
@@ -296,7 +296,7 @@ def exponentials(matrices: np.ndarray) -> np.ndarray:
     takes them one by one.
     """
     norm = np.abs(matrices).sum(axis=-2).max()
-    squarings = max(0, int(np.ceil(np.log2(norm / SCALED)))) if norm > 0 else 0
+    squarings = max(0, int(np.ceil(np.log2(norm / SCALED_NORM)))) if norm > 0 else 0
     scaled, identity = matrices / 2.0**squarings, np.eye(matrices.shape[-1])
     power, even, odd = identity, identity * 0.0, identity * 0.0
     for k, weight in enumerate(PADE_6):

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, t_value
 from friso.identification.settings import identification_settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 Correlated = tuple[Sequence[Estimate], np.ndarray]
 """Estimates of one experiment that have a value, and their correlation matrix, shape (estimates, estimates)."""
@@ -68,7 +68,7 @@ def determined(estimates: Sequence[Estimate]) -> list[Estimate]:
 
 def _weight(estimate: Estimate) -> float:
     """Return the weight of an estimate: one over its variance."""
-    return (COVERAGE / estimate.half_width) ** 2
+    return (NORMAL_COVERAGE / estimate.half_width) ** 2
 
 
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
@@ -87,10 +87,10 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     squares = float(np.sum(weights * (values - mean) ** 2))
     method = ", ".join(dict.fromkeys(estimate.method for estimate in estimates))
     if chi2.sf(squares, freedom) > identification_settings.chance_of_agreement:
-        errors = np.array([(estimate.half_width - estimate.systematic) / COVERAGE for estimate in estimates])
+        errors = np.array([(estimate.half_width - estimate.systematic) / NORMAL_COVERAGE for estimate in estimates])
         error = float(np.linalg.norm(weights * errors)) / float(weights.sum())
         ratio = (squares / freedom) ** 0.5
-        wider = ratio * t_value(freedom) if ratio > 1 and freedom > 1 else COVERAGE * max(ratio, 1.0)
+        wider = ratio * t_value(freedom) if ratio > 1 and freedom > 1 else NORMAL_COVERAGE * max(ratio, 1.0)
         half = wider * error + shared
         return Estimate(key, estimates[0].unit, mean, mean - half, mean + half, method, systematic=shared), True
     if freedom == 1:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 NO_INTERVAL = "how far off it may be is not known"
 """Reason given for a value that counts as not determined because it has no finite interval."""
@@ -44,7 +44,7 @@ class Estimate:
 
         `deviation` is its standard deviation, in the `unit` of the `value`. `name` and `method` are stored.
         """
-        half = COVERAGE * deviation
+        half = NORMAL_COVERAGE * deviation
         return cls(name, unit, float(value), float(value - half), float(value + half), method)
 
     @classmethod

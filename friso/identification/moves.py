@@ -36,7 +36,7 @@ from friso.identification.spread import binned, correlation_length
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
-FITTED, REPEATED = 0.8, 0.92
+FITTED_SHARE, REPEATED_SHARE = 0.8, 0.92
 """Fractions of the analysis that are done after the fit, and after its repetition on simulated logs. Fits of either
 direction alone are the last step.
 """
@@ -116,17 +116,19 @@ def identify_moves(
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
     noise = noise_of(log["force"][part])
-    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, between(progress, 0, FITTED))
+    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, between(progress, 0, FITTED_SHARE))
     fit = answer.fit
     fitted = FittedCase(log, inverse, share, flat=flat, fit=fit, velocity=moved.velocity)
     leading = leading_effect(fitted) if fit.left > fit.problem.noise_left(noise) else None
     quality = quality_of(log, inverse, fit, noise, share, leading is not None)
     if not fit.problem.closed:
-        fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, between(progress, FITTED, REPEATED))
+        fit = as_far_off_as_repeated(
+            fit, log, part, inverse.bandwidth, noise, between(progress, FITTED_SHARE, REPEATED_SHARE)
+        )
         fit = fit if fit.explains(noise) else late_by_a_sample(fit)
     case = FitCase(
         log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
-        leading=None if quality.seen else leading, progress=between(progress, REPEATED, 1),
+        leading=None if quality.seen else leading, progress=between(progress, REPEATED_SHARE, 1),
     )  # fmt: skip
     doubted = judged_fit(case)
     inverse, quality, answer = doubted.inverse, doubted.quality, replace(answer, fit=doubted.fit)

@@ -16,7 +16,7 @@ from friso.errors import InputError
 from friso.quantities import Number, Quantity, Value, any_sign, as_toml, positive, quoted
 from friso.stage.motion import DURATION, Motion, Piece, register_motion
 from friso.stage.section import Rule
-from friso.stage.tables import ROUNDING
+from friso.stage.tables import TIME_ROUNDING
 
 FILE, REFERENCE, TIME, UNIT, SAMPLE_TIME, SCALE, BETWEEN = (
     f"motion.{name}" for name in ("file", "reference", "time", "unit", "sample_time", "scale", "between")
@@ -54,7 +54,7 @@ class Recorded(Motion):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             (FILE, DURATION),
-            lambda f: _samples(f)[0][-1] <= f[DURATION] * (1 + ROUNDING),
+            lambda f: _samples(f)[0][-1] <= f[DURATION] * (1 + TIME_ROUNDING),
             "a duration in which the record ends; left out, it is that of the record",
             'duration = "20 s"',
         ),

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.stats import t as student
 
 from friso.identification.settings import identification_settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
-CONFIDENCE = 0.975
+UPPER_PROBABILITY = 0.975
 """Cumulative probability at the upper end of a 95 % interval, for Student's t."""
 
 
@@ -114,7 +114,7 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
     power = np.bincount(members, (scores**2).sum(axis=1), len(names))
     equal = power.sum() ** 2 / (power @ power) if power.any() else 1.0
     freedom = max(equal - 1, identification_settings.least_freedom_of_groups)
-    wider = float(student.ppf(CONFIDENCE, freedom)) / COVERAGE
+    wider = float(student.ppf(UPPER_PROBABILITY, freedom)) / NORMAL_COVERAGE
     return wider**2 * (1 + 1 / freedom) * (sums.T @ sums)
 
 

@@ -29,7 +29,7 @@ A folder that a killed process left behind is deleted by the next command."""
 
 _LOCK = "lock"
 
-_LEVELS = 4
+SEARCHED_LEVELS = 4
 """Number of parent folders in which leftover drafts are searched; no command writes deeper below its output folder."""
 
 
@@ -105,7 +105,7 @@ class Drafts:
 
         Folders further up are searched as well, since the folder of the file may not have existed.
         """
-        for folder in {*path.absolute().parents[:_LEVELS]} - self.tidied:
+        for folder in {*path.absolute().parents[:SEARCHED_LEVELS]} - self.tidied:
             self.tidied.add(folder)
             if folder.is_dir():
                 remove_leftovers(folder, DRAFTS, _LOCK)

@@ -61,7 +61,7 @@ ChannelUnits: TypeAlias = Changes
 RoleScales: TypeAlias = Changes
 """Dictionaries, or texts NAME=VALUE: expressions by key, channels by role, units by channel, scales by role."""
 
-_NAMED = 3
+MOST_NAMED = 3
 """Largest number of uncertain keys that a message names."""
 
 LOGGER = logging.getLogger("friso")
@@ -128,7 +128,7 @@ def read_stage(
     keys = [] if uncertain_too else [*stage.uncertain()]
     if keys:
         several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"
-        named = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
+        named = ", ".join([*keys[:MOST_NAMED], *(["..."] if len(keys) > MOST_NAMED else [])])
         centres = "their centres are" if len(keys) > 1 else "its centre is"
         LOGGER.warning(
             f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range"

@@ -341,11 +341,11 @@ def _entries(folder: Path) -> list[str]:
 
 def _first_names(names: Sequence[str]) -> str:
     """Write the first of some names, and how many more there are."""
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MOST_LISTED
+    return ", ".join(names[:MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-_LISTED = 8
+MOST_LISTED = 8
 
 
 def _check_writable(folder: Path) -> None:

@@ -13,13 +13,13 @@ import numpy as np
 from scipy.linalg import eigh
 
 from friso.leaf_springs import plate
-from friso.leaf_springs.beam_system import COORDINATES, LeafBeams
+from friso.leaf_springs.beam_system import NODE_COORDINATES, LeafBeams
 from friso.leaf_springs.closed_forms import axial, body_mass
 from friso.leaf_springs.evaluation import Mode
 from friso.leaf_springs.mechanism import Mechanism
 from friso.leaf_springs.settings import settings
 
-KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
+COUPLED_KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
 """Coordinates of a node that couple while the leaf is straight, with the number of modes between held ends: bending,
 bending in its plane, torsion, stretching."""
 
@@ -48,22 +48,22 @@ class Reduced:
         `stiffness` [N/m, N, N m] and `mass` [kg, kg m, kg m^2] are those of its nodes. The torsion of the beam is
         replaced by the torsion of a plate.
         """
-        size, twisted = len(stiffness), (slice(3, None, COORDINATES),) * 2
+        size, twisted = len(stiffness), (slice(3, None, NODE_COORDINATES),) * 2
         stiffness, mass = stiffness.copy(), mass.copy()
-        stiffness[twisted], mass[twisted] = _torsion(mechanism, size // COORDINATES)
-        static, parts, squares = np.zeros((size, COORDINATES)), [], []
-        static[-COORDINATES:] = np.eye(COORDINATES)
-        for kind, number in KINDS:
-            inside = np.add.outer(np.arange(COORDINATES, size - COORDINATES, COORDINATES), kind).ravel()
+        stiffness[twisted], mass[twisted] = _torsion(mechanism, size // NODE_COORDINATES)
+        static, parts, squares = np.zeros((size, NODE_COORDINATES)), [], []
+        static[-NODE_COORDINATES:] = np.eye(NODE_COORDINATES)
+        for kind, number in COUPLED_KINDS:
+            inside = np.add.outer(np.arange(NODE_COORDINATES, size - NODE_COORDINATES, NODE_COORDINATES), kind).ravel()
             clamped = stiffness[np.ix_(inside, inside)]
-            static[inside] = -np.linalg.solve(clamped, stiffness[inside, -COORDINATES:])
+            static[inside] = -np.linalg.solve(clamped, stiffness[inside, -NODE_COORDINATES:])
             values, vectors = eigh(clamped, mass[np.ix_(inside, inside)])
             shapes = np.zeros((size, min(number, len(values))))
             shapes[inside] = vectors[:, :number]
             parts.append(shapes)
             squares.append(values[:number])
         inner, moved = np.hstack(parts), mass @ static
-        shapes = (matrix.reshape(-1, COORDINATES, matrix.shape[1]) for matrix in (static, inner))
+        shapes = (matrix.reshape(-1, NODE_COORDINATES, matrix.shape[1]) for matrix in (static, inner))
         at_end = static.T @ stiffness @ static, static.T @ moved, inner.T @ moved
         return cls(*shapes, np.concatenate(squares), *at_end)
 
@@ -101,23 +101,25 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     """
     ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
     count = len(leaf.squares)
-    size = COORDINATES + count * len(rows)
+    size = NODE_COORDINATES + count * len(rows)
     stiffness, mass = np.zeros((size, size)), np.eye(size)
-    stage = slice(0, COORDINATES)
+    stage = slice(0, NODE_COORDINATES)
     stiffness[stage, stage] = _gathered(ends, leaf.stiffness)
     body = body_mass(mechanism)
     mass[stage, stage] = body + _gathered(ends, leaf.mass)
-    np.fill_diagonal(stiffness[COORDINATES:, COORDINATES:], np.tile(leaf.squares, len(rows)))
+    np.fill_diagonal(stiffness[NODE_COORDINATES:, NODE_COORDINATES:], np.tile(leaf.squares, len(rows)))
     # pattern k of the leaves acts with the weights rows[k]
-    mass[COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(-1, COORDINATES)
-    mass[stage, COORDINATES:] = mass[COORDINATES:, stage].T
+    mass[NODE_COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(
+        -1, NODE_COORDINATES
+    )
+    mass[stage, NODE_COORDINATES:] = mass[NODE_COORDINATES:, stage].T
     squares, vectors = eigh(stiffness, mass)
     lowest = []
     for square, vector in zip(squares, vectors.T, strict=True):
         moves = vector[stage] @ body @ vector[stage] > settings.stage_energy_share
         if len(lowest) >= settings.reported_modes and not moves:
             continue
-        amplitudes = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
+        amplitudes = rows.T @ vector[NODE_COORDINATES:].reshape(len(rows), count)
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
         moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], amplitudes)
         sign = 1.0 if moved.flat[np.argmax(np.abs(moved))] >= 0 else -1.0  # of the largest displacement of a leaf
@@ -132,7 +134,7 @@ def end_motions(offsets: np.ndarray) -> np.ndarray:
 
     `offsets` [m], shape (leaves,), are the places of the leaves along z.
     """
-    ends = np.tile(np.eye(COORDINATES), (len(offsets), 1, 1))
+    ends = np.tile(np.eye(NODE_COORDINATES), (len(offsets), 1, 1))
     ends[:, 0, 4], ends[:, 1, 3] = offsets, -offsets
     return ends
 
@@ -160,12 +162,12 @@ def buckling_load(mechanism: Mechanism, leaves: LeafBeams, straight: np.ndarray,
 
     `straight` is the stiffness of a leaf without load. `load` [N] is a guess, at which the problem is linearised.
     """
-    state = np.zeros((1, leaves.nodes, COORDINATES))
+    state = np.zeros((1, leaves.nodes, NODE_COORDINATES))
     strain = load / float(mechanism.leaves * axial(mechanism))
     state[:, :, 0] = -strain * np.linspace(0, float(mechanism.length), leaves.nodes)
     loaded = leaves.stiffness(state)[0]
     # all leaves bend identically; the stage's pitch stretches them
-    moving = np.add.outer(np.arange(COORDINATES, len(straight), COORDINATES), (2, 4)).ravel()
+    moving = np.add.outer(np.arange(NODE_COORDINATES, len(straight), NODE_COORDINATES), (2, 4)).ravel()
     without, with_load = (int(mechanism.leaves) * matrix[np.ix_(moving, moving)] for matrix in (straight, loaded))
     softening = without - with_load
     without[-1, -1] += axial(mechanism) / mechanism.length * mechanism.offset_squares

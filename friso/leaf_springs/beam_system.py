@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from friso.leaf_springs import plate
-from friso.leaf_springs.closed_forms import SHEAR, axial, edgewise_shear
+from friso.leaf_springs.closed_forms import SHEAR_COEFFICIENT, axial, edgewise_shear
 from friso.leaf_springs.mechanism import Mechanism
 
-ELEMENTS = 16
+LEAF_ELEMENTS = 16
 """Elements along a leaf; its modes are reported at the nodes between them."""
 
-COORDINATES = 6
+NODE_COORDINATES = 6
 """Coordinates of a node: displacements along x, y, z and angles of successive rotations about them."""
 
 
@@ -40,7 +40,7 @@ class LeafBeams:
     cart end first.
     """
 
-    def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:
+    def __init__(self, mechanism: Mechanism, elements: int = LEAF_ELEMENTS) -> None:
         """Build one leaf with the given number of elements in exudyn."""
         self.count, self.nodes = int(mechanism.leaves), elements + 1
         import exudyn  # package of an extra
@@ -66,7 +66,7 @@ class LeafBeams:
 
     def mass(self) -> np.ndarray:
         """Return the mass matrix of an undeflected leaf, shape (6 * nodes, 6 * nodes)."""
-        self._move(np.zeros((self.nodes, COORDINATES)))
+        self._move(np.zeros((self.nodes, NODE_COORDINATES)))
         self._solver.ComputeMassMatrix(self._system)
         return np.array(self._solver.GetSystemMassMatrix())
 
@@ -114,7 +114,7 @@ class Configuration:
         """
         x, z, turn = self.stage
         leaves, inner, _ = self.inner.shape
-        state = np.zeros((leaves, inner + 2, COORDINATES))
+        state = np.zeros((leaves, inner + 2, NODE_COORDINATES))
         state[:, 1:-1, 0::2] = self.inner
         state[:, -1, 0] = x + np.sin(turn) * offsets
         state[:, -1, 2] = z + (np.cos(turn) - 1) * offsets
@@ -146,7 +146,7 @@ class Condensed:
         leaf ends follow the stage. If the stage turns, the leaf ends move along arcs. `bend` has the index of this
         rotation, and the stiffness [N m/rad] that the forces at the ends add to it.
         """
-        matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
+        matrices = stiffness[:, NODE_COORDINATES + which :: 2, NODE_COORDINATES + which :: 2]
         out = forces[:, 1:, which::2].reshape(len(forces), -1)
         inside, border = slice(None, -3), slice(-3, None)
         back = np.swapaxes(ends, 1, 2)
@@ -181,7 +181,7 @@ def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
     `curl` and `twist` are the compliances in bending and torsion relative to a plain beam.
     """
     weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
-    shears = (edgewise_shear(mechanism), strong), (SHEAR * mechanism.shear * mechanism.area, weak)
+    shears = (edgewise_shear(mechanism), strong), (SHEAR_COEFFICIENT * mechanism.shear * mechanism.area, weak)
     torsion = mechanism.torsional_rigidity / twist
     edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for shear, bending in shears)
     bulge = mechanism.area * h**2 / 6
@@ -195,7 +195,7 @@ def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
     return section
 
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def _inside(h: float, middles: np.ndarray) -> np.ndarray:
@@ -203,7 +203,7 @@ def _inside(h: float, middles: np.ndarray) -> np.ndarray:
 
     Elements of length `h` [m] have their `middles` [m], shape (elements,), counted from the middle of the leaf.
     """
-    return middles[:, None] + _POINTS * h / 2
+    return middles[:, None] + GAUSS_POINTS * h / 2
 
 
 def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
@@ -213,7 +213,7 @@ def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     """
     s = _inside(h, middles)
     compliance = plate.compliance_profile(s, *mechanism.plate_shape)
-    return (compliance * s**2) @ _WEIGHTS / (s**2 @ _WEIGHTS)
+    return (compliance * s**2) @ GAUSS_WEIGHTS / (s**2 @ GAUSS_WEIGHTS)
 
 
 def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
@@ -228,6 +228,6 @@ def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     stiffness along y vanish).
     """
     s, end = 2 * _inside(h, middles) / mechanism.length, 2 * middles / mechanism.length
-    even = plate.free_twist(s * mechanism.length / 2, *mechanism.plate_shape) @ _WEIGHTS / 2
-    odd = (plate.cubic_twist(s, *mechanism.plate_shape) * s**3) @ _WEIGHTS / 2
+    even = plate.free_twist(s * mechanism.length / 2, *mechanism.plate_shape) @ GAUSS_WEIGHTS / 2
+    odd = (plate.cubic_twist(s, *mechanism.plate_shape) * s**3) @ GAUSS_WEIGHTS / 2
     return plate.tilted(even, end**3 + end * (2 * h / mechanism.length) ** 2 / 2, end, odd.sum())

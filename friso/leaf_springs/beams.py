@@ -13,7 +13,7 @@ import numpy as np
 
 from friso.leaf_springs import closed_forms, plate
 from friso.leaf_springs.beam_modes import Reduced, buckling_load, modes
-from friso.leaf_springs.beam_system import ELEMENTS, BeamFailure, Condensed, Configuration, LeafBeams
+from friso.leaf_springs.beam_system import LEAF_ELEMENTS, BeamFailure, Condensed, Configuration, LeafBeams
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
 from friso.leaf_springs.settings import settings
@@ -36,7 +36,7 @@ class HeldEquilibrium:
     stiffness: np.ndarray
 
 
-def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Evaluation:
+def beams(mechanism: Mechanism, stroke: float, elements: int = LEAF_ELEMENTS) -> Evaluation:
     """Evaluate the mechanism at even deflections up to the stroke [m], 5 by default.
 
     Raises BeamFailure where the mechanism has no equilibrium, or has numbers that are not positive.

@@ -14,17 +14,17 @@ import numpy as np
 from friso.leaf_springs import plate
 from friso.leaf_springs.mechanism import Mechanism
 
-SHEAR = 5 / 6
+SHEAR_COEFFICIENT = 5 / 6
 """Fraction of a rectangle's area that carries shear (Timoshenko's coefficient)."""
 
-CLAMPED = 4.730040744862704
+CLAMPED_ROOT = 4.730040744862704
 """First root of cos x cosh x = 1: a beam between clamps."""
 
 WITH_STAGE, WITH_TURN = 0.41543, 0.08939
 """Mean over a leaf of its first bending mode, which has mean square 1, times a static shape of the leaf: the shape when
 the stage moves along the motion, and the shape when it turns about the width (per length of the leaf)."""
 
-LATERAL = 9.229
+LATERAL_BUCKLING = 9.229
 """Force across the end of a leaf, over sqrt(E I G J)/L^2, at which the leaf gives way sideways: it twists and bends.
 theta'' = -p^2 m (m theta - mean of m theta), m = 1 - x/L, theta = 0 at both clamps, the stage free to follow."""
 
@@ -53,7 +53,7 @@ def axial(mechanism: Mechanism) -> Any:
 
 def edgewise_shear(mechanism: Mechanism) -> Any:
     """Return the shear stiffness of a leaf in its plane, 5/6 G A [N], stiffened by its clamps."""
-    return SHEAR * mechanism.shear * mechanism.area * plate.edgewise_shear_factor(*mechanism.plate_shape)
+    return SHEAR_COEFFICIENT * mechanism.shear * mechanism.area * plate.edgewise_shear_factor(*mechanism.plate_shape)
 
 
 def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
@@ -118,7 +118,7 @@ def leaf_bending(mechanism: Mechanism) -> Any:
     It is 1.028 t/L^2 sqrt(E/rho), raised because a plate is stiffer than a beam.
     """
     speed = np.sqrt(mechanism.young * mechanism.bending / (mechanism.density * mechanism.area))
-    return CLAMPED**2 / (2 * np.pi * mechanism.length**2) * speed * np.sqrt(_mode_stiffening(mechanism))
+    return CLAMPED_ROOT**2 / (2 * np.pi * mechanism.length**2) * speed * np.sqrt(_mode_stiffening(mechanism))
 
 
 def _mode_stiffening(mechanism: Mechanism) -> Any:
@@ -151,7 +151,7 @@ def lateral_load(mechanism: Mechanism) -> Any:
     The force acts at the leaf ends, on all leaves together.
     """
     rigidity = np.sqrt(mechanism.young * mechanism.bending * mechanism.torsional_rigidity)
-    return mechanism.leaves * LATERAL * rigidity / mechanism.length**2
+    return mechanism.leaves * LATERAL_BUCKLING * rigidity / mechanism.length**2
 
 
 def stage_stiffness(mechanism: Mechanism) -> np.ndarray:

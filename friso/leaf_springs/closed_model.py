@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from friso.leaf_springs import closed_forms, plate
-from friso.leaf_springs.closed_forms import CLAMPED, SHEAR, axial, edgewise_shear
+from friso.leaf_springs.closed_forms import CLAMPED_ROOT, SHEAR_COEFFICIENT, axial, edgewise_shear
 from friso.leaf_springs.evaluation import Evaluation, Mode
 from friso.leaf_springs.mechanism import Mechanism
 from friso.leaf_springs.settings import settings
@@ -99,8 +99,8 @@ def _unlike(mechanism: Mechanism) -> list[Mode]:
 
 def _clamped_shape() -> np.ndarray:
     """Return the first bending mode of a clamped beam at even places, with mean square 1."""
-    x = CLAMPED * np.linspace(0.0, 1.0, settings.mode_shape_points)
-    ratio = (np.cosh(CLAMPED) - np.cos(CLAMPED)) / (np.sinh(CLAMPED) - np.sin(CLAMPED))
+    x = CLAMPED_ROOT * np.linspace(0.0, 1.0, settings.mode_shape_points)
+    ratio = (np.cosh(CLAMPED_ROOT) - np.cos(CLAMPED_ROOT)) / (np.sinh(CLAMPED_ROOT) - np.sin(CLAMPED_ROOT))
     return np.cosh(x) - np.cos(x) - ratio * (np.sinh(x) - np.sin(x))
 
 
@@ -146,7 +146,7 @@ def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndar
     in the integral along x, lengthened by the `slope` of the leaf. All arguments have the shape (points,).
     """
     s = x - mechanism.length / 2
-    sheared = 1 / (SHEAR * mechanism.shear * mechanism.area)
+    sheared = 1 / (SHEAR_COEFFICIENT * mechanism.shear * mechanism.area)
     shape, ends = mechanism.plate_shape, 2 * s / mechanism.length
     compliance = (plate.cubic_twist(ends, *shape) * ends**3) @ weight
     free = plate.tilted(plate.free_twist(s, *shape) * weight, ends**3, ends, compliance) / weight

@@ -17,10 +17,10 @@ from friso.leaf_springs.plate import torsion_constant
 
 AXES = ("x", "y", "z")
 
-GRAVITY = 9.80665
+STANDARD_GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s^2]."""
 
-ALUMINIUM = 2700.0
+ALUMINIUM_DENSITY = 2700.0
 """Density [kg/m^3] of the cube that stands in for a stage whose inertia is not given."""
 
 
@@ -105,7 +105,7 @@ class Mechanism:
     @property
     def weight(self) -> Any:
         """Return the weight of the stage [N]."""
-        return GRAVITY * self.body.mass
+        return STANDARD_GRAVITY * self.body.mass
 
     @property
     def shear(self) -> Any:
@@ -163,7 +163,7 @@ def cube_inertia(mass: Any) -> tuple[Any, Any, Any]:
 
     The cube stands in for a stage of unknown inertia. It does not depend on the leaves.
     """
-    moment = mass / 6 * (mass / ALUMINIUM) ** (2 / 3)
+    moment = mass / 6 * (mass / ALUMINIUM_DENSITY) ** (2 / 3)
     return moment, moment, moment
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from friso.leaf_springs.settings import settings
 
-CONVERGED, PEAK = 0.878, 0.63
+CONVERGED_STIFFENING, CONVERGED_PEAK = 0.878, 0.63
 """Fractions that remain with more functions across the width: of the stiffening (0.866 to 0.895 at a Poisson's ratio of
 0.3, 0.854 to 0.909 from 0.05 to 0.45), and of the excess stress (0.60, for square leaves 0.65). They hold for leaves
 from 1 to 6 times as long as wide (tests/ritz.py)."""
@@ -99,7 +99,7 @@ def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
     decays = zip(curl.rates, curl.weights, strict=True)
     reduction = sum(weight * _moment_of(rate, length, odd) for rate, weight in decays)
     compliance = 1 + share * (1 - reduction / beam)
-    return 1 + CONVERGED * (1 / ((1 - poisson**2) * compliance) - 1)
+    return 1 + CONVERGED_STIFFENING * (1 / ((1 - poisson**2) * compliance) - 1)
 
 
 def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
@@ -110,7 +110,9 @@ def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     curl = Curl.of(length, width, poisson, odd=True)
     stiff = 1 - (1 - poisson**2) * curl.curvature(s, length) / s
     factor = stiffening(length, width, poisson)
-    return 1 - stiff * (CONVERGED + factor - 1) / factor  # fraction of `stiff` that remains with more functions
+    return (
+        1 - stiff * (CONVERGED_STIFFENING + factor - 1) / factor
+    )  # fraction of `stiff` that remains with more functions
 
 
 def _moment_of(rate: Any, length: Any, odd: bool) -> Any:
@@ -129,7 +131,7 @@ def stress_factors(length: Any, width: Any, poisson: Any) -> tuple[Any, Any]:
     half = length / 2
     mean = stiffening(length, width, poisson)
     uncurling = poisson / (1 - poisson**2) * curl.shape(half, length, derivative=2) * width**2 / 24
-    return mean, 1 + PEAK * (mean * (1 + uncurling / half) - 1)
+    return mean, 1 + CONVERGED_PEAK * (mean * (1 + uncurling / half) - 1)
 
 
 def warping_rate(width: Any, poisson: Any) -> Any:

@@ -17,7 +17,7 @@ from contextlib import suppress
 from threading import Thread, Timer
 from typing import Any
 
-PATIENCE = 60.0
+QUESTION_WAIT = 60.0
 """Time [s] to wait for the next question. Longer waits keep 150 MB per process."""
 
 
@@ -71,7 +71,7 @@ def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> Non
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C on a terminal: the parent ends this process
     answers, sys.stdout = sys.stdout, sys.stderr  # output of plug-ins must not mix with answers
     while True:
-        patience = Timer(PATIENCE, os._exit, (0,))
+        patience = Timer(QUESTION_WAIT, os._exit, (0,))
         patience.daemon = True
         patience.start()
         try:

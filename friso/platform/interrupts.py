@@ -23,10 +23,10 @@ from friso.platform import early
 from friso.platform.early import SIGNALS
 from friso.platform.system import interrupts_held, no_signal_later, signal_later, signals_told
 
-_AGAIN = 0.02
+IMPORT_CHECK_INTERVAL = 0.02
 """Interval [s] between checks for the end of an import."""
 
-PATIENCE = 10.0
+ENDING_TIME = 10.0
 """Time [s] that a command may take to end after a signal."""
 
 _raising = _said = False
@@ -95,7 +95,7 @@ def raise_what_waits() -> None:
     Commands call this before work that must not be cut short, because a later signal would have to wait for its end.
     """
     while _waits and not _held:
-        time.sleep(_AGAIN)
+        time.sleep(IMPORT_CHECK_INTERVAL)
 
 
 @contextmanager
@@ -167,7 +167,7 @@ def _arrived(number: int, frame: FrameType | None) -> None:
         return
     _waits = _imports(frame) or bool(_held)
     if _waits:  # the signal is sent again
-        signal_later(_AGAIN, _arrived)
+        signal_later(IMPORT_CHECK_INTERVAL, _arrived)
         return
     raise KeyboardInterrupt
 
@@ -182,9 +182,9 @@ def _end_in_time(pipe: int) -> None:
     number = came()
     while number not in SIGNALS:
         number = os.read(pipe, 1)[0]
-    time.sleep(PATIENCE)
+    time.sleep(ENDING_TIME)
     while _bounded and not _whole.acquire(blocking=False):
-        time.sleep(PATIENCE)
+        time.sleep(ENDING_TIME)
     if not _bounded:
         return
     threading.Timer(1.0, os._exit, (128 + number,)).start()  # a pipe without a reader takes no last word
@@ -201,7 +201,7 @@ def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
     handler `otherwise`, unless it is due to an interrupt that came before.
     """
     if _raising and isinstance(what.exc_value, KeyboardInterrupt):
-        signal_later(_AGAIN, _arrived)
+        signal_later(IMPORT_CHECK_INTERVAL, _arrived)
     elif not came():
         otherwise(what)
 

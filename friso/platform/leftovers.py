@@ -18,7 +18,7 @@ from filelock import FileLock, Timeout
 
 from friso.platform.system import DRAFT_MODE, MOVES_OPEN_FOLDERS, foreign_writers, is_users_own, remove_folder
 
-_TRIES = 3
+MOST_TRIES = 3
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
     locked.
     """
     remove_leftovers(root, prefix, lock)
-    folder, held = _made_and_locked(root, prefix, lock, _TRIES)
+    folder, held = _made_and_locked(root, prefix, lock, MOST_TRIES)
     try:
         yield folder
     finally:

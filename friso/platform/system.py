@@ -20,7 +20,7 @@ from typing import TypeVar
 
 _T = TypeVar("_T")
 
-PATIENCE = 2.0
+OPEN_FILE_WAIT = 2.0
 """Time [s] to wait for a file that another program holds open.
 
 Virus scanners and indexers open every new file."""
@@ -295,9 +295,9 @@ else:
 def once_free(use: Callable[[], _T]) -> _T:
     """Call `use`, and retry while another program may hold the file that it needs.
 
-    Retries for up to `PATIENCE`, then raises the last OSError. Other errors are raised at once.
+    Retries for up to `OPEN_FILE_WAIT`, then raises the last OSError. Other errors are raised at once.
     """
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + OPEN_FILE_WAIT
     while True:
         try:
             return use()

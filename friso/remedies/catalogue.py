@@ -20,7 +20,7 @@ from friso.equations.motion import pieces
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
-from friso.frequency.crossover import WANTED, bandwidths_at, limits, settled_margin
+from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at, limits, settled_margin
 from friso.hunting import find_attractors
 from friso.quantities import exactly
 from friso.remedies.machines import Goal
@@ -104,7 +104,7 @@ def joint_variables(friction: float) -> tuple[Variable, ...]:
     )
 
 
-WIDTHS, DEPTH = (0.1, 1.5), 0.9
+NOTCH_WIDTHS, NOTCH_DEPTH = (0.1, 1.5), 0.9
 """Range of the width of a notch over its frequency, and the depth of the notch."""
 
 
@@ -214,14 +214,14 @@ def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
         "kind": "notch",
         "frequency": exactly(frequency, "Hz"),
         "width": exactly(frequency / 2, "Hz"),
-        "depth": DEPTH,
+        "depth": NOTCH_DEPTH,
     }
     try:
         with_notch = stage.replace({FILTERS_KEY: [*filters, notch]})
     except InputError:  # the file has as many filters as are allowed
         return
     key = f"{FILTERS_KEY}.{len(filters) + 1}.width"
-    width = of_key(key, WIDTHS[0] * frequency, WIDTHS[1] * frequency)
+    width = of_key(key, NOTCH_WIDTHS[0] * frequency, NOTCH_WIDTHS[1] * frequency)
     yield Remedy("notch at the parasitic mode, and bandwidth", with_notch, (width, bandwidth_factor()))
 
 
@@ -230,7 +230,7 @@ def _reaches(stage: Stage, goal: Goal) -> bool:
 
     The answer is False if the goal has no such limit.
     """
-    if goal.bandwidth_limit is None or goal.margin > WANTED:
+    if goal.bandwidth_limit is None or goal.margin > COMFORTABLE_MARGIN:
         return False
     flat = stage.flat()
     highest, own = limits(linear_flat(stage, flat)).highest_comfortable, bandwidth(flat) or 1.0

@@ -76,7 +76,7 @@ LEAST = ": the least change"
 """Suffix of the name of a remedy with the smallest change."""
 
 
-STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
+TRIED_POWERS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
 """Powers of the factors of the smallest change that are tried in turn. The smallest change just works on the machines
 of the search, so other machines may need more."""
 
@@ -228,7 +228,7 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
         return
     others = free[np.argsort(wanted(free), kind="stable")][: settings.other_settings]
     least, (home, works) = others[0], _ends(search.remedy).T
-    further = [home + step * (least - home) for step in STEPS]
+    further = [home + step * (least - home) for step in TRIED_POWERS]
     towards = [least + part * (works - least) for part in settings.change_parts]
     tried = np.unique(np.clip([*further, *towards, *others], 0, 1), axis=0)
     kept = tried[search.measured(tried, settings.worst_time).meets(search.goal)]

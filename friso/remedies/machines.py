@@ -14,7 +14,7 @@ from scipy.constants import golden
 
 from friso.equations.motion import size
 from friso.errors import InputError, StageError
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import COMFORTABLE_MARGIN
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import exactly
 from friso.remedies.settings import settings
@@ -22,7 +22,7 @@ from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
 from friso.stage.motion import motion_of
-from friso.studies.compare.machines import LEAST, SPREADS, draw_machines
+from friso.studies.compare.machines import FEWEST_MACHINES, SPREADS, draw_machines
 
 ACCELERATION = "motion.acceleration"
 
@@ -172,7 +172,7 @@ def draw_fleet(
     """
     own = float(size(stage.flat()))
     moves = moves or MoveRange(own, own)
-    sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()
+    sample, flat = draw_machines(stage, correlations, max(count, FEWEST_MACHINES), seed), stage.flat()
     keys = {key: values[:count] for key, values in sample.keys.items() if key in flat and not key.startswith("rail.")}
     ratios = {key: values / flat[key] for key, values in keys.items() if flat[key]}
     shifts = {key: values.copy() for key, values in keys.items() if not flat[key]}
@@ -195,7 +195,7 @@ def draw_fleet(
     return Fleet(ratios, shifts, sizes, moves, sample.from_file, dict(sample.spreads), left_out, accelerations)
 
 
-SHARE = 0.95
+MEETING_SHARE = 0.95
 """Fraction of the machines, each with its own move, that must meet the goal."""
 
 
@@ -217,9 +217,9 @@ class Goal:
     settle: float | None = None
     force_limit: float | None = None
     bandwidth_limit: float | None = None
-    margin: float = WANTED
+    margin: float = COMFORTABLE_MARGIN
     distance: float = SEARCH_LIMITS.edge_distance
-    share: float = SHARE
+    share: float = MEETING_SHARE
     controller: bool = True
     joint: bool = True
     moves: MoveRange | None = None

@@ -35,11 +35,11 @@ from friso.stage import Stage, numeric_keys
 from friso.stage.arguments import check_arguments
 from friso.stage.controllers import as_tuned, controller_of
 
-RTOL = 1e-11
+SENSITIVITY_RTOL = 1e-11
 """Relative tolerance of the runs, because derivatives need six digits."""
 
 
-NOISE = 100 * RTOL
+NOISE = 100 * SENSITIVITY_RTOL
 """Relative error of times in runs with that tolerance."""
 
 ENTERED = STATISTICS.index("inner_exit")
@@ -169,7 +169,7 @@ def sensitivity(
         stage,
         names,
         values,
-        cycle_derivatives(flat, names, RTOL) if hunts else None,
+        cycle_derivatives(flat, names, SENSITIVITY_RTOL) if hunts else None,
         _of_edge(stage, flat, names, edge) if hunts else None,
         _of_margin(flat, names),
         None if within is None else _of_settling(flat, names, within),
@@ -217,7 +217,7 @@ def _of_edge(
     Returns None if there is no certain edge, or none that can be differentiated.
     """
     edge = check_given(stage).judgement.margin if edge is None else edge
-    moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, RTOL)
+    moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, SENSITIVITY_RTOL)
     if edge is None or moved is None:
         return None
     named = bandwidth(stage.flat())
@@ -239,7 +239,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     places = stands(flat)
     stages = Ensemble(flat, len(places))
     untils = np.array([float(place.until) for place in places])
-    results = stages.run(_starts(stages, flat, len(places)), untils, RTOL, bands=(within, within))
+    results = stages.run(_starts(stages, flat, len(places)), untils, SENSITIVITY_RTOL, bands=(within, within))
     if not _all_done(results):
         return None
     corners, entries = np.array([float(place.corner) for place in places]), results.statistics[:, ENTERED]
@@ -249,7 +249,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
         return None
     stages, duration = Ensemble(flat, 1), untils[longest : longest + 1]
     start = _starts(stages, flat, 1)
-    flow = flow_derivatives(stages, keys, start, entered, RTOL)
+    flow = flow_derivatives(stages, keys, start, entered, SENSITIVITY_RTOL)
     if flow is None:
         return None
     end, by_states, by_keys = flow
@@ -259,7 +259,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     if not _is_smooth(flat, keys, until, float(entered[0]), settling, by, within):
         return None
     # a single run, with room for all turns
-    results = stages.run(start, duration, RTOL, least_swing=0.0, room=room_settings.most_turning_points)
+    results = stages.run(start, duration, SENSITIVITY_RTOL, least_swing=0.0, room=room_settings.most_turning_points)
     if not _all_done(results):
         return None
     turns = slice(int(results.turn_counts[0]))
@@ -293,7 +293,9 @@ def _is_smooth(
     beside = {name: flat[name] + values for name, values in zip(keys, changes.T, strict=True)}
     stages = Ensemble({**flat, **beside}, len(changes))
     durations = np.full(len(changes), until)
-    results = stages.run(_starts(stages, stages.flat, len(changes)), durations, RTOL, bands=(within, within))
+    results = stages.run(
+        _starts(stages, stages.flat, len(changes)), durations, SENSITIVITY_RTOL, bands=(within, within)
+    )
     moved = results.statistics[:, ENTERED] - entered
     expected = np.concatenate([-step * by, step * by])
     allowed = settings.smooth_share * settings.loop_change * settling + NOISE * entered

@@ -22,7 +22,7 @@ from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
 
-RANKING = 1e-5
+RANKING_RTOL = 1e-5
 """Relative tolerance of the moves by which settings are compared. It halves the number of steps; settling times are off
 by at most a thousandth, usually by a tenth of that."""
 
@@ -53,7 +53,7 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def moves_of_points(
-    remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING
+    remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING_RTOL
 ) -> Moves:
     """Simulate the moves of all machines with the settings of each point of a search.
 

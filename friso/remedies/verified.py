@@ -36,7 +36,7 @@ from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
 from friso.remedies.window import VariableWindow
-from friso.shares import DOUBT, Share, share
+from friso.shares import DOUBT_PROBABILITY, Share, share
 from friso.stage import Stage
 from friso.studies.compare.measures import quantile_interval
 from friso.studies.compare.options import linear_flat
@@ -112,7 +112,7 @@ def confirmed(stage: Stage, goal: Goal) -> Confirmation:
     return Confirmation(stage, attracting, word, factors, quiet, unstable(stage))
 
 
-ONE = np.zeros((1, 0))
+NO_VARIABLES = np.zeros((1, 0))
 """Coordinates of the only point of a remedy without variables."""
 
 Certainty = Literal["works", "large moves", "unsure", "given up", "does not work"]
@@ -257,7 +257,7 @@ class Performance:
         some = numbers[self._meets_all(goal)[numbers]]
         if not some.size:
             return self
-        surveyed = attraction(Remedy.settled_on("", stage), ONE, machines.take(some), goal, at_once=at_once)
+        surveyed = attraction(Remedy.settled_on("", stage), NO_VARIABLES, machines.take(some), goal, at_once=at_once)
         return replace(self, attraction=self.attraction.of_some(surveyed, some))
 
     def _first(self, count: int) -> Performance:
@@ -299,7 +299,7 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
     def by_chance(beyond: np.ndarray) -> bool:
         """Tell whether so many misses are no surprise, if the goal is met by the fraction `share`."""
         misses = int(np.count_nonzero(~beyond))
-        return not misses or bdtrc(misses - 1, len(beyond), 1 - share) >= DOUBT * (1 - 1e-9)
+        return not misses or bdtrc(misses - 1, len(beyond), 1 - share) >= DOUBT_PROBABILITY * (1 - 1e-9)
 
     low, high = 0 if by_chance(meets[:first]) else int(first), len(meets) - 1 if by_chance(meets[last + 1 :]) else last
     return low, int(high)
@@ -370,8 +370,8 @@ def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[s
     """
     remedy = Remedy.settled_on("", stage)
     return {
-        "moves": moves_of_points(remedy, ONE, machines, goal, rtol=settings.move_rtol),
-        "margin": modulus_margins(remedy, ONE, machines, drive),
+        "moves": moves_of_points(remedy, NO_VARIABLES, machines, goal, rtol=settings.move_rtol),
+        "margin": modulus_margins(remedy, NO_VARIABLES, machines, drive),
         "attraction": Attraction.none(machines.count),
     }
 

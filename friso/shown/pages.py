@@ -160,7 +160,7 @@ _PATH, _SPACED = re.compile(r'(?<= d=")[^"]*'), re.compile(r" ?([A-Za-z]) ?")
 _STRAIGHT = re.compile(r"(?:[ML] -?[\d.]+ -?[\d.]+ ?|z ?)+")
 """Pattern of paths that consist of straight pieces alone."""
 
-TENTHS = 10
+STEPS_PER_POINT = 10
 """Steps of a coordinate in a point of 1/72 inch, finer than printers' dots."""
 
 
@@ -176,7 +176,7 @@ def _shortened(path: re.Match[str]) -> str:
         if command == "z":
             parts.append("z")
         else:
-            there = round(TENTHS * float(x)), round(TENTHS * float(y))
+            there = round(STEPS_PER_POINT * float(x)), round(STEPS_PER_POINT * float(y))
             step = there if command == "M" else (there[0] - here[0], there[1] - here[1])
             if command == last == "L" and step == (0, 0):
                 continue
@@ -192,7 +192,11 @@ def _tenths(number: int, apart: bool) -> str:
 
     `apart` separates it from a number before it, unless its sign does.
     """
-    text = f"{number / TENTHS:g}".replace("0.", ".", 1) if abs(number) < TENTHS else f"{number / TENTHS:g}"
+    text = (
+        f"{number / STEPS_PER_POINT:g}".replace("0.", ".", 1)
+        if abs(number) < STEPS_PER_POINT
+        else f"{number / STEPS_PER_POINT:g}"
+    )
     return f" {text}" if apart and number >= 0 else text
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError, StageError
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 from friso.quantities import LARGEST_INTEGER, as_toml, percent, quoted
 from friso.stage.controllers import as_tuned
 from friso.stage.files import parsed, text_of
@@ -27,11 +27,11 @@ from friso.stage.stage import Stage, violations
 _EXPECTED = "a file with keys and the matrix of their correlations"
 _EXAMPLE = 'keys = ["friction.coulomb", "friction.viscous"] and matrix = [[1.0, -0.8], [-0.8, 1.0]]'
 
-ROUNDING = 1e-9
+MATRIX_ROUNDING = 1e-9
 """Tolerance for rounded numbers of a matrix: it bounds asymmetry, deviation of the diagonal from 1, and negative
 eigenvalues."""
 
-MOST = 100
+MOST_SAMPLES = 100
 """Largest number of samples tried per stage before the ranges count as hardly ever allowed."""
 
 
@@ -75,11 +75,11 @@ def _problem(matrix: np.ndarray, size: int) -> str:
         return f"{' x '.join(map(str, matrix.shape))} numbers for {size} keys"
     if not np.isfinite(matrix).all():
         return "a number that is not finite"
-    if size and np.abs(np.diag(matrix) - 1).max() > ROUNDING:
+    if size and np.abs(np.diag(matrix) - 1).max() > MATRIX_ROUNDING:
         return "a diagonal that is not 1"
-    if size and np.abs(matrix - matrix.T).max() > ROUNDING:
+    if size and np.abs(matrix - matrix.T).max() > MATRIX_ROUNDING:
         return "not symmetric"
-    if size and np.linalg.eigvalsh(matrix).min() < -ROUNDING * size:
+    if size and np.linalg.eigvalsh(matrix).min() < -MATRIX_ROUNDING * size:
         return "not positive semidefinite: no quantities can be correlated like this"
     return ""
 
@@ -181,7 +181,7 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
     sampler = qmc.Sobol(len(intervals), rng=seed)
     matrix, size = correlations.over([*intervals]), 1 << max(0, count - 1).bit_length()
     parts, accepted, beyond, broken = [], 0, 0, Counter[str]()
-    for _ in range(MOST):
+    for _ in range(MOST_SAMPLES):
         keys = _values(stage, matrix, sampler.random(size))
         within, why = _allowed(stage, keys, size)
         enough = np.flatnonzero(np.cumsum(within) == count - accepted)[:1]
@@ -195,7 +195,7 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
             joined = {key: np.concatenate([part[key] for part in parts]) for key in intervals}
             return Sample(joined, count, beyond, broken)
     most = broken.most_common(1)
-    text = f"ranges of which {percent(accepted / (MOST * size))} are allowed"
+    text = f"ranges of which {percent(accepted / (MOST_SAMPLES * size))} are allowed"
     raise StageError("", text, most[0][0] if most else "ranges within the bounds of their keys")
 
 
@@ -214,7 +214,7 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
     for (key, interval), column in zip(stage.uncertain().items(), normals.T, strict=True):
         half = (interval.high - interval.low) / 2
         values[key] = (
-            interval.evenly(ndtr(column)) if interval.form == "range" else flat[key] + half / COVERAGE * column
+            interval.evenly(ndtr(column)) if interval.form == "range" else flat[key] + half / NORMAL_COVERAGE * column
         )
     return values
 

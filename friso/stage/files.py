@@ -173,7 +173,7 @@ def parse_set(text: str) -> tuple[str, Any]:
     value = value.strip()
     if value[:1] in ("'", '"') and (opened := _open_quote(value)) is not None:
         before = one_line(text[: text.index(value, len(key)) + opened])
-        shown = f"{_INDENT}{one_line(text)[:_WIDTH]}\n{_INDENT}{' ' * len(before)}^"
+        shown = f"{_INDENT}{one_line(text)[:SHOWN_WIDTH]}\n{_INDENT}{' ' * len(before)}^"
         actual = f"a quote that is not closed\n{shown}"
         raise InputError("", actual, "KEY=VALUE", 'masses.stage="0.6 kg"', origin="--set")
     return key.strip(), _value(value)
@@ -241,7 +241,7 @@ def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
         raise InputError("", "an empty file", expected, example)
     if key := _MANY_PARTS.search(text):
         line = text.count("\n", 0, key.end()) + 1
-        raise InputError("", f"a key of more than {_PARTS} parts in line {line}", expected, example)
+        raise InputError("", f"a key of more than {MOST_PARTS} parts in line {line}", expected, example)
     if (lines := text.count("\n")) > MOST_LINES:
         raise InputError("", f"{lines} lines", f"at most {MOST_LINES} lines", example)
     if (tables := len(_TABLE.findall(text))) > MOST_TABLES:
@@ -257,9 +257,9 @@ def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
         raise InputError("", "not TOML: a whole number of thousands of digits", expected, example) from None
 
 
-_PARTS = 32
+MOST_PARTS = 32
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
-_MANY_PARTS = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{_PARTS}}}", re.MULTILINE)
+_MANY_PARTS = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{MOST_PARTS}}}", re.MULTILINE)
 """Pattern of keys with more parts than any table has. With thousands of parts, reading would take a time that grows
 with the square of their number."""
 
@@ -275,7 +275,7 @@ _PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
 
 _TYPOGRAPHIC = tuple("\u2018\u2019\u201a\u201c\u201d\u201e\u00ab\u00bb")
 
-_WIDTH = 100
+SHOWN_WIDTH = 100
 """Largest number of characters shown of a line."""
 
 
@@ -291,8 +291,8 @@ def _syntax_error(text: str, message: str) -> str:
         column, why = opened + 1, "a quote that is not closed"
     elif line[column - 1 : column] in _TYPOGRAPHIC:
         why = "a typographic quote in place of a straight one"
-    start = max(0, column - _WIDTH // 2) if column > _WIDTH else 0
-    before, line = one_line(line[start : column - 1]), one_line(line[start : start + _WIDTH])
+    start = max(0, column - SHOWN_WIDTH // 2) if column > SHOWN_WIDTH else 0
+    before, line = one_line(line[start : column - 1]), one_line(line[start : start + SHOWN_WIDTH])
     place_in_words = f"(at line {number}, column {column})"
     return f"{why} {place_in_words}\n{_INDENT}{line}\n{_INDENT}{' ' * len(before)}^"
 

@@ -19,7 +19,7 @@ FORWARD, FEEDBACK = "forward", "feedback"
 FILTER_RULE = "drive.filter_discretisation"
 """Key of the rule that applies to filters without a rule of their own."""
 
-MOST = 12
+MOST_FILTERS = 12
 """Largest number of filters of a controller."""
 
 FilterRule = Literal["bilinear", "prewarped", "backward_euler"]
@@ -71,7 +71,7 @@ class ContinuousFilter(FilterSection):
 
 
 FILTERS = Variants("kind")
-FILTER_ARRAY = TableArray(FILTERS, '[[controller.filters]] kind = "notch", frequency = "300 Hz" ...', MOST)
+FILTER_ARRAY = TableArray(FILTERS, '[[controller.filters]] kind = "notch", frequency = "300 Hz" ...', MOST_FILTERS)
 
 
 @FILTERS.register

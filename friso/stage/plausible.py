@@ -14,15 +14,15 @@ from friso.stage.lists import element_keys
 from friso.stage.stage import Stage
 from friso.stage.tables import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, TRANSMISSION, moving_mass
 
-GRAVITY = 9.81
+STANDARD_GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
 
-STRONGEST = 30.0
+STRONGEST_FRICTION = 30.0
 """Largest plausible friction of a contact bearing, in units of the load's weight. Preload may exceed the weight, but
 not by that much."""
 
 
-PRESLIDING = (1e-10, 1e-2)
+PRESLIDING_RANGE = (1e-10, 1e-2)
 """Plausible range of displacements [m] before sliding."""
 
 
@@ -163,7 +163,7 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
     carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
     usual = dict(_USUAL)
     for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():
-        most = STRONGEST * GRAVITY * mass
+        most = STRONGEST_FRICTION * STANDARD_GRAVITY * mass
         usual |= dict.fromkeys(
             (f"{table}.static", f"{table}.coulomb"), _Usual(1e-6, most, "N", ("N", "mN", "uN", "kN"))
         )
@@ -178,7 +178,7 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
 
 def _presliding(force: float) -> _Usual:
     """Return the usual range of a contact's stiffness before sliding, for a friction force [N]."""
-    low, high = (force / way for way in reversed(PRESLIDING))
+    low, high = (force / way for way in reversed(PRESLIDING_RANGE))
     return _Usual(low, high or inf, "N/m", _STIFFNESSES)
 
 

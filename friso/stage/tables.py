@@ -200,7 +200,7 @@ class Bias(UncertainSection):
     stage: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
 
 
-ROUNDING = 1e-12
+TIME_ROUNDING = 1e-12
 """Relative tolerance for limits on times, which are sums of decimal numbers."""
 
 

@@ -19,7 +19,7 @@ from friso.stage.arguments import check_arguments
 if TYPE_CHECKING:
     import xarray as xr
 
-SAMPLES = 16_384
+PERIOD_SAMPLES = 16_384
 """Samples per period of the simulated cycle from which balance with several harmonics starts."""
 
 CYCLE = "the symmetric cycle, closed as an orbit: it attracts where the multiplier is below 1 in size, else it repels"
@@ -27,7 +27,7 @@ APPROXIMATION = "harmonic balance, an approximation"
 PREDICTED = ("solutions", "least_residual")
 """Value of the attribute `of`, and the variables that balance with a single harmonic predicts."""
 
-HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
+DEFAULT_HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
 """Default orders of the highest harmonic of balance with several harmonics."""
 
 
@@ -35,7 +35,7 @@ HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
 def harmonic_balance(
     stage: Stage,
     crossovers: Sequence[float] | np.ndarray,
-    harmonics: Sequence[int] = HARMONICS,
+    harmonics: Sequence[int] = DEFAULT_HARMONICS,
     rtol: float = CYCLE_RTOL,
 ) -> xr.Dataset:
     """Compare the symmetric hunting cycle of a stage by simulation and by harmonic balance.
@@ -117,13 +117,13 @@ def _errors(
     the error of the period, that of the amplitude, and a status.
     """
     single, period = stages.take(np.array([number])), float(cycles.period[number])
-    interval = period / SAMPLES
+    interval = period / PERIOD_SAMPLES
     run = single.run(cycles.states[[number]], np.array([period]), rtol, interval=interval)
-    cart = run.samples[0, :SAMPLES, stages.sticking]
+    cart = run.samples[0, :PERIOD_SAMPLES, stages.sticking]
     flat = {key: value[0] if np.ndim(value) else value for key, value in single.flat.items()}
     cells = []
     for highest in harmonics:
-        series = balanced(flat, np.arange(SAMPLES) * interval, cart, highest)
+        series = balanced(flat, np.arange(PERIOD_SAMPLES) * interval, cart, highest)
         errors = (series.period / period - 1, series.amplitude / float(cycles.amplitude[number]) - 1)
         cells.append((*(errors if series.status == DONE else (np.nan, np.nan)), series.status))
     return cells

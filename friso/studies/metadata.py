@@ -27,7 +27,7 @@ from friso.studies.store_files import digest_of, put, stored
 
 logger = logging.getLogger("friso")
 
-FORMAT = 2
+METADATA_FORMAT = 2
 """Version of friso's metadata in a store."""
 
 _FILE, _COPY, _OWN, _ATTRIBUTES = ".zmetadata", ".zmetadata.copy", "friso", ".zattrs"
@@ -38,7 +38,7 @@ _NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w
 
 _KIND, _CODECS = re.compile(r"[<>|](?P<letter>[bfiuU])(?P<size>[0-9]{1,4})"), {"blosc", "crc32"}
 """Allowed types of numbers and texts with their size, and allowed codecs, which only decode."""
-_CHUNK = 1 << 30
+LARGEST_CHUNK = 1 << 30
 """Largest chunk in memory [bytes]; a chunk may be a whole axis."""
 
 _EXPECTED = "a store made by friso map, or a new name"
@@ -122,7 +122,12 @@ def annotate_metadata(
 
 
 def _write(path: Path, metadata: Metadata) -> None:
-    entry = {"format": FORMAT, "study": metadata.study, "axes": dict(metadata.axes), "notes": dict(metadata.notes)}
+    entry = {
+        "format": METADATA_FORMAT,
+        "study": metadata.study,
+        "axes": dict(metadata.axes),
+        "notes": dict(metadata.notes),
+    }
     entry["sha256"] = digest([metadata.files, entry])
     sealed = replace(metadata, document={**metadata.document, _OWN: entry})
     put(path / _FILE, _text(sealed.document))
@@ -177,11 +182,11 @@ def _metadata_in(path: Path, file: str) -> Metadata:
         raise StoreError.of(_damaged(path, f"cannot be read ({cause_of(error)})")) from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _damaged(path, "is damaged") from None
-    if number is not None and number > FORMAT:
+    if number is not None and number > METADATA_FORMAT:
         actual = f"a store of a newer friso ({one_line(str(attributes.get('friso', 'unknown')))})"
         error = StoreError if entry.get("sha256") == sealed else _DamagedError
         raise error("", actual, "a store of this friso, or that one to read it", origin=str(path))
-    if number == FORMAT:
+    if number == METADATA_FORMAT:
         study, axes, notes = (entry.get(name) for name in ("study", "axes", "notes"))
         complete = isinstance(study, str) and isinstance(axes, dict) and isinstance(notes, dict)
         if not complete or entry.get("sha256") != sealed or not _are_of_a_store(metadata, axes):
@@ -259,7 +264,7 @@ def _is_plain(array: Mapping[str, Any]) -> bool:
     if kind is None or not codecs <= _CODECS or laid_out != ("C", ".") or min(*array["shape"], *array["chunks"]) < 1:
         return False
     size = int(kind["size"]) * (4 if kind["letter"] == "U" else 1)  # a character takes 4 bytes
-    return size > 0 and size * math.prod(array["chunks"]) <= _CHUNK
+    return size > 0 and size * math.prod(array["chunks"]) <= LARGEST_CHUNK
 
 
 def _chunks(array: Mapping[str, Any]) -> int:

@@ -148,7 +148,7 @@ class KeptCells:
 
 logger = logging.getLogger("friso")
 
-_FORMAT = 2
+ZARR_FORMAT = 2
 """Version of the Zarr format that every reader supports, and in which fixed-length texts are specified."""
 
 COORDINATES = "coordinates"
@@ -230,7 +230,7 @@ class Store:
         try:
             with zarr.config.set({"array.write_empty_chunks": False}):
                 for part, how, mode in parts:
-                    part.to_zarr(folder, mode=mode, encoding=how, zarr_format=_FORMAT, consolidated=False)  # type: ignore[call-overload]
+                    part.to_zarr(folder, mode=mode, encoding=how, zarr_format=ZARR_FORMAT, consolidated=False)  # type: ignore[call-overload]
             indent = zarr.config.get("json_indent")
             for name in study.metrics:  # Zarr's own resize would list every possible chunk
                 place = folder / name / ".zarray"
@@ -238,7 +238,7 @@ class Store:
                 place.write_text(
                     json.dumps({**array, "shape": study.shape}, indent=indent), encoding="utf-8", newline=""
                 )
-            zarr.consolidate_metadata(str(folder), zarr_format=_FORMAT)
+            zarr.consolidate_metadata(str(folder), zarr_format=ZARR_FORMAT)
         except OSError:
             _let_zarr_finish()
             raise
@@ -317,7 +317,7 @@ class Store:
         shape = tuple(part.stop - part.start for part in block)
         # empty chunks are written too, because the record lists every chunk
         with zarr.config.set({"array.write_empty_chunks": True}):
-            group: Any = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT, use_consolidated=True)
+            group: Any = zarr.open_group(self.path, mode="r+", zarr_format=ZARR_FORMAT, use_consolidated=True)
             for name in self.study.metrics:
                 values = columns[name].astype(form_of(name)).reshape(shape)
                 once_free(partial(group[name].__setitem__, block, values))
@@ -367,7 +367,7 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     try:
         if metadata.damaged_axes(Path(path)):
             raise ValueError("other axes than were written")
-        runs = xr.open_zarr(SealedStore.at(Path(path), metadata), chunks=None, zarr_format=_FORMAT)
+        runs = xr.open_zarr(SealedStore.at(Path(path), metadata), chunks=None, zarr_format=ZARR_FORMAT)
         runs.attrs = {name: value for name, value in metadata.attributes.items() if name != COORDINATES}
         runs = runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
         runs.encoding["source"] = os.path.abspath(path)

@@ -273,7 +273,7 @@ def _stage_differences(mine: Stage, its: Stage) -> list[str]:
     return [f"{key}: {b.get(key, 'absent')} there, {a.get(key, 'absent')} here" for key in keys]
 
 
-TRIED = 512
+TRIAL_CELLS = 512
 """Cells of a trial run."""
 
 
@@ -310,9 +310,9 @@ class Request:
         axes = []
         for axis in self._read({**self.axes, **(self.samples.ranges if self.samples else {})}):
             if isinstance(axis, SweptRange):
-                axes.append(SweptAxis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
+                axes.append(SweptAxis(axis.name, axis.at(rng.random(TRIAL_CELLS)), axis.unit, axis.scale))
             else:
-                axes.append(replace(axis, values=rng.choice(axis.values, TRIED)))
+                axes.append(replace(axis, values=rng.choice(axis.values, TRIAL_CELLS)))
         return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), usual_metrics(), 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-TRIED = 400
+TRIED_CELLS = 400
 """Number of cells on which a tolerance is chosen: 1 % of them are four."""
 
 
@@ -85,7 +85,9 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
     and the number of cells used. If no tolerance is good enough, the one at which most outcomes survive is returned. If
     no cell has a valid stage, there are no fractions, and the tightest tolerance is returned.
     """
-    picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))
+    picked = random_cells(
+        study, TRIED_CELLS, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells))
+    )
     if not picked.size:
         return settings.candidate_rtols[-1], {}, 0
     outcomes: dict[float, np.ndarray] = {}

@@ -69,7 +69,7 @@ def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
 
     ratio = design_rules._needed_ratio(thesis_rig().to_toml())
     flat = {**thesis_rig().flat(), "joint.locked": False}
-    tried = design_rules._RATIOS
+    tried = design_rules.PARASITIC_RATIOS
     below = tried[tried < ratio * 0.999][-1]
     crossover = flat["controller.crossover"]
     assert settled_margin({**flat, "parasitic.frequency": ratio * crossover}) >= 0.5

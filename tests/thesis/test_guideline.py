@@ -386,7 +386,7 @@ def quick() -> compute.Guideline:
     patch.setattr(sweeps, "find_edges", invented)
     shortened(patch)
     try:
-        yield compute.guideline(compute.FEWEST)
+        yield compute.guideline(compute.FEWEST_SAMPLES)
     finally:
         patch.undo()
 
@@ -398,7 +398,7 @@ def shortened(patch: pytest.MonkeyPatch) -> None:
     )
     patch.setattr(compute, "worked", shown)
     patch.setattr(compute, "_compile", lambda: None)
-    patch.setattr(worked, "FREQUENCIES", (300.0,))
+    patch.setattr(worked, "PARASITIC_FREQUENCIES", (300.0,))
 
 
 def invented(stages: Any, grid: np.ndarray) -> Edges:
@@ -528,7 +528,7 @@ def test_an_interrupted_guideline_answers_from_fewer_samples(monkeypatch: pytest
     assert answer.interrupted is not whole
     assert answer.samples == (512 if whole else 64)
     assert len(calls) <= after
-    again = 2 * sweeps.PART  # parts with a free joint that later rounds fill up
+    again = 2 * sweeps.PART_SAMPLES  # parts with a free joint that later rounds fill up
     assert sum(calls) <= 512 + 128 + 2 * (192 + 96) + again
     assert answer.locked.on_test.count > 0
     assert ("Interrupted" in " ".join(sentences(answer))) is answer.interrupted

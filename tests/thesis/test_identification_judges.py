@@ -10,7 +10,7 @@ from friso.studies.rig.outcome import locked_stage
 from friso_thesis.studies.thesis.as_built import rig_with_drive
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.experiments import (
-    SLOW,
+    SLOW_SPEEDS,
     Experiments,
     LockedLine,
     constant_speed,
@@ -60,7 +60,7 @@ def test_the_judges_recognise_what_holds() -> None:
     assert all(part.holds for part in judged_steps(joint_steps(stiff)).parts)
     assert all(part.holds for part in of_plant({"masses.stage": "0.75 kg", "joint.stiffness": "3.6 N/mm"}).parts)
     slippery = thesis_rig().replace({"friction.static": "2.4 N"})
-    assert all(part.holds for part in judged_slips(tuple(slow_motion(slippery, speed) for speed in SLOW)).parts)
+    assert all(part.holds for part in judged_slips(tuple(slow_motion(slippery, speed) for speed in SLOW_SPEEDS)).parts)
     magnitude = np.full((4, 9), 1.7 / 2.5)
     magnitude[:, -1] = 0.1
     scatter = np.array([0.01, 0.1, 0.3, 0.2, 0.1, 0.1, 0.01, 0.01, 0.01])
@@ -69,7 +69,7 @@ def test_the_judges_recognise_what_holds() -> None:
 
 def test_the_judges_recognise_what_does_not_hold() -> None:
     smooth = thesis_rig().replace({"friction.static": "1 N"})
-    runs = tuple(slow_motion(smooth, speed) for speed in SLOW)
+    runs = tuple(slow_motion(smooth, speed) for speed in SLOW_SPEEDS)
     assert judged_slips(runs).pattern[0] is False
     varied = ("static_deviation", "coulomb_deviation", "first_harmonic", "second_harmonic")
     even = {"friction.static": "1 N", "cable.stiffness": "0 N/m", **{f"rail.{name}": 0.0 for name in varied}}

@@ -39,7 +39,7 @@ from friso_thesis.questions.reproduce.figures import reproduction_figures
 from friso_thesis.questions.reproduce.page import COLOURS, reproduce_files, reproduce_html
 from friso_thesis.questions.reproduce.questions import QUESTIONS
 from friso_thesis.questions.reproduce.summary import summary_sheet
-from friso_thesis.questions.reproduce.words import SHORT, details, in_order, reasons, short
+from friso_thesis.questions.reproduce.words import SHORT_FORM, details, in_order, reasons, short
 from friso_thesis.studies.thesis import experiments
 from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso_thesis.studies.thesis.claims import (
@@ -159,7 +159,10 @@ def thorough_study() -> Reproduction:
     Its verdicts mean little, but every part is there.
     """
     with patched(
-        {import_module("friso_thesis.studies.thesis.plausible"): {"POINTS": 5, "EVERY": 9}, REPRODUCE: {"JUDGED": 5}}
+        {
+            import_module("friso_thesis.studies.thesis.plausible"): {"MAP_POINTS": 5, "ANALYSED_EVERY": 9},
+            REPRODUCE: {"JUDGED_POINTS": 5},
+        }
     ):
         return reproduce(points=5, with_cycles=False, draws=2)
 
@@ -903,7 +906,9 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         if label.startswith("draw 1"):
             raise KeyboardInterrupt
 
-    with patched({import_module("friso_thesis.studies.thesis.plausible"): {"POINTS": 3}, REPRODUCE: {"JUDGED": 3}}):
+    with patched(
+        {import_module("friso_thesis.studies.thesis.plausible"): {"MAP_POINTS": 3}, REPRODUCE: {"JUDGED_POINTS": 3}}
+    ):
         with pytest.raises(KeyboardInterrupt):
             reproduce(**orders, kept=kept, progress=stop)
         before = {file: file.stat().st_mtime_ns for file in (tmp_path / "kept").iterdir()}
@@ -931,7 +936,7 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
 def test_few_points_are_shown_and_not_judged_on() -> None:
     """Whatever is asked for, claims are judged on maps of as many values as decide: the headline is the same."""
     orders: dict[str, Any] = {"only": ["F15B"], "with_cycles": False, "draws": 0}
-    with patched({REPRODUCE: {"JUDGED": 7}}):
+    with patched({REPRODUCE: {"JUDGED_POINTS": 7}}):
         coarse, enough = (reproduce(**orders, points=points) for points in (3, 7))
     assert {name: runs.sizes for name, runs in coarse.judged.items()} == {n: r.sizes for n, r in enough.maps.items()}
     assert all(set(runs.sizes.values()) == {3} for runs in coarse.maps.values())
@@ -997,7 +1002,7 @@ def test_a_draw_that_decides_nothing_says_why() -> None:
     def stopped(*_: Any) -> Any:
         raise ValueError("the loop stops")
 
-    with patched({import_module("friso_thesis.studies.thesis.plausible"): {"POINTS": 3, "counted": stopped}}):
+    with patched({import_module("friso_thesis.studies.thesis.plausible"): {"MAP_POINTS": 3, "counted": stopped}}):
         space = plausible({"F15B": registered()["F15B"]}, 1).claims["F15B"]
     assert (space.undecided, space.count, space.failures) == (1, 0, {0: "ValueError: the loop stops"})
     undecided: Any = SimpleNamespace(finding=None, space=space, reason="", turned={}, attracts=None)
@@ -1169,7 +1174,7 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     """Crossover and mass, locked: the flip of the rig's 1.7 kg lies at 9.75 Hz, on the drawn curve as in the check; the
     cells compared add up; the page shows curve and table."""
     study = STUDIES["system"]
-    with patched({import_module("friso_thesis.studies.thesis.cycles"): {"NODES": 5}}):
+    with patched({import_module("friso_thesis.studies.thesis.cycles"): {"CURVE_NODES": 5}}):
         cycles_ = map_cycles(
             study,
             thorough_study.maps["system"],
@@ -1203,4 +1208,4 @@ def test_what_is_shortened_ends_with_a_statement() -> None:
     assert short(f"{long}. The next one. Assumed: nothing") == long
     assert short("one; two. Three. Assumed: nothing") == "one; two. Three"
     assert short(f"one. Two; {long}") == "one. Two"
-    assert len(short("A statement. " * 40)) <= SHORT
+    assert len(short("A statement. " * 40)) <= SHORT_FORM

@@ -51,7 +51,7 @@ def test_limits_take_fewer_runs_than_the_grid_that_shows_them() -> None:
 
 def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
     """Fig. 27."""
-    with patched({measured_cycles: {"STARTS": (0.0,)}}):
+    with patched({measured_cycles: {"CYCLE_STARTS": (0.0,)}}):
         even = measured_cycles.on_rail(with_joint(RIG, locked=True))
         one = measured_cycles.started(even, 1, {}, 1, silent, "")
         cases = {f"rail.{kind}_deviation": np.array([0.0, 0.1]) for kind in ("static", "coulomb")}
@@ -70,7 +70,7 @@ def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
 
 def test_standstill_adds_up_and_stiffness_holds() -> None:
     """Fig. 28: variances of independent disturbances add up; the free joint moves more."""
-    with patched({in_position: {"SETTLING": 1.0, "WATCHED": 4.0, "DAMPING_RATIOS": (0.01, 1.0)}}):
+    with patched({in_position: {"SETTLING_TIME": 1.0, "RECORD_LENGTH": 4.0, "DAMPING_RATIOS": (0.01, 1.0)}}):
         standstill, kept = in_position.in_position(RIG, 1, silent, noises=(1.0, 3.0))
     assert set(kept) == {"locked", "free"}
     alike = [standstill.runs[case, "all"].true[0, 1] for case in in_position.CASES]

@@ -11,7 +11,7 @@ from rig_evidence import FAILED, HUNTS, cycles, grid, loops, moves, standstill
 from friso.studies.rig.experiments.frf import measured_loop
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.experiments import BUILT, GRID, MOVES, ON_RAILS, STANDSTILL, Experiments
-from friso_thesis.studies.thesis.judges.identified_in_time import MEASURED, WEIGHED
+from friso_thesis.studies.thesis.judges.identified_in_time import MEASURED_MASSES, WEIGHED_MASSES
 from friso_thesis.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig, weaker_motor
 from friso_thesis.studies.thesis.reading import OWN, read_as
 
@@ -111,8 +111,8 @@ NEEDS = {"F24": MOVES, "F25": MOVES, "F26": GRID, "F27": ON_RAILS, "F28": STANDS
 ADDED = {
     "locked": measured_locked,
     "free": measured_free,
-    "motor, locked": lambda results: weaker_motor(results, 0, MEASURED[0], WEIGHED[0]),
-    "motor, free": lambda results: weaker_motor(results, 1, MEASURED[1], WEIGHED[1]),
+    "motor, locked": lambda results: weaker_motor(results, 0, MEASURED_MASSES[0], WEIGHED_MASSES[0]),
+    "motor, free": lambda results: weaker_motor(results, 1, MEASURED_MASSES[1], WEIGHED_MASSES[1]),
 }
 """Parts that the loops of the rig as built add to F17, F18, F22 and F23."""
 

@@ -39,7 +39,7 @@ UNIT = "machine_unit"
 FORCE_FIELD = Quantity("N", positive, "20 N")
 VELOCITY_FIELD = Quantity("m/s", positive, "5 mm/s")
 
-UNITY = (0.9, 1.1)
+UNITY_RANGE = (0.9, 1.1)
 """Range of FF1 [machine units/s per unit of output] for which the output counts as machine units per second."""
 
 TARGET = "error-previous-target, with which the error is taken from the command of the sample before"
@@ -367,7 +367,7 @@ def _velocity(
 
 def _unity(axis: AxisParameters) -> bool:
     """Tell whether FF1 is about 1, which means that the output is in machine units per second."""
-    return UNITY[0] <= axis.number("FF1", 0.0) <= UNITY[1]
+    return UNITY_RANGE[0] <= axis.number("FF1", 0.0) <= UNITY_RANGE[1]
 
 
 def _kind(axis: AxisParameters) -> AxisKind:

@@ -37,7 +37,7 @@ from friso.stage.lists import row_keys
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
 LIMITS_OF_MOVES = f"{MOVE}.vel_limit", f"{MOVE}.accel_limit"
 GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
-RATE = 8000.0
+SAMPLE_RATE = 8000.0
 """Samples of the controller per second, in ODrive 3."""
 
 CONTROL_MODES = ("VOLTAGE_CONTROL", "TORQUE_CONTROL", "VELOCITY_CONTROL", "POSITION_CONTROL")
@@ -111,7 +111,7 @@ NEWEST = frozenset({"config.motor", "config.encoder_bandwidth", "config.torque_s
 
 Firmware up to 0.4 has gains in counts; 0.5 has gains in turns."""
 
-FASTEST = 1000.0
+FASTEST_MOTOR = 1000.0
 """Speed in turns per second beyond any motor. A higher limit must be in counts."""
 
 TURNS_EXPECTED = "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6"
@@ -213,7 +213,7 @@ def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
 def _fastest(axis: AxisParameters) -> str:
     """Return the name of a velocity limit too high to be in turns per second; "" if none is."""
     limits = (f"{place}.vel_limit" for place in (CONFIG, MOVE))
-    return next((key for key in limits if axis.is_set(key) and axis.number(key) > FASTEST), "")
+    return next((key for key in limits if axis.is_set(key) and axis.number(key) > FASTEST_MOTOR), "")
 
 
 def _entries(text: str) -> dict[str, Any]:
@@ -309,7 +309,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     bandwidth = axis.number(f"{ENCODER}.bandwidth", 1000.0) / (2 * pi)
     low_pass = {"kind": "low_pass", "path": "feedback", "order": 2, "damping_ratio": 1.0}
     table["filters"] = [{**low_pass, "frequency": si(bandwidth, "Hz")}]
-    drive = {"sample_time": si(1 / RATE, "s")}
+    drive = {"sample_time": si(1 / SAMPLE_RATE, "s")}
     if axis.is_set(f"{MOTOR}.current_control_bandwidth"):
         drive["current_bandwidth"] = si(axis.number(f"{MOTOR}.current_control_bandwidth") / (2 * pi), "Hz")
     tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": drive, **_motion(axis, kind, travel)}

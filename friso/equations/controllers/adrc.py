@@ -25,7 +25,7 @@ from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.quantities import Number, Quantity, Value, at_least_1, positive
 from friso.stage import ControllerSection, Rule, register_controller
 from friso.stage.controllers import Gain
-from friso.stage.tables import ROUNDING, moving_mass
+from friso.stage.tables import TIME_ROUNDING, moving_mass
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -96,7 +96,7 @@ class DisturbanceRejection(ControllerSection):
             (BANDWIDTH, OBSERVER_RATIO, "drive.sample_time"),
             lambda f: (
                 "drive.sample_time" not in f
-                or f[BANDWIDTH] * f[OBSERVER_RATIO] * f["drive.sample_time"] <= 1 / 10 * (1 + ROUNDING)
+                or f[BANDWIDTH] * f[OBSERVER_RATIO] * f["drive.sample_time"] <= 1 / 10 * (1 + TIME_ROUNDING)
             ),
             "a sample time of at most a tenth of the observer's period",
             '[drive] sample_time = "50 us" (20 kHz) with bandwidth = "8 Hz", observer_ratio = 5',

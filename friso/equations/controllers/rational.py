@@ -18,7 +18,7 @@ from friso.errors import InputError
 from friso.quantities import Number, Quantity, Value, positive
 from friso.stage.controllers import CONTROLLER, ControllerSection
 from friso.stage.section import Rule
-from friso.stage.tables import ROUNDING
+from friso.stage.tables import TIME_ROUNDING
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -29,7 +29,7 @@ SAMPLE_TIME, DRIVE_TIME, LOOP_TIME = f"{CONTROLLER}.sample_time", "drive.sample_
 PARTS = "parts"
 """Prefix of the keys in a stage that hold the coefficients of integral and sections."""
 
-AT_ZERO = 1e3 * ROUNDING
+AT_ZERO = 1e3 * TIME_ROUNDING
 """Largest distance from 0 (in z: from 1) at which a pole counts as an integrator, relative to the largest pole (in z:
 to 1).
 

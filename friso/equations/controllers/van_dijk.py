@@ -10,7 +10,7 @@ from friso.equations.controllers.pid import Pid
 from friso.quantities import Number, Quantity, Value, at_least_1, inside_0_1, positive
 from friso.stage import Rule, register_controller
 from friso.stage.controllers import KIND, Gain
-from friso.stage.tables import ROUNDING, moving_mass
+from friso.stage.tables import TIME_ROUNDING, moving_mass
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -54,7 +54,9 @@ class VanDijk(Pid):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             (CROSSOVER, "drive.sample_time"),
-            lambda f: "drive.sample_time" not in f or f[CROSSOVER] * f["drive.sample_time"] <= 1 / 10 * (1 + ROUNDING),
+            lambda f: (
+                "drive.sample_time" not in f or f[CROSSOVER] * f["drive.sample_time"] <= 1 / 10 * (1 + TIME_ROUNDING)
+            ),
             "a sample time of at most a tenth of the crossover's period",
             '[drive] sample_time = "50 us" (20 kHz) with crossover = "8 Hz"',
         ),

@@ -12,7 +12,7 @@ from friso.quantities import Quantity, any_sign, positive
 from friso.stage.lists import Several, Values, element_keys
 from friso.stage.motion import DURATION, Motion, ReferenceForm, Tone, register_motion
 from friso.stage.section import Rule
-from friso.stage.tables import ROUNDING
+from friso.stage.tables import TIME_ROUNDING
 
 AMPLITUDE, FREQUENCY, PHASE = (f"motion.{name}" for name in ("amplitude", "frequency", "phase"))
 
@@ -73,6 +73,8 @@ class Multisine(Motion):
         first, *others = (float(frequency) for frequency in _numbers(flat, FREQUENCY))
         most = max(1, int(first * flat[DURATION]))
         ratios = [Fraction(other / first).limit_denominator(most) for other in others]
-        exact = all(abs(other / first - ratio) <= ROUNDING * ratio for other, ratio in zip(others, ratios, strict=True))
+        exact = all(
+            abs(other / first - ratio) <= TIME_ROUNDING * ratio for other, ratio in zip(others, ratios, strict=True)
+        )
         periods = lcm(*(ratio.denominator for ratio in ratios))
         return periods / first if exact and periods <= most else None

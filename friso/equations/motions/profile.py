@@ -27,7 +27,7 @@ from friso.stage.motion import (
     register_motion,
 )
 from friso.stage.section import Rule
-from friso.stage.tables import ROUNDING
+from friso.stage.tables import TIME_ROUNDING
 
 LIMITS = {"velocity": "m/s", "acceleration": "m/s^2", "jerk": "m/s^3", "snap": "m/s^4"}
 """Limits of a move, from velocity to its highest derivative, and their units."""
@@ -190,7 +190,7 @@ class MoveProfile(Motion):
         ),
         Rule(
             (DISTANCE, DURATION),
-            lambda f: _end(f) <= f[DURATION] * (1 + ROUNDING),
+            lambda f: _end(f) <= f[DURATION] * (1 + TIME_ROUNDING),
             "a duration in which all moves end; left out, it is that of all moves with their dwells",
             'duration = "20 s"',
         ),
@@ -226,7 +226,7 @@ class MoveProfile(Motion):
             Lowered(float(move.distance), name, float(flat[f"motion.{name}"]), float(peak), unit)
             for move, _, _ in _moves(flat)
             for (name, unit), peak in zip(LIMITS.items(), move.peaks, strict=False)
-            if peak < flat[f"motion.{name}"] * (1 - ROUNDING)
+            if peak < flat[f"motion.{name}"] * (1 - TIME_ROUNDING)
         ]
 
     @staticmethod

@@ -10,7 +10,7 @@ import numpy as np
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage.motion import DURATION, Motion, Piece, Stand, register_motion
 from friso.stage.section import Rule
-from friso.stage.tables import ROUNDING
+from friso.stage.tables import TIME_ROUNDING
 
 ACCELERATION, TIME, RETURN, CRUISE = (
     f"motion.{name}" for name in ("acceleration", "acceleration_time", "return_at", "cruise_ratio")
@@ -38,13 +38,13 @@ class ThereAndBack(Motion):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             (TIME, RETURN),
-            lambda f: _time_there(f) <= f[RETURN] * (1 + ROUNDING),
+            lambda f: _time_there(f) <= f[RETURN] * (1 + TIME_ROUNDING),
             "the move there (2 + cruise_ratio times acceleration_time) finished before return_at",
             'acceleration_time = "30 ms", return_at = "5 s"',
         ),
         Rule(
             (TIME, RETURN, DURATION),
-            lambda f: f[RETURN] + _time_there(f) <= f[DURATION] * (1 + ROUNDING),
+            lambda f: f[RETURN] + _time_there(f) <= f[DURATION] * (1 + TIME_ROUNDING),
             "the move back (return_at + 2 + cruise_ratio times acceleration_time) finished within the duration",
             'acceleration_time = "30 ms", return_at = "5 s", duration = "20 s"',
         ),

@@ -27,7 +27,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.component import key
 from friso.equations.model import assemble
 from friso.equations.structure import Structure, shared_structure
-from friso.frequency.describing.function import RTOL, checked_positive, dynamic_stiffness
+from friso.frequency.describing.function import IMPOSED_RTOL, checked_positive, dynamic_stiffness
 from friso.frequency.settings import settings
 from friso.frequency.system import Declared
 from friso.stage import Stage
@@ -66,14 +66,14 @@ def beyond_stroke(flat: Mapping[str, Any], deflections: np.ndarray) -> np.ndarra
     return deflections > flat["joint.stroke"] if free else np.zeros(np.shape(deflections), bool)
 
 
-AMPLITUDES = np.geomspace(1e-9, 1.0, 181)
+DEFAULT_AMPLITUDES = np.geomspace(1e-9, 1.0, 181)
 """Default amplitudes [m] of the grid."""
 
-FREQUENCIES = np.geomspace(1e-4, 1e3, 281)
+DEFAULT_FREQUENCIES = np.geomspace(1e-4, 1e3, 281)
 """Default frequencies [Hz] of the grid."""
 
 
-TURN, WITHIN = np.pi / 2, 16
+TURN, PARTS_BETWEEN = np.pi / 2, 16
 """Largest turn [rad] of the loop between neighbouring frequencies, and number of parts in which the loop is examined
 between them."""
 
@@ -103,9 +103,9 @@ class Balance:
 
 def single_harmonic(
     stage: Stage,
-    amplitudes: Sequence[float] | np.ndarray = AMPLITUDES,
-    frequencies: Sequence[float] | np.ndarray = FREQUENCIES,
-    rtol: float = RTOL,
+    amplitudes: Sequence[float] | np.ndarray = DEFAULT_AMPLITUDES,
+    frequencies: Sequence[float] | np.ndarray = DEFAULT_FREQUENCIES,
+    rtol: float = IMPOSED_RTOL,
 ) -> Balance:
     """Solve the single-harmonic balance of a stage with friction on a grid.
 
@@ -178,7 +178,7 @@ class _Loop:
     def refined(self, frequencies: np.ndarray) -> np.ndarray:
         """Return ascending frequencies [Hz], (n,), with more inserted where the loop turns by TURN."""
         for _ in range(settings.grid_halvings):
-            logs, share = np.log(frequencies), np.linspace(0, 1, WITHIN + 1)
+            logs, share = np.log(frequencies), np.linspace(0, 1, PARTS_BETWEEN + 1)
             dense = np.exp(logs[:-1, None] + np.diff(logs)[:, None] * share)
             answer = receptance(self.stage.flat(), dense.ravel())[0].reshape(dense.shape)
             turned = np.sum(np.abs(np.angle(answer[:, 1:] / answer[:, :-1])), axis=1)

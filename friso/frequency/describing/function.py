@@ -39,7 +39,7 @@ from friso.stage.arguments import check_arguments
 if TYPE_CHECKING:
     import xarray as xr
 
-RTOL = 1e-9
+IMPOSED_RTOL = 1e-9
 """Default relative tolerance of the runs."""
 
 
@@ -53,7 +53,7 @@ class Imposition:
 
     flat: Mapping[str, Any]
     count: int
-    rtol: float = RTOL
+    rtol: float = IMPOSED_RTOL
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> Imposition:
@@ -204,7 +204,7 @@ def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple
     return np.linalg.solve(slopes, -missed[:, :, None])[:, :, 0], missed, fine
 
 
-SAMPLES = 4096
+HARMONIC_SAMPLES = 4096
 """Default number of samples per period for the higher harmonics."""
 
 NOT_CLOSED = "no periodic steady state found: the law's own states do not repeat; tighten rtol"
@@ -212,7 +212,7 @@ NOT_RUN = "a run was not completed: loosen rtol"
 
 
 def dynamic_stiffness(
-    flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float = RTOL
+    flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float = IMPOSED_RTOL
 ) -> np.ndarray:
     """Return the dynamic stiffness N = F_1/A [N/m], complex, of friction, shape (count,).
 
@@ -234,8 +234,8 @@ def describing(
     amplitudes: Sequence[float] | np.ndarray,
     frequencies: Sequence[float] | np.ndarray,
     harmonics: int = 1,
-    samples: int = SAMPLES,
-    rtol: float = RTOL,
+    samples: int = HARMONIC_SAMPLES,
+    rtol: float = IMPOSED_RTOL,
 ) -> xr.Dataset:
     """Describing function of the stage's friction, over amplitude [m] and frequency [Hz].
 

@@ -26,7 +26,7 @@ from scipy.optimize.elementwise import find_root
 
 from friso.engine.tolerance import checked_rtol
 from friso.frequency.describing.balance import TOUCHES, beyond_stroke
-from friso.frequency.describing.function import RTOL, Imposition, checked_positive, dynamic_stiffness
+from friso.frequency.describing.function import IMPOSED_RTOL, Imposition, checked_positive, dynamic_stiffness
 from friso.frequency.parts import mechanics
 from friso.frequency.settings import settings
 from friso.stage import Stage
@@ -35,7 +35,7 @@ from friso.stage.arguments import check_arguments
 if TYPE_CHECKING:
     import xarray as xr
 
-LIMITS = (1e-18, 1e18)
+AMPLITUDE_LIMITS = (1e-18, 1e18)
 """Smallest and largest amplitude [m] of the search."""
 
 
@@ -53,7 +53,7 @@ class DrivenPlant:
     rtol: float
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any], frequencies: np.ndarray, rtol: float = RTOL) -> DrivenPlant:
+    def of(cls, flat: Mapping[str, Any], frequencies: np.ndarray, rtol: float = IMPOSED_RTOL) -> DrivenPlant:
         """Return the plant of a stage whose limiter is not touched, at frequencies [Hz]."""
         (compliances,) = mechanics(flat, np.zeros(1, bool)).at(2j * np.pi * frequencies)
         return cls(flat, frequencies, compliances, rtol)
@@ -91,7 +91,7 @@ class DrivenPlant:
         """
         rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
         with np.errstate(over="ignore"):
-            bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *LIMITS)
+            bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *AMPLITUDE_LIMITS)
         stuck = np.abs(self.answer(np.full(shape[1], self.stuck), rows)[1][:, 1])
         slid = np.abs(self.answer((settings.free_amplitude * bare).ravel(), np.tile(rows, shape[0]))[1][:, 1]).reshape(
             shape
@@ -106,7 +106,7 @@ class DrivenPlant:
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
         """Return amplitudes moved until they need less force (`side` -1) or more (1) than `forces`."""
-        amplitudes = np.clip(amplitudes, *LIMITS)
+        amplitudes = np.clip(amplitudes, *AMPLITUDE_LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
         for _ in range(settings.most_decades):
             reached = self.answer(amplitudes[force, frequency], frequency)[0]
@@ -114,7 +114,7 @@ class DrivenPlant:
             force, frequency = force[missed], frequency[missed]
             if not force.size:
                 break
-            amplitudes[force, frequency] = np.clip(amplitudes[force, frequency] * 10.0**side, *LIMITS)
+            amplitudes[force, frequency] = np.clip(amplitudes[force, frequency] * 10.0**side, *AMPLITUDE_LIMITS)
         return amplitudes
 
     def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -176,7 +176,10 @@ MISSING = "answers are missing: friction was not found at some amplitude, or the
 
 @check_arguments
 def plant_response(
-    stage: Stage, forces: Sequence[float] | np.ndarray, frequencies: Sequence[float] | np.ndarray, rtol: float = RTOL
+    stage: Stage,
+    forces: Sequence[float] | np.ndarray,
+    frequencies: Sequence[float] | np.ndarray,
+    rtol: float = IMPOSED_RTOL,
 ) -> xr.Dataset:
     """First-harmonic response of the plant to sinusoidal actuator forces `forces` [N].
 
@@ -325,7 +328,7 @@ def mass_line(
     places: Sequence[Mapping[str, Any]],
     forces: Sequence[float] | np.ndarray,
     frequencies: Sequence[float] | np.ndarray,
-    rtol: float = RTOL,
+    rtol: float = IMPOSED_RTOL,
 ) -> xr.Dataset:
     """Return how far the measured plant lies off the line 1/(m omega^2), place by place.
 

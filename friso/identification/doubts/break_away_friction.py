@@ -13,9 +13,9 @@ from friso.identification.readings.common import by_direction, robust, stribeck_
 from friso.identification.readings.ramps import Ramps, force_ramps
 from friso.identification.readings.settings import settings
 from friso.identification.settings import doubt_settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
-MEDIAN = 1.25
+MEDIAN_ERROR_RATIO = 1.25
 """Ratio of the standard deviations of median and mean, for normal errors: sqrt(pi / 2), rounded."""
 
 
@@ -52,8 +52,8 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
     medians = [float(np.median(friction[side])) for side in sides]
     middle = float(np.mean(medians))
     apart = robust(friction - np.where(sides[0], *medians))
-    scatter = MEDIAN * apart * np.sqrt(sum(1 / side.sum() for side in sides)) / len(sides)
-    unsure = COVERAGE * scatter + float(np.median(ramps.unsure))
+    scatter = MEDIAN_ERROR_RATIO * apart * np.sqrt(sum(1 / side.sum() for side in sides)) / len(sides)
+    unsure = NORMAL_COVERAGE * scatter + float(np.median(ramps.unsure))
     return middle if middle - unsure > static.high else None
 
 

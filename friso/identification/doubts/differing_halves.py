@@ -11,7 +11,7 @@ from friso.identification.doubt import Doubt, RaisedDoubt, ValueCase
 from friso.identification.inverse_model import InverseModel, least_squares
 from friso.identification.settings import doubt_settings
 from friso.identification.spread import spread_of
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb friction"}
 """Quantities of the inverse model, as named in sentences."""
@@ -60,7 +60,7 @@ def halves(inverse: InverseModel) -> list[Half]:
         fits.append((solution, np.sqrt(np.diag(spread_of(columns, left)))))
     values, off = (np.array(rows) for rows in zip(*fits, strict=True))
     apart = np.abs(values[0] - values[1]) > doubt_settings.deviations_of_differing_halves * np.hypot(*off)
-    low, high = (values - COVERAGE * off).min(axis=0), (values + COVERAGE * off).max(axis=0)
+    low, high = (values - NORMAL_COVERAGE * off).min(axis=0), (values + NORMAL_COVERAGE * off).max(axis=0)
     return [
         Half(name, *(float(number) for number in (*values[:, i], low[i], high[i])))
         for i, name in enumerate(WORDS)

@@ -10,7 +10,7 @@ import numpy as np
 from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
 from friso.identification.output_error.fit import everywhere, fits
 from friso.identification.settings import doubt_settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 from friso.progress import between
 
 EITHER = ("friction.viscous_asymmetry", "bias.cart", "bias.stage")
@@ -38,7 +38,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     starts = everywhere(both.problem, free, both.inner) if case.quality.lacks_something else both.inner[None]
     progress = between(case.progress, 0, 1, "moves: forward and backward motion alone")
     alone = fits(problems, free, starts, progress)
-    off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / COVERAGE
+    off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / NORMAL_COVERAGE
     left = sum(one.cost for one in alone) * len(counted) / counted.sum()
     reaching = both.with_deviations(np.maximum(off, both.deviation))
     if left >= doubt_settings.cost_share_of_either_direction * both.left**2:

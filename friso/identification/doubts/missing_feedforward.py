@@ -13,7 +13,7 @@ from friso.identification.inverse_model import InverseModel, least_squares, move
 from friso.identification.logs.log import Log
 from friso.identification.settings import doubt_settings
 from friso.identification.spread import spread_of
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 ACCELERATION, DIRECTION = "reference acceleration", "reference direction"
 """Names of the additional columns of the inverse model."""
@@ -71,7 +71,7 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
     columns = np.column_stack([inverse.columns, fed])
     for rows in np.array_split(fast, 2):
         solution, left = least_squares(columns[rows], inverse.measured[rows])
-        if not solution[-1] > COVERAGE * np.sqrt(spread_of(columns[rows], left)[-1, -1]):
+        if not solution[-1] > NORMAL_COVERAGE * np.sqrt(spread_of(columns[rows], left)[-1, -1]):
             return False
     force = inverse.measured[fast]
     without, left = (least_squares(some[fast], force)[1] for some in (inverse.columns, columns))

@@ -22,7 +22,7 @@ from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
 from friso.stage import Stage
 
-STARTS = np.linspace(0.1, 0.7, 7)
+SETTLED_SHARES = np.linspace(0.1, 0.7, 7)
 """Fractions of a plateau after which it may have settled, tried in turn."""
 
 KEY, UNIT = "joint.stiffness", "N/m"
@@ -150,7 +150,7 @@ def _settled_window(
     margin = min(length // 10, int(1 / (experiment_settings.low_pass_of_steps * log.sample_time)))
     range_of_force = float(np.subtract(*np.percentile(force, [95, 5])))
     limits = experiment_settings.drift_of_a_settled_force, experiment_settings.drift_of_a_settled_place
-    for allowed, share in product(limits, STARTS):
+    for allowed, share in product(limits, SETTLED_SHARES):
         chosen = slice(span.start + int(share * length), span.stop - margin)
         if chosen.stop - chosen.start < 2 * reading_settings.blocks_of_a_mean:
             continue

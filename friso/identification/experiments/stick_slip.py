@@ -31,7 +31,7 @@ from friso.identification.readings.rate_effect import static_friction
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.readings.slips import Slip, slips
 from friso.identification.settings import experiment_settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 from friso.stage import Stage
 
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
@@ -146,7 +146,7 @@ def _pull(
         raise InputError("stiffness", f"{value:g} +/- {half:g} N/m", "a stiffness greater than 0", "2.4 N/mm", log.name)
     if deflected is None:
         deflected = channel(log, "relative_position")  # raises if missing
-    return value * deflected, half / COVERAGE / value
+    return value * deflected, half / NORMAL_COVERAGE / value
 
 
 def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutoff: float) -> Estimate:
@@ -249,7 +249,7 @@ def _answer(
         if not chosen.any():
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", f"{why}{words}", 0.0)
         if held[chosen].mean() > experiment_settings.share_of_held_slips:
-            low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * COVERAGE)))
+            low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * NORMAL_COVERAGE)))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
         used = chosen & (rates > 0)  # ranges of held mean values may be missing
         return static_friction(KEY, forces[used], rates[used], relative_error, late[used].mean())

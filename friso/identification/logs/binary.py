@@ -29,7 +29,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file."""
 
 
-MOST, PER_BYTE = 256 << 20, 16
+MOST_CONTENT_BYTES, PER_BYTE = 256 << 20, 16
 """Limit on the bytes of the contents: a fixed number, plus a multiple of the file's size."""
 
 
@@ -228,7 +228,7 @@ def _plain(node: Any) -> Any:
 
 def most_bytes(size: int) -> int:
     """Return how many bytes a file's pickled contents may have, by the file's `size` [B]."""
-    return MOST + PER_BYTE * size
+    return MOST_CONTENT_BYTES + PER_BYTE * size
 
 
 def _too_much(size: int, most: int) -> str:

@@ -16,7 +16,7 @@ from friso.errors import LogError
 from friso.identification.logs.settings import settings
 from friso.identification.logs.units import is_unit, split_heading
 
-REMEMBERED = 4
+REMEMBERED_LAYOUTS = 4
 """Number of files whose layout is cached, because each file is examined several times."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
@@ -79,7 +79,7 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
     return encoding, [*lines]
 
 
-@lru_cache(REMEMBERED)
+@lru_cache(REMEMBERED_LAYOUTS)
 def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
     """Return encoding and lines of the beginning of a file; None if it is no text."""
     encoding = next((name for mark, name in _BYTE_ORDER_MARKS if head.startswith(mark)), "")
@@ -165,7 +165,7 @@ def layout(path: Path) -> TextLayout:
     raise LogError("log", actual, expected, "time [s];position [mm];force [N]", str(path))
 
 
-@lru_cache(REMEMBERED)
+@lru_cache(REMEMBERED_LAYOUTS)
 def _best_fit(encoding: str, lines: Sequence[str]) -> TextLayout | None:
     """Return the layout that fits lines best; None if none fits."""
     split = {delimiter: [split_line(line, delimiter) for line in lines] for delimiter, _ in _CANDIDATES}

@@ -40,7 +40,7 @@ RESPONSES = tuple(
 """Units of frequency responses: positions and their rates over forces, or over substitutes of forces."""
 _SPELLINGS = {text: unit for unit, texts in _WORDS["spellings"].items() for text in texts} | dict.fromkeys(RMS, "A")
 """The units that friso knows, by their usual spellings."""
-_MEGA = 1e5
+MISSPELT_FROM = 1e5
 """Factor above which a unit is a misspelling: no log is in megametres, megaseconds or gigaradians."""
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
@@ -101,7 +101,7 @@ def unit_factor(unit: str, si_unit: str) -> float | None:
         factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
         return None
-    return None if si_unit in ("m", "s", "rad") and factor > _MEGA else factor
+    return None if si_unit in ("m", "s", "rad") and factor > MISSPELT_FROM else factor
 
 
 def is_unit(text: str) -> bool:

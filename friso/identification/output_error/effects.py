@@ -11,7 +11,7 @@ from scipy.stats import chi2, norm
 from friso.identification.output_error.fit import OutputErrorFit, spread_along
 from friso.identification.output_error.settings import settings
 from friso.identification.spread import correlation_length
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
     """Return the fit with intervals extended at both ends by `further`, shape (free,)."""
-    return fit.with_deviations(fit.deviation + further / COVERAGE)
+    return fit.with_deviations(fit.deviation + further / NORMAL_COVERAGE)
 
 
 def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: OutputErrorFit) -> list[np.ndarray]:

@@ -17,7 +17,7 @@ from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.settings import settings
 from friso.identification.spread import correlation_length, groups_of, spread_of
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 from friso.progress import Progress, Tally, share_of, silent
 
 
@@ -66,7 +66,7 @@ class OutputErrorFit:
         for number, deviation in zip(self.free, self.deviation, strict=True):
             parameter = self.problem.parameters[number]
             most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
-            bounded |= {number} if COVERAGE * deviation < most else set()
+            bounded |= {number} if NORMAL_COVERAGE * deviation < most else set()
         return bounded
 
     def is_noise_of_motion(self, noise: float) -> bool:
@@ -302,8 +302,8 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
     """
     if not moved:
         return covariance
-    wanted = np.sqrt(np.diag(covariance)) + np.linalg.norm(moved, axis=0) / COVERAGE
-    further = covariance + sum(np.outer(off, off) for off in moved) / COVERAGE**2
+    wanted = np.sqrt(np.diag(covariance)) + np.linalg.norm(moved, axis=0) / NORMAL_COVERAGE
+    further = covariance + sum(np.outer(off, off) for off in moved) / NORMAL_COVERAGE**2
     deviation = np.sqrt(np.diag(further))
     finite = np.isfinite(deviation) & (deviation > 0)
     wider = np.divide(wanted, deviation, out=np.ones_like(wanted), where=finite)

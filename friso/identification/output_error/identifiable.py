@@ -32,12 +32,12 @@ from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import low_pass
 from friso.progress import Progress, between, silent
 
-PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
+PLAIN_SHARE, LOOP_SHARE, ALONG_SHARE, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
 """Fractions of the whole fit that are done after its steps: mass and sliding friction; all parameters in closed loop;
 all parameters along the log; the closed loop from the fit along the log. Uncertainties are the last step.
 """
 
-FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
+FITTED_SHARE, SETTLED_SHARE, PROFILED_SHARE = 0.5, 0.65, 0.95
 """Fractions of the fit along the log that are done after its steps: all parameters; motion between samples; profiles.
 The last step refits the determined parameters.
 """
@@ -78,24 +78,24 @@ def fit_identifiable(
     """
     names = follows.names
     core = {parameter.name for parameter in follows.parameters if parameter.core}
-    part = between(progress, 0, PLAIN, "moves: mass and sliding friction along the log")
+    part = between(progress, 0, PLAIN_SHARE, "moves: mass and sliding friction along the log")
     plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None], part)
     explaining = []
     if loop is not None:
         numbers = tuple(range(len(names)))
-        part = between(progress, PLAIN, LOOP, "moves: all parameters in closed loop")
+        part = between(progress, PLAIN_SHARE, LOOP_SHARE, "moves: all parameters in closed loop")
         full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]), part)
         if full.explains(noise, closely=True):
-            return believed(full, core, covered, between(progress, LOOP, 1), explained=True)
+            return believed(full, core, covered, between(progress, LOOP_SHARE, 1), explained=True)
         explaining = [full] if full.explains(noise) else []
-    part = between(progress, *((PLAIN, 1) if loop is None else (LOOP, ALONG)))
+    part = between(progress, *((PLAIN_SHARE, 1) if loop is None else (LOOP_SHARE, ALONG_SHARE)))
     along = _identifiable_on_log(follows, plain, core, covered, noise, part)
     if loop is None:
         return along
     starts = nearby(along.fit)
     if set(along.fit.free) - set(_numbers(names, core)):
         starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
-    part = between(progress, ALONG, AGAIN_LOOP, "moves: the closed loop from there")
+    part = between(progress, ALONG_SHARE, AGAIN_LOOP, "moves: the closed loop from there")
     best = min((fit(loop, along.fit.free, starts, part), *explaining), key=attrgetter("cost"))
     if not (_in_step(best, along.fit, bandwidth) and bounds_as_much(best, along.fit)):
         return along
@@ -119,13 +119,13 @@ def _identifiable_on_log(
     if not hopeful:
         return IdentifiableFit(plain, {}, frozenset())
     numbers = _numbers(names, core | hopeful)
-    part = between(progress, 0, FITTED, "moves: all parameters along the log")
+    part = between(progress, 0, FITTED_SHARE, "moves: all parameters along the log")
     full = fit(follows, numbers, everywhere(follows, numbers, plain.inner), part)
-    between(progress, FITTED, SETTLED)(0, 0, "moves: what happens between the samples")
+    between(progress, FITTED_SHARE, SETTLED_SHARE)(0, 0, "moves: what happens between the samples")
     full = with_force_settled(with_smoothness_settled(full), noise)
     if not full.explains(noise):
         full = with_force_settled(with_smoothness_settled(_searched_again(full)), noise)
-    answer = believed(full, core, covered, between(progress, SETTLED, PROFILED))
+    answer = believed(full, core, covered, between(progress, SETTLED_SHARE, PROFILED_SHARE))
     if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)
     alone = full.explains(noise) and not plain.explains(noise)
@@ -137,7 +137,7 @@ def _identifiable_on_log(
         return replace(answer, fit=plain)
     free = _numbers(names, core | answer.shown | ({EXPONENT} if RATIO in answer.shown else set()))
     neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
-    part = between(progress, PROFILED, 1, "moves: the parameters that are shown")
+    part = between(progress, PROFILED_SHARE, 1, "moves: the parameters that are shown")
     return replace(answer, fit=fit(full.problem, free, neutral[None], part))
 
 

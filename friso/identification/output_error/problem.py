@@ -28,7 +28,7 @@ from friso.stage.controllers import CONTROLLER
 
 CONTINUOUS = "the controller is simulated in continuous time"
 
-PASSES = 5 / 8
+NOISE_BANDWIDTH = 5 / 8
 """Noise bandwidth [Hz] of a critically damped second-order loop, in units of its natural frequency [rad/s]."""
 
 
@@ -103,7 +103,7 @@ class Problem:
         if self.closed:
             return noise
         omega = 2 * self.flat[KP] / self.flat[KD]
-        passes = min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time))
+        passes = min(1.0, np.sqrt(2 * NOISE_BANDWIDTH * omega * self.inputs.sample_time))
         linear = reading_settings.linearity_of_sensors * float(np.std(self.inputs.force[self.counted > 0]))
         most = output_error_settings.friction_share_of_linearity
         linear = min([linear, *(most * one.start for one in self.parameters if one.name == "friction.coulomb")])

@@ -11,7 +11,7 @@ from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.settings import settings
 from friso.progress import Progress, silent
 
-LADDER = np.array([0.1, 1.0, 10.0, 100.0])
+TRIED_DAMPINGS = np.array([0.1, 1.0, 10.0, 100.0])
 """Levenberg-Marquardt dampings that are tried at once, relative to the previous best damping."""
 
 
@@ -63,12 +63,18 @@ def refine_fit(
         rows = np.flatnonzero(busy)
         if not rows.size:
             break
-        step = _best_steps(pieces, inner[rows], rest[rows], slopes[rows], damping[rows, None] * LADDER, (low, high))
+        step = _best_steps(
+            pieces, inner[rows], rest[rows], slopes[rows], damping[rows, None] * TRIED_DAMPINGS, (low, high)
+        )
         fallen = cost[rows] - step.cost
         better, slow = fallen > 0, fallen < enough * cost[rows]
         late = cost[rows] - (iterations - iteration) * np.maximum(fallen, 0.0) > aim
         poor = fallen < settings.share_of_predicted_fall * (cost[rows] - step.predicted)
-        raised = np.where(exact[rows], damping[rows] * LADDER[-1] * (LADDER[1] / LADDER[0]) / LADDER[0], damping[rows])
+        raised = np.where(
+            exact[rows],
+            damping[rows] * TRIED_DAMPINGS[-1] * (TRIED_DAMPINGS[1] / TRIED_DAMPINGS[0]) / TRIED_DAMPINGS[0],
+            damping[rows],
+        )
         damping[rows] = np.where(better, step.damping, raised)
         busy[rows] = ~(exact[rows] & (late | (better & slow)))
         asked[rows] = np.where(better, poor | slow | late, ~exact[rows])

@@ -15,8 +15,8 @@ from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import digit_of, noise_of
 from friso.identification.settings import identification_settings
-from friso.identification.spread import CONFIDENCE, binned
-from friso.intervals import COVERAGE
+from friso.identification.spread import UPPER_PROBABILITY, binned
+from friso.intervals import NORMAL_COVERAGE
 from friso.progress import Progress
 
 
@@ -39,7 +39,7 @@ def as_far_off_as_repeated(
         until = settings.iterations_of_a_repetition, settings.cost_share_of_refinement
         again.append(refine_fit([like], once.inner[None], free, *until, slopes=once.slopes))
     off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
-    off = off * float(student.ppf(CONFIDENCE, settings.repetitions_of_a_fit)) / COVERAGE
+    off = off * float(student.ppf(UPPER_PROBABILITY, settings.repetitions_of_a_fit)) / NORMAL_COVERAGE
     usual = float(np.mean([fit.cost[0] for fit in again]))
     off *= np.sqrt(max(1.0, once.cost / usual)) if 0 < usual < np.inf else 1.0
     return once.with_deviations(np.maximum(off, once.deviation))
@@ -56,7 +56,7 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
     late = fit.value("friction.bristle_stiffness") * fit.problem.inputs.sample_time
     covariance = fit.covariance.copy()
     place = fit.fitted.index("friction.bristle_damping")
-    covariance[place, place] += (late / fit.value("friction.bristle_damping") / COVERAGE) ** 2
+    covariance[place, place] += (late / fit.value("friction.bristle_damping") / NORMAL_COVERAGE) ** 2
     return fit.with_covariance(covariance)
 
 

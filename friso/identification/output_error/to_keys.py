@@ -14,7 +14,7 @@ from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, 
 from friso.identification.output_error.settings import settings
 from friso.identification.output_error.settings import settings as output_error_settings
 from friso.identification.readings.settings import settings as reading_settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 METHOD = "output error"
 
@@ -37,7 +37,7 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     shares = np.full(len(keys), reading_settings.linearity_of_sensors)
     if "friction.static" in keys and not fit.problem.closed:
         shares[keys.index("friction.static")] = output_error_settings.static_error_of_following
-    linear = shares * np.abs([values[key] for key in keys]) / COVERAGE
+    linear = shares * np.abs([values[key] for key in keys]) / NORMAL_COVERAGE
     of_logarithm = {parameter.name for parameter in parameters if parameter.logarithmic}
     logarithmic = np.isin([_OWNERS.get(key, key) for key in keys], [*of_logarithm])
     spread_of_keys = np.sqrt(np.diag(covariance))
@@ -69,7 +69,7 @@ def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray
     """
     size = np.abs(values)
     relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)
-    farther = size * np.expm1(COVERAGE * np.minimum(relative, 1.0)) / COVERAGE
+    farther = size * np.expm1(NORMAL_COVERAGE * np.minimum(relative, 1.0)) / NORMAL_COVERAGE
     return np.where(relative > 0, np.maximum(farther, deviation), deviation)
 
 
@@ -112,7 +112,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
             continue
         half = max(abs(float(parameter.inner(end)) - fit.inner[number]) for end in (interval.low, interval.high))
         if spread[i] > 0:
-            factors[i] = max(1.0, half / (COVERAGE * spread[i]))
+            factors[i] = max(1.0, half / (NORMAL_COVERAGE * spread[i]))
     return fit.covariance * np.outer(factors, factors)
 
 
@@ -146,7 +146,7 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
     if owner == RATIO:
         level = parameters["friction.coulomb"]
         number = number_of[level.name]
-        off = COVERAGE * float(np.sqrt(fit.covariance[fit.free.index(number), fit.free.index(number)]))
+        off = NORMAL_COVERAGE * float(np.sqrt(fit.covariance[fit.free.index(number), fit.free.index(number)]))
         ends = level.inner(level.low), level.inner(level.high)
         least, most = (float(level.outer(np.clip(fit.inner[number] + end, *ends))) for end in (-off, off))
         return least * parameter.low, most * parameter.high
@@ -174,7 +174,9 @@ def drawn_from(
         rng.standard_normal((settings.machines_drawn, len(determined))) @ (ways * np.sqrt(np.clip(sizes, 0.0, None))).T
     )
     values = {
-        estimate.name: np.clip(estimate.value + step * estimate.half_width / COVERAGE, estimate.low, estimate.high)
+        estimate.name: np.clip(
+            estimate.value + step * estimate.half_width / NORMAL_COVERAGE, estimate.low, estimate.high
+        )
         for estimate, step in zip(determined, steps.T, strict=True)
     }
     for estimate in estimates:

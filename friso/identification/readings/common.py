@@ -16,9 +16,9 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.readings.settings import settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
-ORDER = 2
+FILTER_ORDER = 2
 """Order of the Butterworth low-pass filter. It is applied forward and backward, which makes 4 in total."""
 
 NORMAL_MAD = 1.4826
@@ -109,7 +109,7 @@ def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarra
 @lru_cache(maxsize=16)
 def _butterworth(sample_time: float, cutoff: float) -> np.ndarray:
     """Return the low-pass filter as second-order sections (cached for repeated fits)."""
-    return np.asarray(butter(ORDER, cutoff, fs=1 / sample_time, output="sos"))
+    return np.asarray(butter(FILTER_ORDER, cutoff, fs=1 / sample_time, output="sos"))
 
 
 def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
@@ -294,7 +294,7 @@ def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray)
     Systematic `shifts`, shape (m, p), move the quantities together; errors of half-width `even`, shape (p,), are
     independent.
     """
-    total = covariance + (shifts.T @ shifts + np.diag(even**2)) / COVERAGE**2
+    total = covariance + (shifts.T @ shifts + np.diag(even**2)) / NORMAL_COVERAGE**2
     size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
     return total / np.outer(size, size)
 

@@ -18,7 +18,7 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.common import block_mean, by_t, channel, low_pass, on_bearing
 from friso.identification.readings.passes import Pass, passes
 from friso.identification.readings.settings import settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
     travel = min(np.isfinite(m.force).sum() * (m.places[1] - m.places[0]) for m in maps)
     independent = max(travel / (2 * float(np.median(lengths_shown))), 4.0)
     error = max((independent - 3) ** -0.5, float(z.std(ddof=1)) / len(z) ** 0.5 if len(z) > 1 else 0.0)
-    value, low, high = np.tanh(z.mean() + COVERAGE * error * np.array([0, -1, 1]))
+    value, low, high = np.tanh(z.mean() + NORMAL_COVERAGE * error * np.array([0, -1, 1]))
     method = f"mean correlation of the force over position between {len(pairs)} pairs of passes"
     return Estimate("repeatability", "1", float(value), float(low), float(high), method)
 

@@ -15,7 +15,7 @@ from friso.identification.readings.common import Mean, by_direction, by_t, t_val
 from friso.identification.readings.passes import Pass, on_common_places, passes, places_of
 from friso.identification.readings.settings import settings
 from friso.identification.readings.stribeck import FittedStribeck, Forces, Possible, stribeck_fit
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 METHOD = "mean forces over stretches of constant velocity"
 
@@ -159,7 +159,7 @@ def _deviations(errors: np.ndarray) -> np.ndarray:
 
     A stretch whose velocity swings counts less; a stretch that happens to be very even counts no more than others.
     """
-    return np.maximum(errors, float(np.median(errors))) / COVERAGE
+    return np.maximum(errors, float(np.median(errors))) / NORMAL_COVERAGE
 
 
 def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -197,7 +197,7 @@ def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
     This is the weighted RMS of the deviations that follow from their half-widths `errors` [N]. The weights follow from
     `deviations` [N].
     """
-    return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
+    return float(np.average((errors / NORMAL_COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
 
 
 def _nothing(reason: str) -> Direction:

@@ -103,12 +103,12 @@ def _half(push: np.ndarray) -> int:
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])
 
 
-LOSS = 2.2
+PEAK_LOSS = 2.2
 """Loss of a smoothed peak of a ramp that ends in a sudden fall, in units of its rise R w within one deviation w of the
 Gaussian. It holds for a fall by 10 R w (least over k of k Phi(k) + phi(k) + 10 Phi(-k), of the normal distribution;
 1.8 for a fall by 5 R w, 2.8 for one by 50); a gradual fall loses less."""
 
-GAUSSIAN = 0.1325
+GAUSSIAN_WIDTH = 0.1325
 """Standard deviation of a Gaussian in time, times the frequency at which it halves the power: sqrt(ln 2) / (2 pi)."""
 
 
@@ -162,12 +162,12 @@ def peak(
     begin, start = marks
     rest = slice(begin, (begin + start) // 2)
     noise = scatter(force[rest]), mass / sample_time**2 * scatter(position[rest])
-    least = max(GAUSSIAN / (cutoff * sample_time), 1.0)
+    least = max(GAUSSIAN_WIDTH / (cutoff * sample_time), 1.0)
     widths = np.geomspace(least, max(settings.ramp_share_of_a_width * (start - begin), least), settings.widths_tried)
     # deviations of white noise under a Gaussian, and under its second derivative
     left = np.hypot(noise[0] / np.sqrt(2 * np.pi**0.5 * widths), noise[1] * np.sqrt(3 / (8 * np.pi**0.5 * widths**5)))
     high = left * np.sqrt(2 * np.log(1 + (start - begin) / (2 * widths)))
-    low = LOSS * rising * widths * sample_time
+    low = PEAK_LOSS * rising * widths * sample_time
     best = int(np.argmin(high + low))
     width = float(widths[best])
     # second differences of the smoothed signal: the derivative of a truncated Gaussian does not sum to 0

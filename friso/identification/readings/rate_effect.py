@@ -17,7 +17,7 @@ from friso.identification.readings.common import Mean, by_t, correlated_mean, st
 from friso.identification.readings.settings import settings
 from friso.quantities import percent
 
-_SPEEDS = np.geomspace(1e-4, 10, 2001)
+RELATIVE_SPEEDS = np.geomspace(1e-4, 10, 2001)
 """Speeds, relative to the Stribeck velocity, among which the largest force is searched."""
 
 
@@ -29,8 +29,8 @@ def break_away(
     Static and Coulomb friction are in N, bristle stiffness in N/m, Stribeck velocity in m/s. Inertia, which is left
     out, only raises break-away.
     """
-    level = stribeck_curve(_SPEEDS, coulomb, static, 1.0)
-    creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * _SPEEDS)
+    level = stribeck_curve(RELATIVE_SPEEDS, coulomb, static, 1.0)
+    creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * RELATIVE_SPEEDS)
     return float(max(np.max(level * creep), coulomb))
 
 

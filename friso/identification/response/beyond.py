@@ -26,7 +26,7 @@ IMAGES = np.array([k for k in range(-8, 9) if k])[:, None]
 """Numbers k of the images that are summed, shape (images, 1). At four samples per period the others add 0.00002 of a
 mass's response."""
 
-MILLI = 1e-3
+ONE_THOUSANDTH = 1e-3
 
 
 def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, parameters: np.ndarray) -> np.ndarray:
@@ -35,7 +35,11 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
     `model` returns the responses of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), also negative
     ones. The result has the shape (outputs, lines).
     """
-    delay, held, compliances = parameters[DELAY], MILLI * np.sqrt(parameters[HELD]), parameters[COMPLIANCES:, None]
+    delay, held, compliances = (
+        parameters[DELAY],
+        ONE_THOUSANDTH * np.sqrt(parameters[HELD]),
+        parameters[COMPLIANCES:, None],
+    )
     masses = model(frequency) * np.sinc(frequency * held)
     if held > 0:
         turns = IMAGES + frequency * held
@@ -53,7 +57,7 @@ def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.nd
     """
     late, longest = settings.periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
-    return np.array([-late, 0.0, *-free]), np.array([late, (longest / MILLI) ** 2, *free])
+    return np.array([-late, 0.0, *-free]), np.array([late, (longest / ONE_THOUSANDTH) ** 2, *free])
 
 
 def believed(response: FrequencyResponse) -> tuple[float, float]:
@@ -61,7 +65,7 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 
     They stand for a time between 0 and the whole sample time.
     """
-    half = (_longest(response, settings.periods_of_a_sample) / MILLI) ** 2 / 2
+    half = (_longest(response, settings.periods_of_a_sample) / ONE_THOUSANDTH) ** 2 / 2
     return half, half
 
 

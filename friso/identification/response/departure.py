@@ -15,7 +15,7 @@ from friso.identification.response.fitting import ResponseTarget
 from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 RANDOM = np.sqrt(2 / np.pi)
 """Equivalent damping of Coulomb friction F under a normally distributed velocity with standard deviation v, relative to
@@ -153,7 +153,7 @@ def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
     random, sine = velocity / RANDOM, velocity * np.sqrt(2) * np.pi / 4
     value = max(damping.value, 0.0) * random
     model = abs(sine / random - 1) * value
-    half = float(np.hypot(damping.half_width * random, COVERAGE * model / np.sqrt(3)))
+    half = float(np.hypot(damping.half_width * random, NORMAL_COVERAGE * model / np.sqrt(3)))
     return Estimate("friction.coulomb", unit, value, max(value - half, 0.0), value + half, method)
 
 

@@ -15,9 +15,9 @@ from scipy import stats
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
-TURNED = np.radians(30)
+LARGEST_TURN = np.radians(30)
 """Largest phase deviation [rad] on a straight line beyond the noise, by delay, damping or a mode nearby."""
 
 KINDS: Mapping[int, str] = {0: "stiffness line", 1: "damping line", 2: "mass line"}
@@ -132,7 +132,7 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
         return None
     frequency, level, phase, relative = (quantity[start:stop] for quantity in _flat(response, slope, sign))
     weight = 2 / (relative**2 + 2 * settings.scatter_of_a_straight_line**2)
-    sums = np.stack([weight, weight * level, weight * level**2, np.abs(phase) > TURNED + 2 * relative])
+    sums = np.stack([weight, weight * level, weight * level**2, np.abs(phase) > LARGEST_TURN + 2 * relative])
     sums = np.concatenate([np.zeros((4, 1)), np.cumsum(sums, axis=1)], axis=1)
     step = max(1, -(-len(frequency) // settings.edges_tried))
     first, last = np.arange(0, len(frequency), step)[:, None], np.arange(0, len(frequency), step)[None, :]
@@ -201,7 +201,7 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
     scatter = float(np.sqrt(scale * inverse[0, 0]))
     gains = inverse[0] @ (columns * weight[:, None]).T
     noise = float(np.sqrt(np.sum(gains**2 * relative**2 / 2)))
-    half_width = stats.t.ppf(0.975, free) * scatter if scatter > noise else COVERAGE * noise
+    half_width = stats.t.ppf(0.975, free) * scatter if scatter > noise else NORMAL_COVERAGE * noise
     turned = float(np.average(-np.log(np.cos(phase)), weights=weight))
     bent = float(np.hypot(half_width, np.sum(coefficients[1:] ** 2) / 2))
     return float(coefficients[0]), bent + max(turned, 0.0) + float(np.median(relative)), independent

@@ -15,11 +15,11 @@ from friso.identification.response.fitting import ResponseFit, ResponseTarget, d
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import settings
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 
 METHOD = "two-mass model fitted to the response"
 
-FAR = np.log(30.0)
+FARTHEST_LOG = np.log(30.0)
 """Logarithm of the factor by which masses and stiffness may differ from the start; damping may by twice as much."""
 
 DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, BEYOND = range(7)
@@ -130,7 +130,7 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     if not estimate.determined or not all(another.determined and another.half_width > 0 for another in others):
         return estimate
     values = np.array([another.value for another in others])
-    weights = np.array([(COVERAGE / another.half_width) ** 2 for another in others])
+    weights = np.array([(NORMAL_COVERAGE / another.half_width) ** 2 for another in others])
     off = values - np.average(values, weights=weights)
     ratio = max(float(np.sqrt(np.sum(weights * off**2) / (len(others) - 1))), 1.0)
     low, high = (estimate.value + ratio * (end - estimate.value) for end in (estimate.low, estimate.high))
@@ -196,7 +196,7 @@ def _best(
     the lower and upper bounds of delay, hold and compliances. `held` has prior values and deviations of parameters, by
     index.
     """
-    reach = np.array([FAR] * 3 + [2 * FAR])
+    reach = np.array([FARTHEST_LOG] * 3 + [2 * FARTHEST_LOG])
 
     target = ResponseTarget(partial(two_masses, frequency=frequency), values, deviation)
 

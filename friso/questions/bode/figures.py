@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.frequency.bode import Bode, BodeCase, CascadeLoop
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import COMFORTABLE_MARGIN
 from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
 from friso.questions.bode.table import decibels
 from friso.shown.drawing.colours import ramp
@@ -20,10 +20,10 @@ from friso.shown.drawing.palette import INK, LIGHT
 from friso.shown.drawing.prefixes import pretty, with_unit
 from friso.stage.tables import moving_mass
 
-QUARTER = 90.0
+QUARTER_TURN = 90.0
 """Distance of ticks on phase axes [deg]: a quarter of a turn."""
 
-STARTS = -315.0
+FIRST_TURN_FROM = -315.0
 """Lower end [deg] of the turn in which the first phase is plotted.
 
 The end lies between the phases of whole numbers of integrations.
@@ -32,16 +32,16 @@ The end lies between the phases of whole numbers of integrations.
 LEAST_PHASE = -720.0
 """Lower end of phase axes [deg]; the delay at high frequencies would extend them without end."""
 
-NEAR = ((-3.0, 1.5), (-1.5, 1.5))
+NYQUIST_VIEW = ((-3.0, 1.5), (-1.5, 1.5))
 """Range of the complex plane around -1 that the Nyquist plot shows, real and imaginary."""
 
-KEPT = (0.02, 5.0)
+DRAWN_LOOP_SIZES = (0.02, 5.0)
 """Range of the loop's size in which members of the family are drawn."""
 
 DRAWN = {True: 40, False: 12}
 """Numbers of family members drawn, of stable (True) and of other loops (False)."""
 
-SIZES = (-90.0, 90.0)
+WIDEST_MAGNITUDES = (-90.0, 90.0)
 """Largest range of open-loop magnitudes [dB] on the axis."""
 
 LEAST_SENSITIVITY = -40.0
@@ -88,7 +88,7 @@ def phases(responses: Sequence[np.ndarray]) -> list[Array]:
     angles = [np.angle(response) for response in responses]
     lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag
     first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
-    first = first - 360 * np.floor((first[0] - STARTS) / 360)
+    first = first - 360 * np.floor((first[0] - FIRST_TURN_FROM) / 360)
     high = slice(len(first) // 2, None)
     return [first, *(phase + 360 * np.round(np.median(first[high] - phase[high]) / 360) for phase in others)]
 
@@ -197,10 +197,12 @@ def _nyquist(bode: Bode) -> Figure:
         for curve in (_loop_of(name, case) for name, case in bode.cases.items())
     ]
     turn = np.linspace(0, 2 * np.pi, 181)
-    name = f"modulus margin {WANTED:g}"
-    circle = Series(-1 + WANTED * np.cos(turn), WANTED * np.sin(turn), name, INK, "dashed", 1.0)
+    name = f"modulus margin {COMFORTABLE_MARGIN:g}"
+    circle = Series(-1 + COMFORTABLE_MARGIN * np.cos(turn), COMFORTABLE_MARGIN * np.sin(turn), name, INK, "dashed", 1.0)
     point = Markers(np.array([-1.0]), np.array([0.0]), "−1", INK, "cross")
-    x, y = (Axis(f"{part} part of L", "", limits) for part, limits in zip(("Real", "Imaginary"), NEAR, strict=True))
+    x, y = (
+        Axis(f"{part} part of L", "", limits) for part, limits in zip(("Real", "Imaginary"), NYQUIST_VIEW, strict=True)
+    )
     panel = Panel("", x, y, (*family, *cases, circle), (point,), equal=True)
     caption = (
         "The loop for positive frequencies. Its smallest distance from −1 is the modulus margin: above 0.5 the loop "
@@ -221,7 +223,7 @@ def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
     lines = []
     for k, loop in enumerate(bode.loops[picked]):
-        near = (np.abs(loop) > KEPT[0]) & (np.abs(loop) < KEPT[1])
+        near = (np.abs(loop) > DRAWN_LOOP_SIZES[0]) & (np.abs(loop) < DRAWN_LOOP_SIZES[1])
         visible = np.where(near, loop, np.nan)[np.convolve(near, np.ones(3), "same") > 0]
         lines.append(Series(np.real(visible), np.imag(visible), "" if k else name, shade, width=0.9))
     return lines
@@ -242,7 +244,11 @@ def _sensitivity(bode: Bode) -> Figure:
     if not (lines or bands):
         return Figure("bode_sensitivity", "", "", ())
     largest = max(float(np.max(part)) for part in (*(line.y for line in lines), *(band.high for band in bands)))
-    limit = Limit((-decibels(WANTED),), f"{-decibels(WANTED):.0f} dB: modulus margin {WANTED:g}", INK)
+    limit = Limit(
+        (-decibels(COMFORTABLE_MARGIN),),
+        f"{-decibels(COMFORTABLE_MARGIN):.0f} dB: modulus margin {COMFORTABLE_MARGIN:g}",
+        INK,
+    )
     axis = Axis("|1/(1 + L)|", "dB", (LEAST_SENSITIVITY, max(10.0, 1.08 * largest)))
     caption = "How much of a disturbance remains: above 0 dB the controller amplifies it."
     excluded = f"; {(~stable).sum()} unstable ones are left out; near them the sensitivity is unbounded"
@@ -261,7 +267,7 @@ def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, .
     if not curves:
         return ()
     sizes = np.concatenate([magnitude(curve.response) for curve in curves])
-    view = max(float(sizes.min()) - 5, SIZES[0]), min(float(sizes.max()) + 5, SIZES[1])
+    view = max(float(sizes.min()) - 5, WIDEST_MAGNITUDES[0]), min(float(sizes.max()) + 5, WIDEST_MAGNITUDES[1])
     above = _magnitudes(hertz, curves, Axis("Magnitude", "dB", view, step=30.0), magnitude)
     below = _phases(hertz, curves)
     low, high = below.y.limits or (-180.0, 180.0)
@@ -282,12 +288,12 @@ def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
     """
     angles = zip(curves, phases([curve.response for curve in curves]), strict=True)
     lines = tuple(Series(hertz, y, "", curve.colour, curve.dash, curve.width) for curve, y in angles)
-    least = QUARTER * np.floor((min(line.y.min() for line in lines) + 1) / QUARTER)
-    most = QUARTER * np.ceil((max(line.y.max() for line in lines) - 1) / QUARTER)
+    least = QUARTER_TURN * np.floor((min(line.y.min() for line in lines) + 1) / QUARTER_TURN)
+    most = QUARTER_TURN * np.ceil((max(line.y.max() for line in lines) - 1) / QUARTER_TURN)
     if most == least:
-        least, most = least - QUARTER, most + QUARTER
+        least, most = least - QUARTER_TURN, most + QUARTER_TURN
     view = max(float(least), LEAST_PHASE) - 10, float(most) + 10
-    step = QUARTER if view[1] - view[0] < 6 * QUARTER else 2 * QUARTER
+    step = QUARTER_TURN if view[1] - view[0] < 6 * QUARTER_TURN else 2 * QUARTER_TURN
     return Panel("", Axis.of_frequency(hertz), Axis("Phase", "°", view, step=step), lines)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from friso.equations.bandwidth import bandwidth
 from friso.equations.structure import structure
 from friso.frequency.bode import Bode, Unstable
-from friso.frequency.crossover import WANTED, Limits, Range
+from friso.frequency.crossover import COMFORTABLE_MARGIN, Limits, Range
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.interface.answer import AnswerTable
@@ -202,7 +202,7 @@ def _limits(bode: Bode, name: str) -> str:
     stable = _remark(bode, name, limits.highest_stable, "lost first", limits.first_lost)
     calm = _remark(bode, name, limits.highest_comfortable, "closest to −1", limits.closest)
     return (
-        f"stable: {_windows(limits.stable, limits, bode)}{stable}; modulus margin above {WANTED:g}: "
+        f"stable: {_windows(limits.stable, limits, bode)}{stable}; modulus margin above {COMFORTABLE_MARGIN:g}: "
         f"{_windows(limits.comfortable, limits, bode)}{calm}."
     )
 

@@ -39,13 +39,13 @@ LOST_END = "cycle not followed farther"
 MEETING = "curves meet"
 """Label of places where two curves cross, end on each other, or begin or cease to coincide."""
 
-REACH = 2.5
+LARGEST_MULTIPLIER = 2.5
 """Largest Floquet multiplier that is shown."""
 
-LOGARITHMIC = 30.0
+LOGARITHMIC_RATIO = 30.0
 """Ratio of the largest to the smallest amplitude above which the axis is logarithmic."""
 
-MARGIN = 0.02
+PLANE_MARGIN = 0.02
 """Margin around the plane of two keys, as a fraction of the range, so that nodes at its sides are fully visible."""
 
 
@@ -62,11 +62,11 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
     """
     branches, x = boundary.lines(traced), _axis(traced.space.ranges[0])
     sizes = [size for line in branches for size in line.amplitude]
-    log = max(sizes, default=0.0) > LOGARITHMIC * min(sizes, default=0.0)
+    log = max(sizes, default=0.0) > LOGARITHMIC_RATIO * min(sizes, default=0.0)
     panels = (
         _panel(branches, "amplitude", x, Axis("Amplitude", "m", log=log), key),
         _panel(branches, "period", x, Axis("Period", "s")),
-        _panel(branches, "multiplier", x, Axis("Multiplier", "", (-REACH, REACH))),
+        _panel(branches, "multiplier", x, Axis("Multiplier", "", (-LARGEST_MULTIPLIER, LARGEST_MULTIPLIER))),
     )
     bounds = Limit((-1.0, 1.0), "", GREY, "dotted")
     panels = (*panels[:2], replace(panels[2], title="A cycle attracts between −1 and 1", limits=(bounds,)))
@@ -112,7 +112,7 @@ def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
 
 def _plane(traced: Plane) -> Figure:
     """Draw the curves on which hunting ends, and the verdicts at the nodes of the grid."""
-    x, y = (_axis(swept, MARGIN) for swept in traced.space.ranges)
+    x, y = (_axis(swept, PLANE_MARGIN) for swept in traced.space.ranges)
     curves = boundary.lines(traced)
     series = tuple(
         Series(

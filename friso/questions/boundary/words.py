@@ -36,7 +36,7 @@ MEANINGS = {
 BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 
-PLAIN = 1e-5
+PLAIN_ERROR = 1e-5
 """Largest relative error with which a value is stated without its interval, in six significant digits."""
 
 
@@ -66,7 +66,7 @@ class ShownKey:
 
     def as_known(self, value: float, error: float) -> str:
         """Write a value [SI], with its error unless the error is too small to show in the digits."""
-        return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
+        return self.text(value) if error < PLAIN_ERROR * abs(value) else self.uncertain(value, error)
 
     def extent(self, values: Array, swept: KeyRange) -> str:
         """Write the lowest and highest of some values [SI], cut to the range `swept`."""
@@ -78,7 +78,7 @@ class ShownKey:
         return f"{numbers} {pretty(self.unit)}".rstrip()
 
 
-ROUGHLY = 3
+END_DIGITS = 3
 """Significant digits of the ends of a curve in the answer."""
 
 
@@ -127,7 +127,7 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     if curves := boundary.lines(traced):
         longest = sorted(range(len(curves)), key=lambda number: -len(curves[number].at))[:SHOWN_CURVES]
         more = [f"There are {len(curves) - len(longest)} more curves."] if len(curves) > len(longest) else []
-        courses = [f"{_course(traced, number, keys, ROUGHLY)}." for number in longest]
+        courses = [f"{_course(traced, number, keys, END_DIGITS)}." for number in longest]
         return " ".join([_hunting_corners(traced, keys), *courses, *more, *_first_meetings(traced, keys)])
     if traced.gaps or UNKNOWN in verdicts:
         return f"{_hunting_corners(traced, keys)} No curve could be followed."
@@ -144,12 +144,12 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
 
     def ends(k: int) -> str:
         """Write the value of one key at which hunting ends, or a range, at point `k` along the edge."""
-        low, high = (along.text(float(column[k]), ROUGHLY) for column in (edge.low, edge.high))
+        low, high = (along.text(float(column[k]), END_DIGITS) for column in (edge.low, edge.high))
         return low if edge.low[k] == edge.high[k] else f"{low} to {high}"
 
     def at(k: int) -> str:
         """Write the value of the other key at point `k` along the edge."""
-        return f"{across.key} = {across.text(float(edge.across[k]), ROUGHLY)}"
+        return f"{across.key} = {across.text(float(edge.across[k]), END_DIGITS)}"
 
     answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
     farther = [int(np.argmin(edge.low)), int(np.argmax(edge.high))]

@@ -28,7 +28,7 @@ OPEN = {
 }
 """What is said of draws with an open verdict."""
 
-BINS = 24
+HISTOGRAM_BARS = 24
 """Number of bars in the histogram."""
 
 MOST_LISTED = 4
@@ -173,8 +173,8 @@ def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
     """
     keys = draws.sample.keys
     key = next(iter(fates.separations(keys) or keys))
-    edges = np.histogram_bin_edges(keys[key], BINS)
-    x, bands, below = np.repeat(edges, 2)[1:-1], [], np.zeros(2 * BINS)
+    edges = np.histogram_bin_edges(keys[key], HISTOGRAM_BARS)
+    x, bands, below = np.repeat(edges, 2)[1:-1], [], np.zeros(2 * HISTOGRAM_BARS)
     for word in VERDICTS:
         counts = np.repeat(np.histogram(keys[key][fates.verdicts == word], edges)[0], 2).astype(float)
         if counts.any():

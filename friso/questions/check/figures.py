@@ -49,8 +49,8 @@ def subject(cases: Sequence[ShownCase]) -> str:
 
 SHARES = {"force_p": ("P", SKY), "force_i": ("I", ORANGE), "force_d": ("D", PINK)}
 
-_FLOOR = 1e-9  # [m] lower end of the logarithmic settling panel: below any sensor of such a stage
-_PERIODS = 4  # number of hunting periods that the figure of force terms shows
+LEAST_DEVIATION = 1e-9  # [m] lower end of the logarithmic settling panel: below any sensor of such a stage
+SHOWN_PERIODS = 4  # number of hunting periods that the figure of force terms shows
 
 
 def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
@@ -149,12 +149,14 @@ def _settling(cases: list[ShownCase]) -> Panel:
     """
     lines = []
     for item in cases:
-        size = np.maximum(np.abs(_deviation(item)), _FLOOR)
+        size = np.maximum(np.abs(_deviation(item)), LEAST_DEVIATION)
         lines.append(Series(samples(trace_of(item), "time"), size, item.label, item.colour))
-    largest = max((float(np.max(line.y[np.isfinite(line.y)], initial=_FLOOR)) for line in lines), default=_FLOOR)
+    largest = max(
+        (float(np.max(line.y[np.isfinite(line.y)], initial=LEAST_DEVIATION)) for line in lines), default=LEAST_DEVIATION
+    )
     dashes: tuple[Dash, ...] = ("dotted", "dashed")
     bands = tuple(Limit((band,), band_text(band), INK, dash) for band, dash in zip(BANDS, dashes, strict=True))
-    axis = Axis("|Deviation|", "m", (_FLOOR, max(2 * largest, 1e-3)), log=True)
+    axis = Axis("|Deviation|", "m", (LEAST_DEVIATION, max(2 * largest, 1e-3)), log=True)
     return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
 
 
@@ -203,7 +205,7 @@ def _shares(cases: list[ShownCase]) -> Figure:
     start, end = _window(cases)
     periods = [item.case.period for item in cases if item.case.period and np.isfinite(item.case.period)]
     if periods:
-        start = max(start, end - _PERIODS * max(periods))
+        start = max(start, end - SHOWN_PERIODS * max(periods))
     panels = []
     for item in cases:
         trace = trace_of(item)
@@ -314,8 +316,8 @@ def _span(values: Array) -> float:
     return float(np.ptp(finite)) if finite.size else 0.0
 
 
-_VIEW = 2.2  # reach of a return map's axes, relative to the largest cycle
-_STARTS, _FOLLOWED = 401, 300  # number of distances followed by a return map, and number of swings followed
+VIEW_FACTOR = 2.2  # reach of a return map's axes, relative to the largest cycle
+MAP_STARTS, FOLLOWED_LANDINGS = 401, 300  # number of distances followed by a return map, and number of swings followed
 _BASIN = "#fbe3d6"  # a pale vermillion, the colour of hunting
 _LEAST_DRAWN = 0.01  # smallest return, and difference of cart and stage, that is drawn, relative to the swing
 _DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
@@ -356,8 +358,8 @@ def _return_map(item: ShownCase) -> list[Panel]:
     beyond = returns > _LEAST_DRAWN * distances
     if not beyond.any():
         return []
-    largest = max([cycle.amplitude for cycle in hunting.cycles], default=np.max(distances[beyond]) / _VIEW)
-    reach = _VIEW * float(largest)
+    largest = max([cycle.amplitude for cycle in hunting.cycles], default=np.max(distances[beyond]) / VIEW_FACTOR)
+    reach = VIEW_FACTOR * float(largest)
     swings = np.repeat(_swings(item), 2)
     series = [
         Series(np.array([0.0, reach]), np.array([0.0, reach]), "", GREY, "dashed"),
@@ -382,9 +384,9 @@ def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
     other side. Both sides must behave alike. Many swings are followed in this way; a stage that still swings then is
     hunting.
     """
-    starts = np.linspace(0.0, reach, _STARTS)
+    starts = np.linspace(0.0, reach, MAP_STARTS)
     at = starts
-    for _ in range(_FOLLOWED):
+    for _ in range(FOLLOWED_LANDINGS):
         at = np.interp(at, distances, np.maximum(returns, 0.0), left=0.0, right=0.0)
     ends = np.flatnonzero(np.diff((at > 0).astype(int), prepend=0, append=0))
     floor, top = np.zeros(2), np.full(2, reach)

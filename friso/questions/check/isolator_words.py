@@ -11,7 +11,7 @@ from friso.shown.drawing.prefixes import with_unit
 if TYPE_CHECKING:
     from friso.remedies.catalogue import Suggestion
 
-LITTLE = 0.5
+LITTLE_MARGIN = 0.5
 """Modulus margin below which the controller has to be tuned as well."""
 
 
@@ -24,7 +24,7 @@ def isolator_sentence(suggestion: Suggestion) -> str:
     )
     if not suggestion.settles:
         return f"It would not surely stop hunting on {joint}, or on any shorter stroke tried."
-    low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
+    low = "" if suggestion.margin >= LITTLE_MARGIN else ": too little, so that the controller has to be tuned as well"
     friction = other_static_friction(flat)
     masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
     kept = f"1/{SEARCH_LIMITS.edge_distance:g} of this bandwidth{friction and f', or {friction}'}"

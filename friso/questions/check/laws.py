@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
 
-SAME = 1e-3
+SAME_EDGE = 1e-3
 """Relative difference of edges below which only one edge is stated."""
 
 COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
@@ -153,7 +153,7 @@ def _beyond(laws: VerdictsByLaw, case: str) -> str:
     own, *others = laws.verdicts
     edges = own.edges(case)
     highest = max((other[1] for verdict in others if (other := verdict.edges(case))), default=0.0)
-    if own.hunts(case) is not True or edges is None or highest <= edges[1] * (1 + SAME):
+    if own.hunts(case) is not True or edges is None or highest <= edges[1] * (1 + SAME_EDGE):
         return ""
     return f" The advice keeps clear of the edge under {own.law} alone; keep clear of the highest of these."
 

@@ -24,7 +24,7 @@ from friso.shown.drawing.prefixes import (
     with_unit,
 )
 
-_WINDOWS = 4  # largest number of listed windows of kicks
+MOST_WINDOWS = 4  # largest number of listed windows of kicks
 UNKNOWN = f"not determined: that takes {MORE_WORK}"
 
 
@@ -149,7 +149,7 @@ def _windows(kick: Kick, unit: str, searched: str) -> str:
     """Write the ranges of kicks that start hunting; `searched` is the range tried."""
     if kick.windows == (kick.searched,):
         return f"all that were tried, {searched}"
-    texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
+    texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:MOST_WINDOWS]]
     more = len(kick.windows) - len(texts)
     text = ", ".join([*texts, *([f"and {more} more range{'s' * (more > 1)}"] if more else [])])
     open_ended = kick.windows[0][0] == kick.searched[0] or kick.windows[-1][1] == kick.searched[1]

@@ -65,10 +65,10 @@ IN_SHORT: Mapping[Verdict, str] = {
 ONE_PLACE = 1.01
 """Ratio of the ends of a window of bandwidths below which its centre and width are stated instead."""
 
-ROUGH = 5e-4
+ROUGH_EDGE = 5e-4
 """Relative uncertainty of an edge above which it is mentioned, because the shown digits are not certain."""
 
-ROUGHER = 10 * ROUGH
+ROUGHER = 10 * ROUGH_EDGE
 """Relative uncertainty of an edge above which one digit less is shown."""
 
 
@@ -400,7 +400,7 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
         ends = sorted((end.inside, end.outside))
         low, high = _bandwidth(case, ends[0], up=False, digits=4), _bandwidth(case, ends[1], digits=4)
         return f"somewhere between {low} and {high}"
-    if end.reserve < ROUGH:
+    if end.reserve < ROUGH_EDGE:
         return _bandwidth(case, end.inside, up=None, digits=4)
     value, digits = end.inside * (_present_bandwidth(case) or 1.0), 4 if end.reserve < ROUGHER else 3
     stated = float(f"{value:.{digits}g}")
@@ -585,7 +585,7 @@ def _again(edge: Margin, windows: Iterable[BandwidthWindow]) -> bool:
     """
     to = edge.quiet * SEARCH_LIMITS.edge_distance
     return any(
-        edge.factor < low.inside <= to * (1 + ROUGH)
+        edge.factor < low.inside <= to * (1 + ROUGH_EDGE)
         and (high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2))
         for low, high in ((window.low, window.high) for window in windows)
         if low is not None

@@ -10,16 +10,16 @@ from friso.shares import Share
 from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
-from friso.studies.compare.study import LONGER, Comparison, OptionResult
+from friso.studies.compare.study import LONGER_FACTOR, Comparison, OptionResult
 
 _NAMES = ("ink", "blue", "vermillion", "orange", "pink", "sky", "green")
 COLOURS: dict[str, str] = dict(zip(_NAMES, (INK, BLUE, VERMILLION, ORANGE, PINK, SKY, GREEN), strict=True))
 """Colours of options, by the colour name that an option declares."""
 
-BESIDE = 0.16
+MARKER_DISTANCE = 0.16
 """Distance between the markers of one option, relative to the distance between options."""
 
-MOST = (5, 95)
+BAR_PERCENTILES = (5, 95)
 """Percentiles of machines that a bar spans."""
 
 
@@ -53,14 +53,14 @@ def _probabilities(comparison: Comparison) -> Panel:
         ("swings at the end", VERMILLION, [result.swinging for result in comparison.results]),
         ("not in position at the end", BLUE, [_other(result.settled) for result in comparison.results]),
         (
-            f"does not stay there ({LONGER} times as long)",
+            f"does not stay there ({LONGER_FACTOR} times as long)",
             GREY,
             [_other(result.stays) for result in comparison.results],
         ),
     )
     series, markers = [], []
     for number, (name, colour, shares) in enumerate(kinds):
-        x = np.arange(len(shares), dtype=np.float64) + (number - 1) * BESIDE
+        x = np.arange(len(shares), dtype=np.float64) + (number - 1) * MARKER_DISTANCE
         series.append(_bars(x, [(share.low, share.high) for share in shares], colour, 100))
         heights = np.array([100 * share.probability for share in shares])
         markers.append(Markers(x, heights, name, colour))
@@ -131,5 +131,5 @@ def _most(result: OptionResult) -> tuple[float, float]:
     finite = result.measures.in_position[np.isfinite(result.measures.in_position)]
     if not finite.size:
         return np.nan, np.nan
-    low, high = np.percentile(finite, MOST)
+    low, high = np.percentile(finite, BAR_PERCENTILES)
     return float(low), float(high)

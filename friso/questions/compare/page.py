@@ -10,8 +10,8 @@ from friso.questions.compare import words
 from friso.questions.compare.figures import compare_figures
 from friso.shown.files import Content
 from friso.shown.pages import Report
-from friso.studies.compare.options import DEADBAND, MODEL_ERROR
-from friso.studies.compare.study import LONGER, Comparison
+from friso.studies.compare.options import DEADBAND_SHARE, MODEL_ERROR
+from friso.studies.compare.study import LONGER_FACTOR, Comparison
 
 
 def compare_files(comparison: Comparison) -> dict[str, Content]:
@@ -30,9 +30,9 @@ def compare_files(comparison: Comparison) -> dict[str, Content]:
         paired_columns=words.PAIRED,
         paired=words.paired_rows(comparison),
         computed=(
-            f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND:g} tolerances, model error "
+            f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND_SHARE:g} tolerances, model error "
             f"{percent(MODEL_ERROR)}"
         ),
-        longer=LONGER,
+        longer=LONGER_FACTOR,
         shaken=comparison.shaken,
     ).files()

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth
 from friso.evidence import value
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import COMFORTABLE_MARGIN
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
     NOTHING,
@@ -26,7 +26,14 @@ from friso.stage.controllers import AgainstFriction
 from friso.stage.section import numeric_fields
 from friso.studies.compare.measures import EstimatedValue
 from friso.studies.compare.options import MODEL_ERROR, Option, rejection
-from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, NeededBandwidth, OptionResult
+from friso.studies.compare.study import (
+    ENOUGH_MACHINES,
+    FOLLOWED_MACHINES,
+    LONGER_FACTOR,
+    Comparison,
+    NeededBandwidth,
+    OptionResult,
+)
 
 COLUMNS = (
     "Swings at the end",
@@ -92,7 +99,9 @@ def _bandwidth(option: Option, comparison: Comparison) -> str:
         faster = f"a {comparison.stage.controller.bandwidth_name} of {raised} instead of {before}"
     limit = comparison.bandwidth_limit
     below = "" if limit is None else f" and a bandwidth of at most {with_unit(limit, 'Hz')}"
-    return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}{below}"
+    return (
+        f"{faster}, the highest at which the machine of the file has a modulus margin of {COMFORTABLE_MARGIN:g}{below}"
+    )
 
 
 def table_rows(comparison: Comparison) -> list[PairedRow]:
@@ -201,16 +210,16 @@ def _turning(comparison: Comparison) -> list[str]:
     needed, base = comparison.needed, comparison.results[0]
     if needed is None or base.rests:
         return []
-    enough, last = f"{percent(ENOUGH)} of the machines", len(needed.shares) - 1
+    enough, last = f"{percent(ENOUGH_MACHINES)} of the machines", len(needed.shares) - 1
     least, hertz = comparison.turning, [with_unit(float(value), "Hz") for value in needed.bandwidths]
     if least is None:
         share = _share_at(needed, last)
         return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
     turn = with_unit(least, "Hz")
-    fewer = np.flatnonzero((needed.bandwidths < least) & (needed.shares < ENOUGH))
+    fewer = np.flatnonzero((needed.bandwidths < least) & (needed.shares < ENOUGH_MACHINES))
     if not fewer.size:
         return []
-    at, below = needed.turning(ENOUGH), int(fewer[-1])
+    at, below = needed.turning(ENOUGH_MACHINES), int(fewer[-1])
     only_there = at is None or needed.bandwidths[at] > least
     where = f"at a bandwidth of {turn}" if only_there else f"from a bandwidth of {turn} on"
     others = [result for result in _resting(comparison) if result.option.factor == 1.0]
@@ -252,7 +261,7 @@ def conclusion(comparison: Comparison) -> str:
         best = max(comparison.results, key=lambda result: result.in_position_count)
         none = "None of these options" if comparison.not_run else "No option"
         return (
-            f"{none} brings {percent(ENOUGH)} of the {count} machines to rest within {within}. The best is "
+            f"{none} brings {percent(ENOUGH_MACHINES)} of the {count} machines to rest within {within}. The best is "
             f"{in_prose(best)}, with {best.in_position_count} in position at the end. {_as_is(comparison)}"
         )
     first, *further = resting
@@ -272,7 +281,9 @@ def _too_late(resting: Sequence[OptionResult]) -> str:
     The text is empty if there is no such option.
     """
     there = [(result, float(np.isfinite(result.measures.settling).mean())) for result in resting]
-    late = [f"{percent(fraction, 3)} with {in_prose(result)}" for result, fraction in there if fraction < ENOUGH]
+    late = [
+        f"{percent(fraction, 3)} with {in_prose(result)}" for result, fraction in there if fraction < ENOUGH_MACHINES
+    ]
     return f"At the far end, before the reference returns, {listed(late, 'and')} are in position." if late else ""
 
 
@@ -329,14 +340,17 @@ def _performance(comparison: Comparison) -> list[str]:
 
     The list is empty if no option brings the machines to rest.
     """
-    resting, followed = _resting(comparison), min(FOLLOWED, comparison.machines.count)
+    resting, followed = _resting(comparison), min(FOLLOWED_MACHINES, comparison.machines.count)
     lines = [
         f"{label(result)}: in position in {with_unit(result.settling.value, 's')} "
         f"(median){_still(result, comparison)}; at least {percentage(result.settled.low)} % of such machines come to "
         "rest (95 % confidence)."
         for result in resting
     ]
-    longer = f"Of {followed} machines followed {LONGER} times as long, {percent(ENOUGH)} or more stay at rest with "
+    longer = (
+        f"Of {followed} machines followed {LONGER_FACTOR} times as long, {percent(ENOUGH_MACHINES)} or more stay at "
+        "rest with "
+    )
     return [*lines, f"{longer}{listed([result.letter for result in resting], 'and')}."] if lines else []
 
 
@@ -359,7 +373,10 @@ def _in_the_longer_run(result: OptionResult) -> str:
     """Say how many machines stay in position in a longer run; empty if there was no such run."""
     if not result.later.done.size:
         return ""
-    return f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER} times as long"
+    return (
+        f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER_FACTOR} times as "
+        "long"
+    )
 
 
 def _standstill(comparison: Comparison) -> list[str]:

@@ -9,10 +9,10 @@ from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREY, VERMILLION
 from friso.studies.laws.conversion import LawConversion
 
-SHOWN = 5.0
+SHOWN_CURVE_LENGTH = 5.0
 """Length of drawn virgin curves, in units of the deflection that static friction causes at the first stiffness."""
 
-DRAWN = 40
+MOST_POINTS = 40
 """Largest number of measured points drawn."""
 
 
@@ -28,7 +28,7 @@ def convert_figures(conversion: LawConversion) -> list[Figure]:
     )
     speeds = np.geomspace(1e-2, 1e2, 400) * levels.stribeck_velocity
     points = conversion.points
-    reach = SHOWN * levels.static / before.stiffness if before.stiffness else np.inf
+    reach = SHOWN_CURVE_LENGTH * levels.static / before.stiffness if before.stiffness else np.inf
     if points is not None:
         reach = max(points.displacement)
     virgin, steady = [], []
@@ -40,7 +40,7 @@ def convert_figures(conversion: LawConversion) -> list[Figure]:
         steady.append(Series(speeds, steady_force(flat, speeds, True), label, colour, dash))  # type: ignore[arg-type]
     shown = ()
     if points is not None:
-        some = np.unique(np.linspace(0, len(points.force) - 1, DRAWN).astype(int))
+        some = np.unique(np.linspace(0, len(points.force) - 1, MOST_POINTS).astype(int))
         shown = (Markers(points.displacement[some], points.force[some], "measured points", GREY),)
     panels = (
         Panel("From rest, slowly", Axis("Displacement", "m"), Axis("Friction force", "N"), tuple(virgin), shown),

@@ -12,7 +12,7 @@ from friso.progress import Progress, silent
 if TYPE_CHECKING:
     from friso.shown.files import Files
 
-MOST = 12
+MOST_ELEMENTS = 12
 """Largest number of elements of a law with several elements."""
 
 
@@ -69,7 +69,7 @@ def convert(
     >>> friso.convert(friso.example("thesis_rig"), "gms")  # doctest: +SKIP
     """
     chosen = read_stage(stage, set)
-    whole_number(elements, "elements", 1, MOST, "6")
+    whole_number(elements, "elements", 1, MOST_ELEMENTS, "6")
     from friso.studies.laws.conversion import convert as converted
 
     return ConvertAnswer(converted(chosen, friction, elements, virgin), name=f"{stem_of(stage)}_{friction}")

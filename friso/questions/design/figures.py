@@ -11,7 +11,7 @@ from friso.design_method.choice import Candidate, Confirmed
 from friso.design_method.method import Design, UnfinishedDesign
 from friso.design_method.population import Corners
 from friso.design_method.verification import MachineOutcomes
-from friso.frequency.crossover import WANTED, Range
+from friso.frequency.crossover import COMFORTABLE_MARGIN, Range
 from friso.questions.design.window import stiffest, view
 from friso.questions.design.words import hertz, size
 from friso.questions.flexure.figures import modes_figure
@@ -25,13 +25,13 @@ from friso.shown.drawing.prefixes import listed
 CHOSEN = "#e3001b"
 """Colour of the chosen design's marker, equal to the evaluation point's colour in maps."""
 
-WIDE, FEW = 30.0, 0.01
+WIDE_RATIO, FEW_SHARE = 30.0, 0.01
 """Conditions for a logarithmic axis of settling times.
 
-The axis is logarithmic if the longest time exceeds `WIDE` times the quantile `FEW`.
+The axis is logarithmic if the longest time exceeds `WIDE_RATIO` times the quantile `FEW_SHARE`.
 """
 
-SHARES = 401
+DISTRIBUTION_POINTS = 401
 """Number of points of a distribution."""
 
 CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", INK))
@@ -135,9 +135,9 @@ def _damping(design: Design) -> Figure:
         Markers(damping.tried, damping.margins, "", BLUE),
         Markers(damping.tried[:1], damping.margins[:1], "as designed", CHOSEN, "target"),
     )
-    limit = Limit((WANTED,), f"wanted: {WANTED:g}", INK)
+    limit = Limit((COMFORTABLE_MARGIN,), f"wanted: {COMFORTABLE_MARGIN:g}", INK)
     x = Axis("Joint damping", "N*s/m", log=bool(damping.tried[0] > 0), prefixed=False)
-    top = 1.1 * max(float(damping.margins.max()), WANTED)
+    top = 1.1 * max(float(damping.margins.max()), COMFORTABLE_MARGIN)
     panel = Panel("", x, Axis("Modulus margin", "", (0.0, top)), (line,), points, (limit,))
     caption = (
         "The smallest margin over all settled states if damping were added to the joint; 0 where one of them is "
@@ -155,8 +155,8 @@ def _settling(design: Design) -> Figure:
     if specified is not None:
         lines.append(Series(np.full(2, float(specified)), np.array([0.0, 100.0]), "specified", INK, "dashed", 1.2))
     times = np.concatenate([line.x for line in lines])
-    low, high = float(np.quantile(times, FEW)), float(times.max())
-    wide = high > WIDE * low
+    low, high = float(np.quantile(times, FEW_SHARE)), float(times.max())
+    wide = high > WIDE_RATIO * low
     x = Axis("Settling time", "s", (0.8 * low if wide else 0.0, 1.05 * high), log=wide)
     panel = Panel(
         "", x, Axis("Moves in position", "%", (0.0, 102.0)), tuple(lines), limits=(Limit((95.0,), "95 %", GREEN),)
@@ -174,14 +174,14 @@ def _distribution(outcome: MachineOutcomes) -> tuple[Array, Array]:
     times = np.sort(np.maximum(outcome.settling[outcome.completed & np.isfinite(outcome.settling)], 1e-6))
     if not times.size:
         return np.array([1e-6]), np.array([np.nan])
-    picked = np.unique(np.linspace(0, len(times) - 1, SHARES).round().astype(int))
+    picked = np.unique(np.linspace(0, len(times) - 1, DISTRIBUTION_POINTS).round().astype(int))
     return times[picked], 100.0 * (picked + 1) / outcome.tried
 
 
 HUNTS, CLOSE, ALLOWED = "#eba27a", "#f6ddc0", "#a5d8c4"
 """Colours of forbidden values, of values that lack their safety factor, and of allowed values."""
 
-HALF = 0.32
+HALF_BAR = 0.32
 """Half the height of a bar, relative to the height of its row."""
 
 EDGES = "#7a3300"
@@ -218,7 +218,8 @@ def window_figure(design: Design) -> Figure:
     caption = (
         f"What bounds the crossover, and the chosen one, {hertz(design.controller.crossover)}. Machine: its limit. "
         f"Leaves: the highest first interfering frequency of the front over {multiple:g}. Margin: modulus margin above "
-        f"{WANTED:g}. Isolator, without: where the machine hunts with and without it; dots mark the edges in the "
+        f"{COMFORTABLE_MARGIN:g}. Isolator, without: where the machine hunts with and without it; dots mark the edges "
+        "in the "
         "corners of friction and masses; all but the highest are approximate."
     )
     return Figure("design_window", "The window for the crossover", caption, (panel,))
@@ -228,7 +229,7 @@ def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str
     """Return bars in a row of the figure, for the parts of `ranges` that are in view."""
     clipped = [(max(low, visible[0]), min(high, visible[1])) for low, high in ranges]
     return [
-        Band(np.array(ends), np.full(2, row - HALF), np.full(2, row + HALF), label, colour)
+        Band(np.array(ends), np.full(2, row - HALF_BAR), np.full(2, row + HALF_BAR), label, colour)
         for ends in clipped
         if ends[0] < ends[1]
     ]

@@ -16,7 +16,7 @@ from friso.questions.flexure.drawing import drawing_svg
 from friso.shown.files import Content
 from friso.shown.pages import Report
 
-LEAVES = 2
+LEAVES_STEP = 2
 """Number of the step that shows the drawing and the requirements."""
 
 
@@ -40,7 +40,7 @@ def design_files(design: Design | UnfinishedDesign) -> dict[str, Content]:
         spec=design.spec,
         verdicts=headline(design),
         steps=steps(design),
-        leaves=LEAVES,
+        leaves=LEAVES_STEP,
         drawing=drawing,
         requirements=requirement_rows(design),
     )

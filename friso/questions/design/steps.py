@@ -12,7 +12,7 @@ from friso.design_method.population import Corners
 from friso.design_method.requirements import RelaxableKey, Requirement
 from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import COMFORTABLE_MARGIN
 from friso.quantities import percent, plain_factor
 from friso.questions.design import words
 from friso.questions.design.window import CrossoverBound, comfortable, lower, upper
@@ -21,7 +21,7 @@ from friso.questions.flexure.table import megapascals, newtons_per
 from friso.questions.flexure.words import assumptions
 from friso.shown.drawing.prefixes import listed
 
-GAP = 1.0
+LEAST_FRICTION_GAP = 1.0
 """Least difference [N] of static and Coulomb friction for hunting, as found in the thesis (Sec. 4.3.1)."""
 
 
@@ -133,20 +133,23 @@ def _gap(design: Design) -> list[str]:
     losses = words.gaps(design.without, design.original.flat())
     if losses is None:
         return []
-    small = design.without.edges[losses < GAP]
+    small = design.without.edges[losses < LEAST_FRICTION_GAP]
     text = f"When it breaks away, the cart loses {losses.min():.3g} to {losses.max():.3g} N of its friction."
     if not small.size:
-        return [f"{text} That is more than the {GAP:g} N that hunting needs according to the thesis."]
+        return [f"{text} That is more than the {LEAST_FRICTION_GAP:g} N that hunting needs according to the thesis."]
     hunting = small[small > 0]
     if not hunting.size:
-        return [f"{text} Corners with less than {GAP:g} N do not hunt, as the thesis found."]
+        return [f"{text} Corners with less than {LEAST_FRICTION_GAP:g} N do not hunt, as the thesis found."]
     top = hunting.max()
     about = "" if top == design.without.highest else "about "
     reach = f"up to {about}{hertz(float(top))}" if top < design.without.searched[1] else "at all crossovers searched"
-    return [f"{text} According to the thesis hunting needs about {GAP:g} N; here corners with less also hunt, {reach}."]
+    return [
+        f"{text} According to the thesis hunting needs about {LEAST_FRICTION_GAP:g} N; here corners with less also "
+        f"hunt, {reach}."
+    ]
 
 
-BINDS = 0.95
+BINDING_SHARE = 0.95
 """Fraction of a requirement's bound from which the requirement is called binding."""
 
 
@@ -168,7 +171,7 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
             requirement.name,
             _keys(requirement, lambda relaxable: relaxable.key),
             _keys(requirement, lambda relaxable: trimmed(relaxable.value, relaxable.unit)),
-            f"{percent(share, 3)}{', binds' if share > BINDS else ''}",
+            f"{percent(share, 3)}{', binds' if share > BINDING_SHARE else ''}",
         )
         for requirement, share in zip(choice.requirements, choice.excess, strict=True)
     ]
@@ -242,7 +245,9 @@ def _why(design: Design) -> str:
     """Say which requirements led to these leaves."""
     choice = design.fitted.choice
     binding = [
-        requirement.name for requirement, share in zip(choice.requirements, choice.excess, strict=True) if share > BINDS
+        requirement.name
+        for requirement, share in zip(choice.requirements, choice.excess, strict=True)
+        if share > BINDING_SHARE
     ]
     chosen = "They are the softest on the front that allow this crossover"
     if not binding:
@@ -277,10 +282,10 @@ def _factor(value: float) -> str:
     return f"{plain_factor(value)} times" if np.isfinite(value) else "unknown"
 
 
-ROUNDED = 0.01
+BOUND_ROUNDING = 0.01
 """Relative distance of a crossover from its bound that is rounding, since crossovers have three digits."""
 
-LITTLE = 0.1
+LEAST_MARGIN_GAIN = 0.1
 """Least relative gain of modulus margin for which more joint damping is recommended."""
 
 
@@ -306,7 +311,7 @@ def _gains(design: Design) -> tuple[tuple[str, str], ...]:
         ("As gains of a PID: kp, ki, kd", _parallel(design)),
         ("Least modulus margin, as designed", f"{controller.margin:.3g}"),
         ("The same over the corners", f"{controller.corners.min():.3g}"),
-        (f"Modulus margin above {WANTED:g}", window),
+        (f"Modulus margin above {COMFORTABLE_MARGIN:g}", window),
     )
 
 
@@ -331,7 +336,7 @@ def _not_higher(design: Design) -> str:
     bounds, crossover = upper(design), design.controller.crossover
     text = f"Upper limits: {_bounds(bounds)}."
     short = 1 - crossover / bounds[0].value
-    if short < ROUNDED:
+    if short < BOUND_ROUNDING:
         return text
     return (
         f"{text} The crossover is {percent(short)} below the first of these, because sizes are rounded to tenths of a "
@@ -357,7 +362,7 @@ def _margin(design: Design) -> str:
     controller = design.controller
     return (
         f"The smallest modulus margin of the settled states is {controller.margin:.3g} as designed and "
-        f"{controller.corners.min():.3g} over the corners ({WANTED:g} is required)."
+        f"{controller.corners.min():.3g} over the corners ({COMFORTABLE_MARGIN:g} is required)."
     )
 
 
@@ -366,7 +371,7 @@ def _damping(design: Design) -> str:
     damping = design.controller.damping
     as_designed, best, worth = float(damping.margins[0]), float(damping.margins.max()), damping.worth
     now = f"with its own damping of {trimmed(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"
-    if worth == 0 or best < (1 + LITTLE) * as_designed:
+    if worth == 0 or best < (1 + LEAST_MARGIN_GAIN) * as_designed:
         return (
             f"More damping in the joint is not worth adding: {now}, and none up to "
             f"{trimmed(damping.tried[-1], 'N*s/m')} raises it above {best:.3g}."

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.design_method.method import Design
-from friso.frequency.crossover import WANTED, Range, searched_crossovers
+from friso.frequency.crossover import COMFORTABLE_MARGIN, Range, searched_crossovers
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def upper(design: Design) -> list[CrossoverBound]:
     bounds = [
         CrossoverBound(design.spec.limit, "the machine's limit"),
         CrossoverBound(stiffest(design), front),
-        CrossoverBound(comfortable(design)[1], f"above it the modulus margin is below {WANTED:g}"),
+        CrossoverBound(comfortable(design)[1], f"above it the modulus margin is below {COMFORTABLE_MARGIN:g}"),
     ]
     return sorted((bound for bound in bounds if np.isfinite(bound.value)), key=lambda bound: bound.value)
 
@@ -50,7 +50,7 @@ def lower(design: Design) -> list[CrossoverBound]:
     factor, edges = design.spec.safety.hunting, design.edges
     low = comfortable(design)[0]
     bounds = (
-        [CrossoverBound(low, f"below it the modulus margin is below {WANTED:g}")]
+        [CrossoverBound(low, f"below it the modulus margin is below {COMFORTABLE_MARGIN:g}")]
         if low > searched_crossovers(design.fitted.stage.flat())[0]
         else []
     )

@@ -23,7 +23,7 @@ from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import choose, pretty, with_unit
 from friso.stage.stage import numeric_keys
 
-SHOWN = 5
+MOST_RELAXATIONS = 5
 """Number of relaxations listed in a message."""
 
 
@@ -239,7 +239,7 @@ def _why(failure: NoDesign) -> str:
         return f"{failure.reason}\n  {tail}"
     later = any(change.geometry for change in failure.relaxed)
     tail = ["(each one alone; this concerns the leaf springs only, the later steps were not tried)"] if later else []
-    return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN]), *tail])
+    return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:MOST_RELAXATIONS]), *tail])
 
 
 def shortfall(design: Design) -> str:

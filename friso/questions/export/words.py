@@ -10,7 +10,7 @@ from friso.shown.documents import entries, plain_json
 
 COLUMNS = ("Symbol", "In this file", "In other units")
 
-DIGITS = 4
+GAIN_DIGITS = 4
 """Significant digits of gains in sentences; parameters of a drive are written in full."""
 
 
@@ -50,7 +50,7 @@ def notes(gains: Gains) -> list[str]:
 def _with_unit(value: tuple[float, str]) -> str:
     """Write a value with its unit, rounded for people."""
     number, unit = value
-    rounded = float(f"{number:.{DIGITS}g}")
+    rounded = float(f"{number:.{GAIN_DIGITS}g}")
     return f"{rounded:.10g} {unit}".rstrip()
 
 

@@ -12,9 +12,19 @@ import numpy as np
 
 from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.flexure import svg
-from friso.questions.flexure.layout import ABOVE, CLAMP, FOOT, RIM, SCALES, STOP, WIDTH, PaperDrawing, block_size
+from friso.questions.flexure.layout import (
+    CLAMP_OVERHANG,
+    CLAMP_THICKNESS,
+    SCALES,
+    SHEET_WIDTH,
+    STOP_HEIGHT,
+    TITLE_BLOCK_HEIGHT,
+    UPPER_MARGIN,
+    PaperDrawing,
+    block_size,
+)
 
-CLOSE = 1e-6
+LEAST_LENGTH = 1e-6
 """Lengths on paper [mm] below this are treated as 0."""
 
 
@@ -36,7 +46,7 @@ def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", materia
         *_legend(drawing),
         *_title_block(drawing, title, material),
     ]
-    return svg.sheet(WIDTH, drawing.height, label, parts)
+    return svg.sheet(SHEET_WIDTH, drawing.height, label, parts)
 
 
 def _side_view(drawing: PaperDrawing) -> list[str]:
@@ -44,18 +54,22 @@ def _side_view(drawing: PaperDrawing) -> list[str]:
     mechanism = drawing.mechanism
     start, end = drawing.x0, drawing.x0 + drawing.size(mechanism.length)
     row = drawing.size(mechanism.depth) / 2
-    parts = [svg.words((5, drawing.z0 - drawing.spans[1][1] - ABOVE + 5), "From the side (x–z)", bold=True)]
+    parts = [svg.words((5, drawing.z0 - drawing.spans[1][1] - UPPER_MARGIN + 5), "From the side (x–z)", bold=True)]
     parts += _block(drawing, 1, drawing.z0)
     for offset in mechanism.offsets:
         height = drawing.z0 - drawing.size(offset)
         parts += [svg.path(_bent(drawing, height, side), "dashed") for side in (-1, 1)]
         parts.append(svg.box((start, height - drawing.leaf / 2), (end, height + drawing.leaf / 2), "thin", "#222222"))
-    clamps = ((start - CLAMP, start), (end, end + CLAMP))
+    clamps = ((start - CLAMP_THICKNESS, start), (end, end + CLAMP_THICKNESS))
     parts += [
-        svg.box((x1, drawing.z0 - row - RIM), (x2, drawing.z0 + row + RIM), fill="url(#leaf-hatch)")
+        svg.box(
+            (x1, drawing.z0 - row - CLAMP_OVERHANG), (x2, drawing.z0 + row + CLAMP_OVERHANG), fill="url(#leaf-hatch)"
+        )
         for x1, x2 in clamps
     ]
-    parts += [word for side in (-1, 1) for word in _stop(drawing, end, drawing.z0 + side * (row + RIM), side)]
+    parts += [
+        word for side in (-1, 1) for word in _stop(drawing, end, drawing.z0 + side * (row + CLAMP_OVERHANG), side)
+    ]
     return parts + _side_dimensions(drawing, start, end, row)
 
 
@@ -78,8 +92,8 @@ def _stop(drawing: PaperDrawing, end: float, edge: float, side: int) -> list[str
     The stop lies one stroke away from the stage's clamp, to the `side` 1 or -1. The clamp's `edge` and the leaf's `end`
     are on paper.
     """
-    near, far = edge + side * drawing.travel, edge + side * (drawing.travel + STOP)
-    return [svg.box((end, near), (end + CLAMP, far), fill="url(#leaf-hatch)")]
+    near, far = edge + side * drawing.travel, edge + side * (drawing.travel + STOP_HEIGHT)
+    return [svg.box((end, near), (end + CLAMP_THICKNESS, far), fill="url(#leaf-hatch)")]
 
 
 def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float) -> list[str]:
@@ -90,24 +104,26 @@ def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float
     mechanism, left = drawing.mechanism, drawing.x0 + drawing.spans[0][0]
     below = drawing.z0 - drawing.spans[1][0]
     top = drawing.z0 - row
-    parts = svg.across(start, end, below + 6, drawing.z0 + row + RIM, _mm(mechanism.length))
-    parts += svg.upwards(top, top + drawing.size(mechanism.spacing), left - 6, start - CLAMP, _mm(mechanism.spacing))
+    parts = svg.across(start, end, below + 6, drawing.z0 + row + CLAMP_OVERHANG, _mm(mechanism.length))
+    parts += svg.upwards(
+        top, top + drawing.size(mechanism.spacing), left - 6, start - CLAMP_THICKNESS, _mm(mechanism.spacing)
+    )
     if mechanism.leaves > 2:
         count = int(mechanism.leaves) - 1
         total = f"{count} x {_mm(mechanism.spacing)} = {_mm(mechanism.depth)}"
         text = total if svg.fits(total, 2 * row) else _mm(mechanism.depth)
-        parts += svg.upwards(top, drawing.z0 + row, left - 13, start - CLAMP, text)
+        parts += svg.upwards(top, drawing.z0 + row, left - 13, start - CLAMP_THICKNESS, text)
     tip = (start + 0.15 * (end - start), top - drawing.leaf / 2)
     note = [f"{mechanism.leaves:g} leaves, thickness {_mm(mechanism.thickness)}"]
     parts += svg.leader(tip, (tip[0] + 3, drawing.z0 - drawing.spans[1][1] - 4), note)
-    edge, beside = drawing.z0 + row + RIM, end + CLAMP + 3
-    parts += svg.upwards(edge, edge + drawing.travel, beside, end + CLAMP, "")
+    edge, beside = drawing.z0 + row + CLAMP_OVERHANG, end + CLAMP_THICKNESS + 3
+    parts += svg.upwards(edge, edge + drawing.travel, beside, end + CLAMP_THICKNESS, "")
     parts.append(
         svg.words_over(
             (beside + 2, edge + drawing.travel / 2 + 1), f"±{_mm(drawing.stroke)} stroke, gap to the limiter"
         )
     )
-    parts.append(svg.words((start - CLAMP / 2, drawing.z0 - row - RIM - 1.5), "cart", "middle"))
+    parts.append(svg.words((start - CLAMP_THICKNESS / 2, drawing.z0 - row - CLAMP_OVERHANG - 1.5), "cart", "middle"))
     return parts + _axes(drawing.z0 - drawing.spans[1][0] + 6, "z") + _stage_note(drawing)
 
 
@@ -135,10 +151,10 @@ def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
     cut = max(x1, left), min(x2, right), max(low, bottom), min(high, top)
     near, far, under, over = drawing.x0 + cut[0], drawing.x0 + cut[1], middle - cut[2], middle - cut[3]
     edges = [
-        (x1 >= left - CLOSE, [(near, under), (near, over)]),
-        (x2 <= right + CLOSE, [(far, under), (far, over)]),
-        (low >= bottom - CLOSE, [(near, under), (far, under)]),
-        (high <= top + CLOSE, [(near, over), (far, over)]),
+        (x1 >= left - LEAST_LENGTH, [(near, under), (near, over)]),
+        (x2 <= right + LEAST_LENGTH, [(far, under), (far, over)]),
+        (low >= bottom - LEAST_LENGTH, [(near, under), (far, under)]),
+        (high <= top + LEAST_LENGTH, [(near, over), (far, over)]),
     ]
     fill = svg.area((near, under), (far, over), "#f1f1f1")
     return [fill, *(svg.path(ends, "phantom") for inside, ends in edges if inside)]
@@ -149,19 +165,21 @@ def _top_view(drawing: PaperDrawing) -> list[str]:
     mechanism = drawing.mechanism
     start, end, half = drawing.x0, drawing.x0 + drawing.size(mechanism.length), drawing.size(mechanism.width) / 2
     left = drawing.x0 + drawing.spans[0][0]
-    parts = [svg.words((5, drawing.y0 - drawing.spans[2][1] - ABOVE + 9), "From above (x–y)", bold=True)]
+    parts = [svg.words((5, drawing.y0 - drawing.spans[2][1] - UPPER_MARGIN + 9), "From above (x–y)", bold=True)]
     parts += _block(drawing, 2, drawing.y0)
     parts.append(svg.area((start, drawing.y0 - half), (end, drawing.y0 + half), "#0072B2", 0.18))
     parts.append(svg.box((start, drawing.y0 - half), (end, drawing.y0 + half)))
-    clamps = ((start - CLAMP, start), (end, end + CLAMP))
+    clamps = ((start - CLAMP_THICKNESS, start), (end, end + CLAMP_THICKNESS))
     parts += [
-        svg.box((x1, drawing.y0 - half - RIM), (x2, drawing.y0 + half + RIM), fill="url(#leaf-hatch)")
+        svg.box(
+            (x1, drawing.y0 - half - CLAMP_OVERHANG), (x2, drawing.y0 + half + CLAMP_OVERHANG), fill="url(#leaf-hatch)"
+        )
         for x1, x2 in clamps
     ]
     parts.append(svg.path([(left - 2, drawing.y0), (drawing.x0 + drawing.spans[0][1] + 2, drawing.y0)], "centre"))
-    parts += svg.upwards(drawing.y0 - half, drawing.y0 + half, left - 6, start - CLAMP, _mm(mechanism.width))
-    parts += [svg.words((start - CLAMP / 2, drawing.y0 - half - RIM - 1.5), "cart", "middle")]
-    parts += [svg.words((end + CLAMP / 2, drawing.y0 - half - RIM - 1.5), "stage", "middle")]
+    parts += svg.upwards(drawing.y0 - half, drawing.y0 + half, left - 6, start - CLAMP_THICKNESS, _mm(mechanism.width))
+    parts += [svg.words((start - CLAMP_THICKNESS / 2, drawing.y0 - half - CLAMP_OVERHANG - 1.5), "cart", "middle")]
+    parts += [svg.words((end + CLAMP_THICKNESS / 2, drawing.y0 - half - CLAMP_OVERHANG - 1.5), "stage", "middle")]
     return parts + _axes(drawing.y0 - drawing.spans[2][0] + 6, "y")
 
 
@@ -195,7 +213,7 @@ def _together(places: dict[str, svg.SheetPoint]) -> dict[svg.SheetPoint, list[st
     """Group the letters of marks by where they stand; marks close together share one point."""
     groups: dict[svg.SheetPoint, list[str]] = {}
     for letter, place in places.items():
-        near = next((group for group in groups if math.dist(group, place) < 2 * svg.TEXT), place)
+        near = next((group for group in groups if math.dist(group, place) < 2 * svg.TEXT_HEIGHT), place)
         groups.setdefault(near, []).append(letter)
     return groups
 
@@ -237,7 +255,7 @@ def _legend(drawing: PaperDrawing) -> list[str]:
 
 def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
     """Return the title block: material, sizes and scale."""
-    mechanism, top, split = drawing.mechanism, drawing.height - FOOT - 5, 138.0
+    mechanism, top, split = drawing.mechanism, drawing.height - TITLE_BLOCK_HEIGHT - 5, 138.0
     material_line = f"E {mechanism.young / 1e9:.4g} GPa, ν {mechanism.poisson:g}, {mechanism.density:.4g} kg/m³"
     strength = f"yield {mechanism.yield_strength / 1e6:.4g} MPa"
     if math.isfinite(mechanism.fatigue):
@@ -249,7 +267,10 @@ def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
         f"{material_line}, {strength}",
     ]
     room = split - 9
-    parts = [svg.box((5, top), (WIDTH - 5, top + FOOT)), svg.path([(split, top), (split, top + FOOT)])]
+    parts = [
+        svg.box((5, top), (SHEET_WIDTH - 5, top + TITLE_BLOCK_HEIGHT)),
+        svg.path([(split, top), (split, top + TITLE_BLOCK_HEIGHT)]),
+    ]
     parts.append(svg.words((8, top + 6), svg.clipped(title or "Leaf springs", room, 3.8), size=3.8, bold=True))
     parts += [svg.words((8, top + 12 + 5 * k), svg.clipped(line, room, 2.8), size=2.8) for k, line in enumerate(lines)]
     ratio = f"{drawing.scale:g}:1" if drawing.scale >= 1 else f"1:{1 / drawing.scale:g}"

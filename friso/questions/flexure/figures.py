@@ -23,7 +23,7 @@ DASHES: dict[str, Dash] = {CLOSED: "dashed"}
 Smooth = Callable[[Array, Array, Array], Array]
 """Function that interpolates: from positions, values there, and other positions, it returns the values at these."""
 
-FINE = 101
+LINE_POINTS = 101
 """Number of deflections along a drawn line."""
 
 
@@ -81,7 +81,7 @@ def _lines(
 
     `of` reads the quantity from an evaluation, and `smooth` interpolates it between deflections.
     """
-    fine = np.linspace(0.0, flexure.best.stroke, FINE)
+    fine = np.linspace(0.0, flexure.best.stroke, LINE_POINTS)
     lines = tuple(
         Series(
             fine,
@@ -115,19 +115,19 @@ def _deflection(flexure: BothModels) -> Axis:
     return Axis("Deflection", "m", (0.0, flexure.best.stroke))
 
 
-SHOWN = 8
+DRAWN_MODES = 8
 """Number of modes drawn."""
 
-LARGE = 0.16
+DRAWN_AMPLITUDE = 0.16
 """Amplitude of the largest motion, relative to the size of the picture."""
 
-ASPECT = 1.45
+PICTURE_ASPECT = 1.45
 """Width of a picture over its height."""
 
-HALF = 0.5
+LEAST_ENERGY_SHARE = 0.5
 """Smallest fraction of a mode's energy in the drawn shape for the mode to be drawn."""
 
-ENOUGH = 0.9
+LEAST_SHOWN_SHARE = 0.9
 """Smallest fraction of a mode's motion that a view must show to be chosen."""
 
 LEAF_POINTS = 65
@@ -147,9 +147,11 @@ class Shape:
 
 def modes_figure(evaluation: Evaluation) -> Figure:
     """Draw the first modes, one panel each."""
-    modes = [mode for mode in evaluation.modes if mode.interferes or drawable_share(evaluation.mechanism, mode) > HALF][
-        :SHOWN
-    ]
+    modes = [
+        mode
+        for mode in evaluation.modes
+        if mode.interferes or drawable_share(evaluation.mechanism, mode) > LEAST_ENERGY_SHARE
+    ][:DRAWN_MODES]
     panels = tuple(_panel(evaluation.mechanism, mode, mode is evaluation.modes[0] or mode.interferes) for mode in modes)
     caption = (
         "The first modes with the cart held and the leaves straight, enlarged to be visible. Grey: at rest. The stage "
@@ -172,12 +174,12 @@ def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
     low, high = corners.min(axis=0), corners.max(axis=0)
     largest = max(float(np.abs(shape.moved[:, axes]).max()) for shape in shapes)
     size = float(np.max(high - low))
-    gain = LARGE * size / largest
+    gain = DRAWN_AMPLITUDE * size / largest
     colour, label = (VERMILLION, "seen by actuator and sensor") if visible else (BLUE, "not seen by both")
     rest = _polyline([shape.rest[:, axes] for shape in shapes])
     moved = _polyline([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
     lines = (Series(*rest, f"at rest, {view}", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
-    x, y = _limits(low - LARGE * size * 1.1, high + LARGE * size * 1.1)
+    x, y = _limits(low - DRAWN_AMPLITUDE * size * 1.1, high + DRAWN_AMPLITUDE * size * 1.1)
     title = f"{mode.name}, {with_unit(mode.frequency, 'Hz')}"
     return Panel(title, Axis("xyz"[axes[0]], "m", x), Axis("xyz"[axes[1]], "m", y), lines, equal=True)
 
@@ -190,7 +192,7 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
     everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(mechanism, mode)])
     shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
     spans = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
-    return next((view for view, share in spans.items() if share > ENOUGH), max(spans, key=spans.__getitem__))
+    return next((view for view, share in spans.items() if share > LEAST_SHOWN_SHARE), max(spans, key=spans.__getitem__))
 
 
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
@@ -310,6 +312,6 @@ def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, 
     """
     width, height = high - low
     middle = (low + high) / 2
-    half = np.array([max(width, ASPECT * height), max(height, width / ASPECT)]) / 2
+    half = np.array([max(width, PICTURE_ASPECT * height), max(height, width / PICTURE_ASPECT)]) / 2
     (x1, y1), (x2, y2) = middle - half, middle + half
     return (float(x1), float(x2)), (float(y1), float(y2))

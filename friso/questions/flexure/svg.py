@@ -13,19 +13,19 @@ from friso.escapes import escaped
 
 SheetPoint = tuple[float, float]
 
-TEXT = 3.0
+TEXT_HEIGHT = 3.0
 """Height of letters [mm]."""
 
-ARROW = 2.4
+ARROW_LENGTH = 2.4
 """Length of an arrowhead [mm]."""
 
-REACH = 2.0
+NOTE_LINE = 2.0
 """Length of the level part of the line of a note [mm]."""
 
-OVER = 1.5
+EXTENSION_OVERHANG = 1.5
 """Length of an extension line beyond the dimension line [mm]."""
 
-LETTER = 0.6
+LETTER_ASPECT = 0.6
 """Conservative ratio of a letter's width to its height."""
 
 LINES = {
@@ -83,7 +83,12 @@ def circle(centre: SheetPoint, radius: float, fill: str = "none") -> str:
 
 
 def words(
-    at: SheetPoint, text: str, anchor: str = "start", size: float = TEXT, bold: bool = False, upright: bool = False
+    at: SheetPoint,
+    text: str,
+    anchor: str = "start",
+    size: float = TEXT_HEIGHT,
+    bold: bool = False,
+    upright: bool = False,
 ) -> str:
     """Return a text whose baseline goes through `at`; an `upright` text is read from the right.
 
@@ -105,19 +110,19 @@ def words_over(at: SheetPoint, text: str, bold: bool = False) -> str:
 
 def fits(text: str, room: float) -> bool:
     """Tell whether a text fits into a length [mm]."""
-    return LETTER * TEXT * len(text) + 1 < room
+    return LETTER_ASPECT * TEXT_HEIGHT * len(text) + 1 < room
 
 
-def clipped(text: str, width: float, size: float = TEXT) -> str:
+def clipped(text: str, width: float, size: float = TEXT_HEIGHT) -> str:
     """Return a text, shortened if it does not fit into the width [mm]."""
-    most = int(width / (LETTER * size))
+    most = int(width / (LETTER_ASPECT * size))
     return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
 
 
 def arrow(tip: SheetPoint, towards: SheetPoint, fill: str = "#222222") -> str:
     """Return an arrowhead at `tip` that points in the direction `towards`."""
     size = math.hypot(*towards)
-    dx, dy = towards[0] / size * ARROW, towards[1] / size * ARROW
+    dx, dy = towards[0] / size * ARROW_LENGTH, towards[1] / size * ARROW_LENGTH
     (x, y), slim = tip, 0.17
     corners = [(x, y), (x - dx - slim * dy, y - dy + slim * dx), (x - dx + slim * dy, y - dy - slim * dx)]
     return path(corners, "thin", fill, closed=True)
@@ -132,7 +137,7 @@ def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:
     parts += _arrows((x1, y), (x2, y), (1.0, 0.0))
     if fits(text, x2 - x1):
         return [*parts, words(((x1 + x2) / 2, y - 0.9), text, "middle")]
-    return [*parts, words((x2 + ARROW + 3, y - 0.9), text)]
+    return [*parts, words((x2 + ARROW_LENGTH + 3, y - 0.9), text)]
 
 
 def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]:
@@ -144,7 +149,7 @@ def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]
     parts += _arrows((x, y1), (x, y2), (0.0, 1.0))
     if fits(text, y2 - y1):
         return [*parts, words((x - 0.9, (y1 + y2) / 2), text, "middle", upright=True)]
-    return [*parts, words((x - 0.9, y1 - ARROW - 2), text, upright=True)]
+    return [*parts, words((x - 0.9, y1 - ARROW_LENGTH - 2), text, upright=True)]
 
 
 def leader(tip: SheetPoint, knee: SheetPoint, lines: list[str]) -> list[str]:
@@ -152,9 +157,11 @@ def leader(tip: SheetPoint, knee: SheetPoint, lines: list[str]) -> list[str]:
 
     From the knee the line continues level to the right.
     """
-    end = (knee[0] + REACH, knee[1])
+    end = (knee[0] + NOTE_LINE, knee[1])
     parts = [path([tip, knee, end], "thin"), arrow(tip, (tip[0] - knee[0], tip[1] - knee[1]))]
-    return parts + [words((end[0] + 0.8, end[1] + TEXT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)]
+    return parts + [
+        words((end[0] + 0.8, end[1] + TEXT_HEIGHT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)
+    ]
 
 
 def _arrows(start: SheetPoint, end: SheetPoint, direction: SheetPoint) -> list[str]:
@@ -163,9 +170,9 @@ def _arrows(start: SheetPoint, end: SheetPoint, direction: SheetPoint) -> list[s
     The arrows point inwards from outside if there is no room between the ends. `direction` leads from start to end.
     """
     back = (-direction[0], -direction[1])
-    if math.dist(start, end) > 3 * ARROW:
+    if math.dist(start, end) > 3 * ARROW_LENGTH:
         return [path([start, end], "thin"), arrow(start, back), arrow(end, direction)]
-    tail = 2 * ARROW
+    tail = 2 * ARROW_LENGTH
     outer = [
         (start[0] - tail * direction[0], start[1] - tail * direction[1]),
         (end[0] + tail * direction[0], end[1] + tail * direction[1]),
@@ -177,7 +184,10 @@ def _extension(edge: SheetPoint, at: SheetPoint) -> str:
     """Return a line from near an edge to slightly beyond the dimension line."""
     size = math.dist(edge, at) or 1.0
     dx, dy = (at[0] - edge[0]) / size, (at[1] - edge[1]) / size
-    return path([(edge[0] + 0.8 * dx, edge[1] + 0.8 * dy), (at[0] + OVER * dx, at[1] + OVER * dy)], "thin")
+    return path(
+        [(edge[0] + 0.8 * dx, edge[1] + 0.8 * dy), (at[0] + EXTENSION_OVERHANG * dx, at[1] + EXTENSION_OVERHANG * dy)],
+        "thin",
+    )
 
 
 def _n(value: float) -> str:

@@ -8,16 +8,16 @@ from collections.abc import Callable, Iterator, Mapping
 from friso.interface.answer import AnswerTable
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import AXES, GRAVITY
+from friso.leaf_springs.mechanism import AXES, STANDARD_GRAVITY
 from friso.quantities import percent
 from friso.questions.flexure.table import megapascals, newtons_per, rows
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage import Stage
 
-RULE = 0.1
+CROSSOVER_RULE = 0.1
 """Highest crossover, relative to the first interfering frequency (thesis, Section 5)."""
 
-AGREE = 0.1
+MODELS_AGREE = 0.1
 """Relative difference of the models above which it is mentioned."""
 
 
@@ -97,7 +97,7 @@ def _control(evaluation: Evaluation) -> str:
     return (
         f"The first mode that interferes with control is {first.name}, at {with_unit(first.frequency, 'Hz')}: by the "
         "thesis's rule (ten times the crossover) the crossover may be up to "
-        f"{with_unit(RULE * first.frequency, 'Hz')}."
+        f"{with_unit(CROSSOVER_RULE * first.frequency, 'Hz')}."
     )
 
 
@@ -134,7 +134,7 @@ def _borne(evaluation: Evaluation) -> list[str]:
     if evaluation.buckling_margin < 1:
         lines.append(
             f"A stage standing on its leaves would buckle them: it weighs {with_unit(mechanism.weight, 'N')} "
-            f"(g = {GRAVITY} m/s²), they bear {with_unit(evaluation.buckling, 'N')} along their length."
+            f"(g = {STANDARD_GRAVITY} m/s²), they bear {with_unit(evaluation.buckling, 'N')} along their length."
         )
     return lines
 
@@ -188,7 +188,7 @@ def _differences(flexure: BothModels) -> Iterator[str]:
     """
     beams = flexure.beams or flexure.closed
     shares = {name: get(flexure.closed) / get(beams) - 1 for name, get in _COMPARED.items()}
-    far = [f"{name} by {percent(share, signed=True)}" for name, share in shares.items() if abs(share) > AGREE]
+    far = [f"{name} by {percent(share, signed=True)}" for name, share in shares.items() if abs(share) > MODELS_AGREE]
     if far:
         yield (
             f"The closed forms differ from the beam model in {listed(far, 'and')}: there the leaves are outside the "

@@ -11,19 +11,19 @@ from friso.identification.estimate import Estimate
 from friso.questions.map.words import quantity
 from friso.shown.drawing.prefixes import NOTHING, choose, pretty
 
-DIGITS = 2
+INTERVAL_DIGITS = 2
 """Significant digits of the half-width of an interval, which also set the digits of the value."""
 
-MOST = 4
+MOST_DIGITS = 4
 """Largest number of significant digits of a value without interval."""
 
-LARGE, SMALL = 4, 7
+MOST_ZEROS, MOST_DECIMALS = 4, 7
 """Zeros before and decimals behind the point above which a number gets an exponent."""
 
-EXACT = 15
+EXACT_DIGITS = 15
 """Largest number of digits after the first one."""
 
-FORCES = (1e-2, 1e4)
+PLAIN_FORCES = (1e-2, 1e4)
 """Range of forces [N], and of quantities per newton, without an SI prefix; they are compared with each other."""
 
 _NAMES = {
@@ -118,7 +118,7 @@ def _scale(estimate: Estimate) -> tuple[float, str]:
     if math.isfinite(estimate.value):  # for a value next to 0, the interval gives the scale
         finite = [max(abs(estimate.value), estimate.half_width) if estimate.value else 0.0]
     unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
-    if unit.startswith("N") and FORCES[0] < size < FORCES[1]:
+    if unit.startswith("N") and PLAIN_FORCES[0] < size < PLAIN_FORCES[1]:
         return 1.0, pretty(unit)
     return choose(np.array(finite), unit)
 
@@ -132,14 +132,14 @@ def _places(estimate: Estimate, factor: float) -> int:
             for number in (estimate.value, estimate.low, estimate.high)
             if math.isfinite(number) and number != 0
         ]
-        return MOST - 1 - math.floor(math.log10(max(finite))) if finite else 0
-    return DIGITS - 1 - math.floor(math.log10(half))
+        return MOST_DIGITS - 1 - math.floor(math.log10(max(finite))) if finite else 0
+    return INTERVAL_DIGITS - 1 - math.floor(math.log10(half))
 
 
 def _written(value: float, factor: float, places: int) -> str:
     """Write a value times a factor, to so many decimal places, or with an exponent if shorter."""
-    if math.isfinite(value) and not -LARGE <= places <= SMALL:
+    if math.isfinite(value) and not -MOST_ZEROS <= places <= MOST_DECIMALS:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
-        return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"
+        return f"{value * factor:.{max(MOST_DIGITS - 1, min(places + size, EXACT_DIGITS))}e}"
     rounded = round(value * factor, places)
     return f"{rounded + 0.0:.{max(places, 0)}f}"  # + 0.0: no minus before a zero

@@ -45,7 +45,7 @@ NO_NEWTONS = "No stage file is written: its keys need the force in {}."
 
 NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
 
-POOR = 0.5
+POOR_PREDICTION = 0.5
 """Relative error of force or response above which the prediction of another log is called poor."""
 
 
@@ -162,7 +162,7 @@ def prediction_view(prediction: Prediction) -> PredictionView[Any]:
 def prediction_line(prediction: Prediction) -> tuple[str, str]:
     """Say how well another log is predicted, with the colour of the sentence."""
     view = prediction_view(prediction)
-    colour = GREEN if view.worst(prediction.result) < POOR else VERMILLION
+    colour = GREEN if view.worst(prediction.result) < POOR_PREDICTION else VERMILLION
     return colour, f"Prediction of {prediction.log.name}: {view.sentence(prediction.result)}"
 
 

@@ -12,7 +12,7 @@ from friso.questions.logs.words import title
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.drawing.palette import BLUE
 
-MOST = 12
+MOST_CHANNELS = 12
 """Largest number of channels of a file that are drawn."""
 
 
@@ -24,9 +24,13 @@ def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
 def _figure(content: LogContent, number: int) -> Figure:
     """Draw the channels of one file; `number` is that of the file, for the figure's name."""
     channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
-    left = f" {MOST} of {len(channels)} channels are drawn, those with a role first." if len(channels) > MOST else ""
+    left = (
+        f" {MOST_CHANNELS} of {len(channels)} channels are drawn, those with a role first."
+        if len(channels) > MOST_CHANNELS
+        else ""
+    )
     caption = f"As they stand in the file, in its own units.{left}"
-    panels = tuple(_panel(channel) for channel in channels[:MOST])
+    panels = tuple(_panel(channel) for channel in channels[:MOST_CHANNELS])
     return Figure(f"logs_{number}", title(content), caption, panels, columns=2 if len(panels) > 1 else 1)
 
 

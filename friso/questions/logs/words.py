@@ -19,7 +19,7 @@ from friso.shown.drawing.prefixes import NOTHING, range_with_unit, with_unit
 COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")
 """Columns of the table of channels."""
 
-PLAIN = 1e7
+PLAIN_BELOW = 1e7
 """Numbers below this are written without an exponent."""
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
@@ -109,7 +109,7 @@ def _range(channel: ChannelContent) -> str:
 def _number(value: float) -> str:
     """Write four digits, without an exponent where a plain number is as short."""
     text = f"{value:.4g}"
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN else text
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN_BELOW else text
 
 
 def _samples(channel: ChannelContent) -> str:

@@ -30,9 +30,9 @@ from friso.studies.axes import SCALINGS
 from friso.studies.metric import worded
 from friso.studies.traces import Traces
 
-MOST = 250_000  # most cells in a page: more take a browser seconds to open and colour
+MOST_CELLS = 250_000  # most cells in a page: more take a browser seconds to open and colour
 
-NONE = 255  # code for a cell without a category, whose number counts
+MISSING_HEIGHT = 255  # code for a cell without a category, whose number counts
 
 
 def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
@@ -82,8 +82,8 @@ def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
     A map that is too large is thinned evenly.
     """
     if SAMPLE in runs.dims:
-        return pick([runs.sizes[SAMPLE]], MOST)
-    return pick([len(axis.places) for axis in axes_of(runs)], MOST)
+        return pick([runs.sizes[SAMPLE]], MOST_CELLS)
+    return pick([len(axis.places) for axis in axes_of(runs)], MOST_CELLS)
 
 
 class _Cells:
@@ -111,15 +111,15 @@ class _Cells:
 FINEST = 2 * min(BANDS)
 """Least range [m] of the axis of a drawn run."""
 
-HIGHEST = 250
+HIGHEST_BYTE = 250
 """Largest byte that encodes a height of a drawn run; 255 encodes a missing height."""
 
 
 def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
     """Return the run of each cell as a line: its heights, and the range that they cover.
 
-    The range shows the final behaviour of the run. Heights are bytes from 0 to HIGHEST, which cover the range and half
-    a range beyond either end; lines are cut there.
+    The range shows the final behaviour of the run. Heights are bytes from 0 to HIGHEST_BYTE, which cover the range and
+    half a range beyond either end; lines are cut there.
     """
     outcome = runs["outcome"]
     of_cell = cells.take(outcome.copy(data=np.arange(outcome.size).reshape(outcome.shape)))
@@ -128,7 +128,9 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
     ends = [common_range([line[time >= start]], FINEST) for line, start in zip(deviations, late, strict=True)]
     low, high = np.array([end or (-FINEST, FINEST) for end in ends]).T[:, :, None]
     shares = ((deviations - low) / (high - low) + 0.5) / 2
-    heights = np.where(np.isnan(shares), NONE, np.clip(np.round(HIGHEST * shares), 0, HIGHEST)).astype(np.uint8)
+    heights = np.where(
+        np.isnan(shares), MISSING_HEIGHT, np.clip(np.round(HIGHEST_BYTE * shares), 0, HIGHEST_BYTE)
+    ).astype(np.uint8)
     ranges = {"low": _base64(low.astype("<f4")), "high": _base64(high.astype("<f4"))}
     return {"duration": drawn.duration, "unit": unit_shown("m"), "heights": _base64(heights), **ranges}
 
@@ -187,7 +189,7 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
         "ticks": list(scaled.ticks),
         "texts": list(scaled.texts),
         "kinds": categories,
-        "codes": _base64(np.where(np.isnan(codes), NONE, codes).astype(np.uint8)),
+        "codes": _base64(np.where(np.isnan(codes), MISSING_HEIGHT, codes).astype(np.uint8)),
         "numbers": _base64(_short(cells.take(stored).astype(float) * factor)),
     }
 

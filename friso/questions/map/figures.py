@@ -20,10 +20,10 @@ from friso.shown.drawing.figure import Axis, Cloud, Figure, Map, Markers, Panel,
 from friso.shown.drawing.palette import BLUE, INK
 from friso.studies.metric import metrics
 
-SLICES = 9  # largest number of panels of a map over more than two axes
+MOST_SLICES = 9  # largest number of panels of a map over more than two axes
 RED = "#e3001b"  # the evaluation marker of the thesis
 
-_LISTED = 12  # largest number of left-out values that are named one by one
+MOST_LISTED = 12  # largest number of left-out values that are named one by one
 
 
 def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None) -> Figure:
@@ -161,7 +161,7 @@ def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, fl
     Also returns a text that says which of these values have no panel. `marker` is a point to mark, by its values.
     """
     x, y, *further = plane_first(axes)
-    picked = pick([len(axis.places) for axis in further], SLICES)
+    picked = pick([len(axis.places) for axis in further], MOST_SLICES)
     panels = []
     for positions in product(*picked):
         where = list(zip(further, positions, strict=True))
@@ -185,7 +185,7 @@ def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
     if not missing:
         return ""
     texts = [axis.text(i).removeprefix(f"{axis.quantity} ") for i in missing]
-    listed = ", ".join(texts) if len(texts) <= _LISTED else f"{len(texts)} values from {texts[0]} to {texts[-1]}"
+    listed = ", ".join(texts) if len(texts) <= MOST_LISTED else f"{len(texts)} values from {texts[0]} to {texts[-1]}"
     return f"Not shown: {axis.quantity} {listed}."
 
 

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Content, Files
 
-LARGE = 10_000_000
+CONFIRMED_FROM = 10_000_000
 """Number of cells above which a study must be confirmed: it takes minutes and a gigabyte."""
 
 
@@ -79,7 +79,7 @@ class SweepAnswer(Answer):
     @property
     def drawable(self) -> bool:
         """Tell whether there are few enough cells for a figure and a page."""
-        return self.study.cells <= LARGE
+        return self.study.cells <= CONFIRMED_FROM
 
     def cell(self, *numbers: int | str) -> Stage:
         """Return the stage of a cell, by the cell's indices along the axes.
@@ -292,13 +292,13 @@ def sweep(
             if varied != Varied() or set or rtol or refine or out or confirm:
                 raise _another_study(resumed)
             store = place_of_store(resumed)
-            study, metric = stored_study(store, metric, None if yes else LARGE)
+            study, metric = stored_study(store, metric, None if yes else CONFIRMED_FROM)
         else:
             metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
             chosen = inputs.read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
             if runs_as_built(chosen, [metric]):
                 inputs.mention_sampling(chosen)
-            study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
+            study = study_for(chosen, varied, metric, refine, None if yes else CONFIRMED_FROM, crew)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
             study = study if store is None else as_stored(study, store, metric, overwrite)
         speak_of(study.stage.axis_kind)
@@ -312,7 +312,7 @@ def sweep(
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
             inputs.mention_unstable_loop(study.stage)
             runs, can_note = _filled(study, store, crew, share, overwrite, metric, beside, progress)
-    held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
+    held = in_memory(runs) if store is not None and study.cells <= CONFIRMED_FROM else runs
     if store is None:
         write(export_files(held, exports), exports if overwrite else ())
     elif exports and not beside:

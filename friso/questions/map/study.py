@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
 
-DRAWN = 4096
+MOST_DRAWN_CELLS = 4096
 """Largest number of cells for which a page includes every run."""
 
-BYTES = 8
+BYTES_PER_NUMBER = 8
 """Bytes per number in a store before compression."""
 
 
@@ -170,7 +170,7 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     start = time.perf_counter()
     run_scattered(trial, np.arange(trial.cells), crew)
     hours = (time.perf_counter() - start) / trial.cells * runs / 3600
-    gigabytes = BYTES * len(trial.metrics) * runs / 1e9
+    gigabytes = BYTES_PER_NUMBER * len(trial.metrics) * runs / 1e9
     size = f"{runs:.3g} runs: about {hours:.2g} hours on this machine, and up to {gigabytes:.2g} GB of disk"
     return InputError("yes", size, "--yes, or fewer points; nothing was run", "yes=True")
 
@@ -178,11 +178,11 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
 def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
     """Simulate the runs of all cells, for the page to draw.
 
-    Cells whose result was inferred from neighbours have none. Returns None for more than DRAWN cells.
+    Cells whose result was inferred from neighbours have none. Returns None for more than MOST_DRAWN_CELLS cells.
     """
     from friso.studies.traces import traces
 
-    if study.cells > DRAWN:
+    if study.cells > MOST_DRAWN_CELLS:
         return None
     inferred = np.array([str(status).startswith(INFERRED) for status in runs["status"].values.ravel()])
     return traces(study, inferred, progress)
@@ -243,7 +243,7 @@ def write_beside(
     from friso.studies.metadata import annotate_metadata
     from friso.studies.store_files import lock_store
 
-    with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE) if can_note else nullcontext():
+    with drafts_of(files, progress) as drafts, lock_store(store, NOTE_WAIT) if can_note else nullcontext():
         own = _own_files(store, files)
         if can_note:
             digests = {
@@ -256,7 +256,7 @@ def write_beside(
     return written(files)
 
 
-PATIENCE = 10.0
+NOTE_WAIT = 10.0
 """Time [s] to wait for another process that is writing a note into a store."""
 
 

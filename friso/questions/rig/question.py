@@ -12,7 +12,7 @@ from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.virtual_rig.run import as_built_keys
 
-MANY = 4
+LEAST_DELAY = 4
 """Smallest delay, in samples, that is mentioned."""
 
 
@@ -69,7 +69,7 @@ def _announce(stage: Stage) -> None:
     if stage.drive is None or stage.drive.sample_time is None:
         inputs.mention_sampling(stage)
     samples = whole_samples(as_built_keys(stage))
-    if samples >= MANY:
+    if samples >= LEAST_DELAY:
         LOGGER.warning(
             f"drive.delay is {samples} samples: the force acts that much later than the reading it is computed from"
         )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from friso.hunting import Dwell
 
 
-GROWN = 1.1
+GROWTH_RATIO = 1.1
 """Ratio of errors in the last quarter of a run and before it, above which the run counts as diverging."""
 
 
@@ -36,7 +36,7 @@ def conclusion(
     evenly timed samples of the deviation from the reference [m], shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(LAST_QUARTER * len(deviation))])
-    grows = bool(late.max() > GROWN * before.max(initial=0.0))
+    grows = bool(late.max() > GROWTH_RATIO * before.max(initial=0.0))
     clauses = {
         SWINGS: lambda: (
             f"swings {plus_minus(_value(measures.peak_to_peak) / 2, 'm')} every "

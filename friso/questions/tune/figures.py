@@ -24,13 +24,13 @@ from friso.studies.compare.options import linear_flat
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
 """Colours of remedies with settings, in order; further remedies repeat them, dashed."""
 
-SAMPLES = 4000
+RESPONSE_SAMPLES = 4000
 """Number of samples of a time response."""
 
-SHOWN = 3.0
+SHOWN_SETTLING_TIMES = 3.0
 """Duration of drawn responses, relative to the settling time that 95 % of machines reach with a working remedy."""
 
-RTOL = 1e-7
+RESPONSE_RTOL = 1e-7
 """Relative tolerance of drawn responses."""
 
 
@@ -105,7 +105,7 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
     flat = tuning.stage.flat()
     corner, series, shown_to = float(last_corner(flat)), [], 20 * tuning.goal.within
     for stage, outcome, line in lines:
-        trace = simulate(stage, RTOL, flat["motion.duration"] / SAMPLES)
+        trace = simulate(stage, RESPONSE_RTOL, flat["motion.duration"] / RESPONSE_SAMPLES)
         after = np.asarray(trace["time"]) >= corner
         off = np.asarray(trace["position"] - trace["reference"])[after]
         series.append(Series(np.asarray(trace["time"])[after] - corner, off, *line))
@@ -114,7 +114,8 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
     y = Axis("Deviation", "m", (-shown_to, shown_to))
     settled = [slowest(outcome, tuning.goal) for _, outcome, _ in lines if outcome]
     end = min(
-        flat["motion.duration"] - corner, SHOWN * max((time for time in settled if np.isfinite(time)), default=np.inf)
+        flat["motion.duration"] - corner,
+        SHOWN_SETTLING_TIMES * max((time for time in settled if np.isfinite(time)), default=np.inf),
     )
     return Panel("The same move", Axis("Time after the move", "s", (0.0, end)), y, tuple(series))
 

@@ -7,7 +7,7 @@ from friso.remedies.method import Advice
 from friso.remedies.sensitivities import Sensitivities
 from friso.shown.drawing.prefixes import with_unit
 
-MOST, LEAST = 4, 0.02
+MOST_KEYS, LEAST_EFFECT = 4, 0.02
 """Largest number of keys named, and least effect of a named key relative to the strongest."""
 
 
@@ -28,7 +28,7 @@ def ranked_sentences(sensitivities: Sensitivities) -> list[str]:
     if not ranked or ranked[0][1] == 0:
         return []
     largest = abs(ranked[0][1])
-    named = [(key, move) for key, move in ranked[:MOST] if abs(move) >= LEAST * largest]
+    named = [(key, move) for key, move in ranked[:MOST_KEYS] if abs(move) >= LEAST_EFFECT * largest]
     unit = "Hz" if sensitivities.stage.controller.bandwidth_key else ""
     parts = [f"1 % more of {key} moves it by {_signed(move, unit)}" for key, move in named]
     return [f"What matters for the edge of hunting, most first: {'; '.join(parts)}."]

@@ -14,7 +14,7 @@ import numpy as np
 from friso.design_method.geometry import Geometry
 from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
-from friso.frequency.crossover import WANTED, bandwidths_at
+from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at
 from friso.interface.answer import AnswerTable
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
@@ -554,7 +554,8 @@ def _edges(tuning: Advice) -> str:
         own = bandwidth(stage.flat()) or 1.0
         hertz = [with_unit(float(at), "Hz") for at in bandwidths_at(stage, np.array([comfortable, *again]) / own)]
         parts.append(
-            f"a modulus margin of {WANTED:g} is kept up to {' and again from '.join(hertz)}{' on' * len(again)}"
+            f"a modulus margin of {COMFORTABLE_MARGIN:g} is kept up to "
+            f"{' and again from '.join(hertz)}{' on' * len(again)}"
         )
     if tuning.goal.bandwidth_limit is not None:
         parts.append(f"your limit is {with_unit(tuning.goal.bandwidth_limit, 'Hz')}")

@@ -92,16 +92,16 @@ def line_key(figure: Figure) -> list[Series]:
     return list({(line.label, line.colour, line.dash): line for line in lines}.values())
 
 
-WORDS = 12
+MOST_WORDS = 12
 """Largest number of words written at an axis."""
 
 
 def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:
     """Return positions and words at an axis of words.
 
-    Only every second, third, ... word is written if there are more than `WORDS`.
+    Only every second, third, ... word is written if there are more than `MOST_WORDS`.
     """
-    positions = list(range(0, len(axis.words), -(-len(axis.words) // WORDS)))
+    positions = list(range(0, len(axis.words), -(-len(axis.words) // MOST_WORDS)))
     return positions, [axis.words[position] for position in positions]
 
 
@@ -196,21 +196,21 @@ def prefixed(field: Field, x_factor: float = 1.0, y_factor: float = 1.0) -> Fiel
     return replace(field, x=field.x * x_factor, y=field.y * y_factor, z=z * factor, unit=unit, limits=limits)
 
 
-BUCKETS = 1500  # about one per pixel of a page-wide panel
-KEPT = 5  # at most this many samples of a bucket are kept: the extremes of x and of y, and a gap
+MOST_BUCKETS = 1500  # about one per pixel of a page-wide panel
+KEPT_PER_BUCKET = 5  # at most this many samples of a bucket are kept: the extremes of x and of y, and a gap
 
 
-def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
+def thin(x: Array, y: Array, buckets: int = MOST_BUCKETS) -> tuple[Array, Array]:
     """Return samples of the line (x, y), in order, that look like the whole line.
 
-    x and y have shape (n,) and any unit; NaN breaks the line. Lines of up to KEPT * buckets samples are returned as
-    they are. Of a longer line, the first and last sample are kept. In each bucket of neighbouring samples, the ones
-    with the smallest and largest y and x are kept, and the first gap. Of equal samples, the first counts.
+    x and y have shape (n,) and any unit; NaN breaks the line. Lines of up to KEPT_PER_BUCKET * buckets samples are
+    returned as they are. Of a longer line, the first and last sample are kept. In each bucket of neighbouring samples,
+    the ones with the smallest and largest y and x are kept, and the first gap. Of equal samples, the first counts.
 
     Buckets hold equally many samples. If x runs to and fro, as in a loop, they are equally long pieces of the path
     instead. A state that rests for seconds then takes no samples from one that moves.
     """
-    if len(x) <= KEPT * buckets:
+    if len(x) <= KEPT_PER_BUCKET * buckets:
         return x, y
     starts = _starts(x, y, buckets)
     bucket = np.zeros(len(x), int)

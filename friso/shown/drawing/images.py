@@ -21,7 +21,7 @@ from friso.shown.drawing.figure import Figure
 
 FORMATS = ("png", "svg", "pdf")
 
-PROGRAM, MOST = "friso.shown.drawing.artist", 2
+PROGRAM, MOST_PROCESSES = "friso.shown.drawing.artist", 2
 """Module that a drawing process runs, and the largest number of such processes."""
 
 
@@ -97,7 +97,7 @@ class Artists:
         """Start the first process; others follow when they are needed."""
         self.processes = [_artist()]
         self._free = [*self.processes]
-        self._threads = ThreadPoolExecutor(MOST, thread_name_prefix="friso-artist")
+        self._threads = ThreadPoolExecutor(MOST_PROCESSES, thread_name_prefix="friso-artist")
         self._begun: dict[tuple[int, Image], tuple[Figure, _Job]] = {}
         self._ended = False
 

@@ -20,9 +20,11 @@ from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
 from friso.shown.drawing.figure import Array, Coloured, Figure, Map, Panel
 from friso.shown.drawing.palette import GREY, INK
 
-LINE = 0.17  # [inch] one line of the legend or the note
-LETTERS = 15.5  # to the inch, at their size
-_VECTORS = 1000  # more cells than these become a picture inside an SVG or PDF, which else is slow to draw and to open
+LINE_HEIGHT = 0.17  # [inch] one line of the legend or the note
+LETTERS_PER_INCH = 15.5  # to the inch, at their size
+MOST_VECTORS = (
+    1000  # more cells than these become a picture inside an SVG or PDF, which else is slow to draw and to open
+)
 
 
 def draw_coloured(axes: Axes, panel: Panel) -> None:
@@ -41,7 +43,7 @@ def _add(
     axes: Axes, panel: Panel, field: Coloured, values: Array, colours: Colormap, limits: tuple[float, float]
 ) -> QuadMesh | PathCollection:
     """Draw the numbers or the categories of a map or cloud; places without one stay empty."""
-    style = {"cmap": colours, "norm": Normalize(*limits), "rasterized": np.size(values) > _VECTORS}
+    style = {"cmap": colours, "norm": Normalize(*limits), "rasterized": np.size(values) > MOST_VECTORS}
     if isinstance(field, Map):
         x, y = cell_edges(field.x, log=panel.x.log), cell_edges(field.y, log=panel.y.log)
         # without them SVG shows white hairlines
@@ -85,13 +87,15 @@ def _colour_map(colour_scale: ColourScale) -> Colormap:
 
 def note_lines(figure: Figure, width: float) -> list[str]:
     """Return the note of a figure in lines that fit into `width` [inch]."""
-    return [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(LETTERS * (width - 0.3)))]
+    return [
+        line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(LETTERS_PER_INCH * (width - 0.3)))
+    ]
 
 
 def footer_height(figure: Figure, width: float) -> float:
     """Return the height [inch] that legend and note take beneath the panels."""
     rows = _key_rows(figure, width) + len(note_lines(figure, width))
-    return LINE * rows + 0.08 if rows else 0.0
+    return LINE_HEIGHT * rows + 0.08 if rows else 0.0
 
 
 def add_footer(
@@ -116,7 +120,7 @@ def add_footer(
         for line in line_key(figure)
     ]
     if handles:
-        place = {"loc": "lower left", "bbox_to_anchor": (0.006, (LINE * len(lines) + 0.03) / height)}
+        place = {"loc": "lower left", "bbox_to_anchor": (0.006, (LINE_HEIGHT * len(lines) + 0.03) / height)}
         legend = canvas.legend(
             handles=handles,
             ncols=-(-len(handles) // _key_rows(figure, width)),
@@ -131,7 +135,7 @@ def add_footer(
         for text in legend.get_texts():
             text.set_parse_math(False)
     for number, line in enumerate(reversed(lines)):
-        y = (LINE * number + 0.06) / height
+        y = (LINE_HEIGHT * number + 0.06) / height
         canvas.text(0.01, y, line, fontsize=8, color=INK, parse_math=False, in_layout=False)
 
 
@@ -143,5 +147,5 @@ def _key_rows(figure: Figure, width: float) -> int:
     labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
     if not labels:
         return 0
-    columns = max(1, int(LETTERS * (width - 0.3) / (max(map(len, labels)) + 6)))
+    columns = max(1, int(LETTERS_PER_INCH * (width - 0.3) / (max(map(len, labels)) + 6)))
     return -(-len(labels) // columns)

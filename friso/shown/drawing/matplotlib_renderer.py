@@ -28,16 +28,19 @@ from friso.quantities import quoted
 from friso.shown.drawing.drawable import drawable, word_ticks
 from friso.shown.drawing.figure import Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.images import FORMATS
-from friso.shown.drawing.matplotlib_maps import LINE, add_colour_bars, add_footer, draw_coloured, footer_height
+from friso.shown.drawing.matplotlib_maps import LINE_HEIGHT, add_colour_bars, add_footer, draw_coloured, footer_height
 from friso.shown.drawing.palette import GREY, INK
 
-WIDTH = 9.0  # [inch]
+FIGURE_WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
 LEGEND_ROWS, LEGEND_ROW = 3, 13  # rows of a legend that this has room for, and [point] what each takes
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
-DOTS, FINER = 150, 2  # dots to the inch, and how many times as many where a file of lines holds a picture
+DOTS_PER_INCH, FINER_FACTOR = (
+    150,
+    2,
+)  # dots to the inch, and how many times as many where a file of lines holds a picture
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
 _METADATA = {
@@ -93,18 +96,18 @@ def render(figure: Figure) -> Canvas:
     with _style():
         prepared = drawable(figure)
         heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
-        footer = footer_height(prepared, WIDTH)
+        footer = footer_height(prepared, FIGURE_WIDTH)
         height = _row_height(prepared) * prepared.rows + (HEADER_HEIGHT if heading else 0) + footer
-        canvas = Canvas(figsize=(WIDTH, height), layout="constrained", facecolor="white")
+        canvas = Canvas(figsize=(FIGURE_WIDTH, height), layout="constrained", facecolor="white")
         area = (0, footer / height, 1, 1 - footer / height)
         canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08, rect=area)  # type: ignore[union-attr]
         if heading:
             canvas.suptitle(heading, x=0.01, ha="left", fontsize=11.5, fontweight="bold", parse_math=False)
         for number, panel in enumerate(prepared.panels):
             axes = canvas.add_subplot(prepared.rows, prepared.columns, number + 1)
-            _draw(axes, panel, WIDTH / prepared.columns)
+            _draw(axes, panel, FIGURE_WIDTH / prepared.columns)
         add_colour_bars(canvas, list(canvas.axes), prepared.panels)
-        add_footer(canvas, prepared, _SYMBOLS, _DASHES, WIDTH)
+        add_footer(canvas, prepared, _SYMBOLS, _DASHES, FIGURE_WIDTH)
         return canvas
 
 
@@ -117,7 +120,7 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
     if axes is None:
         from matplotlib import pyplot
 
-        size = (WIDTH, _row_height(prepared) * prepared.rows)
+        size = (FIGURE_WIDTH, _row_height(prepared) * prepared.rows)
         canvas = pyplot.figure(figsize=size, layout="constrained")
         places = [canvas.add_subplot(prepared.rows, prepared.columns, k + 1) for k in range(len(prepared.panels))]
     else:
@@ -129,7 +132,7 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
         raise InputError("axes", f"{len(places)} axes", expected, f"plt.subplots({len(prepared.panels)})[1]")
     with _style():
         for place, panel in zip(places, prepared.panels, strict=True):
-            _draw(place, panel, WIDTH / prepared.columns)
+            _draw(place, panel, FIGURE_WIDTH / prepared.columns)
     return places
 
 
@@ -164,13 +167,13 @@ class _LaidOut:
         letters.
         """
         height = self.canvas.get_figheight()
-        low = 0.0 if noted else LINE * len(self.notes)
+        low = 0.0 if noted else LINE_HEIGHT * len(self.notes)
         high = height - (HEADER_HEIGHT if self.heading and not headed else 0.0)
         if form == "svg":
             return _cut(self.lines, height, low, high)
         for text in self.canvas.texts:
             text.set_visible(headed if text is self.heading else noted)
-        return self._printed(form, None if headed and noted else Bbox([[0, low], [WIDTH, high]]))
+        return self._printed(form, None if headed and noted else Bbox([[0, low], [FIGURE_WIDTH, high]]))
 
     @cached_property
     def lines(self) -> bytes:
@@ -183,7 +186,7 @@ class _LaidOut:
         """Return an area of the canvas, or all of it, as the bytes of a file."""
         stream = io.BytesIO()
         with _letters_alone() if form == "pdf" else nullcontext():
-            dots = DOTS if form == "png" else FINER * DOTS  # resolution of pictures inside
+            dots = DOTS_PER_INCH if form == "png" else FINER_FACTOR * DOTS_PER_INCH  # resolution of pictures inside
             self.canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area, dpi=dots)
         return stream.getvalue()
 
@@ -205,7 +208,7 @@ def _cut(lines: bytes, height: float, low: float, high: float) -> bytes:
     if (low, high) == (0.0, height):
         return lines
     seen = 72 * (high - low)
-    frame = f'height="{seen:g}pt" viewBox="0 {72 * (height - high):g} {72 * WIDTH:g} {seen:g}"'
+    frame = f'height="{seen:g}pt" viewBox="0 {72 * (height - high):g} {72 * FIGURE_WIDTH:g} {seen:g}"'
     return _FRAME.sub(frame.encode(), lines, count=1)
 
 
@@ -267,7 +270,7 @@ def _row_height(figure: Figure) -> float:
         return EQUAL_HEIGHTS.get(figure.columns, ROW_HEIGHT)
     mapped = any(panel.coloured for panel in figure.panels)
     height = MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
-    rows = max(_legend_rows(_labels(panel), WIDTH / figure.columns) for panel in figure.panels)
+    rows = max(_legend_rows(_labels(panel), FIGURE_WIDTH / figure.columns) for panel in figure.panels)
     return height + LEGEND_ROW / 72 * max(0, rows - LEGEND_ROWS)
 
 

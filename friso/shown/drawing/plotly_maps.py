@@ -15,11 +15,11 @@ from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
 from friso.shown.drawing.figure import Array, Axis, Coloured, Figure, Map, Panel
 from friso.shown.drawing.palette import GREY, INK
 
-BAR = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
-LINE = 17  # [px] one line of the note
+BAR_HEIGHT = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
+LINE_HEIGHT = 17  # [px] one line of the note
 KEY_ROW, KEY_SPACE = 19, 11  # [px] a row of a legend, and what lies about the one beneath a figure
 KEY_LETTER, KEY_MARK = 6.6, 45  # [px] one letter of a legend, and the sign of an entry
-_LETTER = 6.1  # [px] of the note
+LETTER_WIDTH = 6.1  # [px] of the note
 
 DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
 SYMBOLS: dict[str, dict[str, Any]] = {
@@ -136,8 +136,8 @@ def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any]
 
     The note is broken at a width [px] and given as annotations.
     """
-    lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(width / _LETTER))]
-    note = LINE * len(lines) + 6 if lines else 0
+    lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(width / LETTER_WIDTH))]
+    note = LINE_HEIGHT * len(lines) + 6 if lines else 0
     below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}
     text = "<br>".join(html.escape(line) for line in lines)
     font = {"size": 11, "color": INK}

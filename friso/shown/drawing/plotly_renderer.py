@@ -25,15 +25,15 @@ from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Serie
 from friso.shown.drawing.packing import packed, packed_json
 from friso.shown.drawing.palette import GREY, INK
 
-WIDE, NARROW = 540, 290  # [px] for all columns of axes: the least of a wide page, and of a telephone
-TITLE, SPACE = 17, 18  # [px] a line of the title, and what lies about it and the legend
+WIDE_HEIGHT, NARROW_HEIGHT = 540, 290  # [px] for all columns of axes: the least of a wide page, and of a telephone
+TITLE_HEIGHT, ROW_SPACE = 17, 18  # [px] a line of the title, and what lies about it and the legend
 TITLE_LETTER = 7.6  # [px] one letter of it
-PLOT = 230  # [px] height of the axes
+PLOT_HEIGHT = 230  # [px] height of the axes
 MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: both axes matter equally
 EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
-FOOTER = 54  # [px] tick labels and axis label
-LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
-GAP = 0.09  # between two panels of a row, as a fraction of the width
+FOOTER_HEIGHT = 54  # [px] tick labels and axis label
+LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN = 72, 14, 26  # [px]; the buttons stand in the top margin
+COLUMN_GAP = 0.09  # between two panels of a row, as a fraction of the width
 
 # The buttons are listed, since plotly's own choice has one that sends the data to a server.
 _BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
@@ -69,7 +69,7 @@ def fragment(figure: Figure) -> str:
 def parts_of_both(figure: Figure) -> dict[str, Any]:
     """Return `parts`, with the layout and colour bars that differ on a narrow screen."""
     prepared = drawable(figure)
-    return _on_both(_laid_out(prepared, WIDE), _laid_out(replace(prepared, columns=1), NARROW))
+    return _on_both(_laid_out(prepared, WIDE_HEIGHT), _laid_out(replace(prepared, columns=1), NARROW_HEIGHT))
 
 
 def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
@@ -113,10 +113,10 @@ def _checked(traces: list[Any], layout: dict[str, Any]) -> go.Figure:
 
 def narrow_parts(figure: Figure) -> dict[str, Any]:
     """Return traces and layout for a narrow screen, with panels one below the other."""
-    return parts(replace(figure, columns=1), NARROW)
+    return parts(replace(figure, columns=1), NARROW_HEIGHT)
 
 
-def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
+def parts(figure: Figure, width: int = WIDE_HEIGHT) -> dict[str, Any]:
     """Return traces and layout as plain dictionaries that hold NumPy arrays.
 
     Plotly does not validate them, because that would take ten times as long as making them. `width` is the least width
@@ -130,13 +130,13 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     plot = _plot_height(prepared, width)
     heads = [_Head.of(panel, width, prepared.columns) for panel in prepared.panels]
     header = max(head.height for head in heads)
-    row = header + plot + FOOTER
+    row = header + plot + FOOTER_HEIGHT
     height = row * prepared.rows
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the earlier numbers
     below, legend, note = plotly_maps.footer(prepared, key, width)
     layout: dict[str, Any] = {
-        "height": height + TOP + below,
-        "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": below},
+        "height": height + TOP_MARGIN + below,
+        "margin": {"l": LEFT_MARGIN, "r": RIGHT_MARGIN, "t": TOP_MARGIN, "b": below},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
         "hovermode": "closest",
         "annotations": note,
@@ -151,9 +151,13 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
         x_domain = _columns(number % prepared.columns, prepared.columns)
         bar = None
         if shared_bar and number in with_bar:
-            bar = {"x": 1.0, "y": (FOOTER + height - header) / 2 / height, "len": 1 - (FOOTER + header) / height}
+            bar = {
+                "x": 1.0,
+                "y": (FOOTER_HEIGHT + height - header) / 2 / height,
+                "len": 1 - (FOOTER_HEIGHT + header) / height,
+            }
         elif number in with_bar:
-            x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR)
+            x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR_HEIGHT)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, links)
         if heads[number].rows:
@@ -191,7 +195,7 @@ class _Head:
     @property
     def height(self) -> int:
         """Return the height of title and legend [px]."""
-        return TITLE * len(self.lines) + plotly_maps.KEY_ROW * self.rows + SPACE
+        return TITLE_HEIGHT * len(self.lines) + plotly_maps.KEY_ROW * self.rows + ROW_SPACE
 
     def over(self, left: float, top: float) -> dict[str, Any]:
         """Return the legend as plotly takes it, with the title above the legend's entries.
@@ -209,7 +213,7 @@ class _Head:
         The title stands above axes whose upper left corner is at `left` and `top`, as fractions of the figure.
         """
         place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
-        return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}
+        return {**self._text, "showarrow": False, **place, "yshift": ROW_SPACE - 4, "align": "left"}
 
     @property
     def _text(self) -> dict[str, Any]:
@@ -229,15 +233,15 @@ def _labels(panel: Panel) -> list[str]:
 def _plot_height(figure: Figure, width: int) -> int:
     """Return the height of the axes of a panel [px]."""
     if any(panel.equal for panel in figure.panels):
-        return min(EQUAL_PLOTS.get(figure.columns, PLOT), max(width, PLOT))
+        return min(EQUAL_PLOTS.get(figure.columns, PLOT_HEIGHT), max(width, PLOT_HEIGHT))
     mapped = any(panel.coloured for panel in figure.panels)
-    return MAP_PLOTS.get(figure.columns, PLOT) if mapped else PLOT
+    return MAP_PLOTS.get(figure.columns, PLOT_HEIGHT) if mapped else PLOT_HEIGHT
 
 
 def _columns(column: int, columns: int) -> tuple[float, float]:
     """Return the left and right end of column number `column` as fractions of the width."""
-    width = (1 - GAP * (columns - 1)) / columns
-    left = column * (width + GAP)
+    width = (1 - COLUMN_GAP * (columns - 1)) / columns
+    left = column * (width + COLUMN_GAP)
     return left, min(1.0, left + width)
 
 

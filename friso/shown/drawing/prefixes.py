@@ -22,7 +22,7 @@ _PREFIXED = {"m": (-9, 0), "rad": (-9, 0), "s": (-9, 0), "N": (-9, 9), "J": (-9,
 _SIGNS = str.maketrans({"*": "·"})
 _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
 
-SOLVED = 1e-9
+SOLVED_LENGTH = 1e-9
 """Length [m] below which a simulated motion cannot be told from rest."""
 
 
@@ -76,7 +76,7 @@ def length_at_rest(value: float) -> str:
 
     Below a nanometre, digits would only show the solver's error.
     """
-    return axis_shown().text("< 1 nm") if value < SOLVED else with_unit(value, "m")
+    return axis_shown().text("< 1 nm") if value < SOLVED_LENGTH else with_unit(value, "m")
 
 
 def digits_that_differ(values: Sequence[float]) -> int:

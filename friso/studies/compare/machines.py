@@ -18,7 +18,7 @@ from friso.stage.correlations import Correlations, Sample, draw
 from friso.stage.lists import element_keys
 from friso.virtual_rig.task import SAMPLE_TIME
 
-LEAST, MOST = 20, 100_000
+FEWEST_MACHINES, MOST_MACHINES = 20, 100_000
 """Fewest machines, because fewer give no useful interval, and most, because more take hours."""
 
 
@@ -56,7 +56,7 @@ SLIP = "friction.breakaway_deflection"
 """Key of the deflection at which elasto-plastic bristles begin to slip. It is drawn as a fraction f of the deflection
 of sliding, F_c/sigma_0, which it must not reach: the spread applies to f/(1 - f)."""
 
-TINY = 1e-6
+TINY_DEFLECTION = 1e-6
 """Factor on the slip deflection while the other keys are drawn, so that it excludes none of their values."""
 
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
@@ -121,7 +121,10 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
 
     Raises InputError for an invalid number of machines or seed, and for ranges of which hardly any machine is valid.
     """
-    for option, value, least, most in (("--machines", count, LEAST, MOST), ("--seed", seed, 0, MOST_SEED)):
+    for option, value, least, most in (
+        ("--machines", count, FEWEST_MACHINES, MOST_MACHINES),
+        ("--seed", seed, 0, MOST_SEED),
+    ):
         if not least <= value <= most:
             example = f"{option} {2000 if option == '--machines' else 1}"
             raise InputError(option, str(value), f"a whole number from {least} to {most}", example)
@@ -183,7 +186,7 @@ def _slipping(flat: Mapping[str, Any], keys: Mapping[str, np.ndarray]) -> np.nda
         return values["friction.coulomb"] * weaker / values["friction.bristle_stiffness"]
 
     share = flat[SLIP] / most(flat)
-    odds = share / (1 - share) * keys[SLIP] / (TINY * flat[SLIP])
+    odds = share / (1 - share) * keys[SLIP] / (TINY_DEFLECTION * flat[SLIP])
     return np.asarray(most({**flat, **keys}) * odds / (1 + odds))
 
 
@@ -191,7 +194,7 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
     """Return the stage with the `spreads` [%] written into its keys, as uncertainties."""
     flat = stage.flat()
     if SLIP in spreads:
-        flat[SLIP] *= TINY
+        flat[SLIP] *= TINY_DEFLECTION
     fields_of_keys = numeric_keys(flat)
     return stage.replace(
         {key: f"{flat[key]!r} {fields_of_keys[key].unit} +/- {part} %" for key, part in spreads.items()}

@@ -19,7 +19,7 @@ from friso.frequency.loops import Poles
 from friso.frequency.members import limit_cases
 from friso.hunting.criteria import FAILED, RESTS, SWINGS, end_of_traces, outcomes, peaks_in_traces, settling_of_traces
 from friso.hunting.measures import LAST_QUARTER
-from friso.intervals import COVERAGE
+from friso.intervals import NORMAL_COVERAGE
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
 
@@ -67,15 +67,15 @@ def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
     gained, lost = (int(np.count_nonzero(cell)) for cell in (flags & ~before, ~flags & before))
     more, less, total = gained + 0.5, lost + 0.5, count + 2
     centre = (more - less) / total
-    half = COVERAGE * np.sqrt((more + less) - (more - less) ** 2 / total) / total
+    half = NORMAL_COVERAGE * np.sqrt((more + less) - (more - less) ** 2 / total) / total
     return EstimatedValue((gained - lost) / count, max(-1.0, float(centre - half)), min(1.0, float(centre + half)))
 
 
-DENSITY, SLOWEST, FASTEST = 25, 0.1, 10.0
+FREQUENCIES_PER_DECADE, SLOWEST_FACTOR, FASTEST_FACTOR = 25, 0.1, 10.0
 """Frequencies at which loops are evaluated: per decade, apart from those near resonances; the lowest, over the slowest
 pole; the highest, over the fastest pole, or half the sampling frequency."""
 
-CLOSER, WITHIN = 2, 9
+REFINEMENT_ROUNDS, REFINED_FREQUENCIES = 2, 9
 """Refinements of the frequency at which a loop comes closest to -1, and number of frequencies in each."""
 
 
@@ -188,15 +188,15 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobus
 def _robustness(loops: Poles) -> tuple[np.ndarray, np.ndarray]:
     """Return which loops are stable, and the least distance of each from -1, both (loops,)."""
     size, rows = np.abs(loops.continuous), np.arange(len(loops.closed))
-    low = SLOWEST * float(np.median(size.min(axis=1)))
-    high = min(loops.drive.highest, FASTEST * float(size.max()))
-    even = np.geomspace(low, high, int(DENSITY * np.log10(high / low)) + 2)
+    low = SLOWEST_FACTOR * float(np.median(size.min(axis=1)))
+    high = min(loops.drive.highest, FASTEST_FACTOR * float(size.max()))
+    even = np.geomspace(low, high, int(FREQUENCIES_PER_DECADE * np.log10(high / low)) + 2)
     resonant = np.nan_to_num(about_resonances(loops), nan=high)
     omega = np.sort(np.concatenate([np.broadcast_to(even, (len(rows), len(even))), resonant], axis=1), axis=1)
     distance = loops.distance(omega)
-    for _ in range(CLOSER):
+    for _ in range(REFINEMENT_ROUNDS):
         closest = distance.argmin(axis=1)
         before, after = (omega[rows, np.clip(closest + step, 0, omega.shape[1] - 1)] for step in (-1, 1))
-        omega = np.linspace(before, after, WITHIN, axis=1)
+        omega = np.linspace(before, after, REFINED_FREQUENCIES, axis=1)
         distance = loops.distance(omega)
     return loops.abscissa < 0, distance.min(axis=1)

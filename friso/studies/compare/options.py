@@ -19,7 +19,7 @@ from friso.equations.controllers.adrc import BANDWIDTH, OBSERVER_RATIO, crossing
 from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.settings import SETTINGS, Setting
 from friso.errors import InputError
-from friso.frequency.crossover import WANTED, bandwidths_at, limits
+from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at, limits
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
 from friso.stage import ControllerSection, Stage
@@ -71,7 +71,7 @@ def rejection(flat: Mapping[str, Any]) -> Rejection | None:
     return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None
 
 
-DEADBAND = 0.5
+DEADBAND_SHARE = 0.5
 """Deadband of the integrator over the tolerance for in position (friso's choice). The integrator pauses while the stage
 is in position, and the edge of the deadband lies inside the tolerance."""
 
@@ -124,7 +124,7 @@ class Situation:
     @property
     def deadband(self) -> float:
         """Return the deadband of the integrator [m], a fixed fraction of the tolerance."""
-        return DEADBAND * self.within
+        return DEADBAND_SHARE * self.within
 
 
 class Variant(NamedTuple):
@@ -262,7 +262,7 @@ def _faster(stage: Stage, situation: Situation) -> Variant:
             raise UnavailableError(f"the limit of {situation.bandwidth_limit:g} Hz is below the present bandwidth")
         highest = present * factors[below[-1]]
     if highest is None or highest <= present:
-        raise UnavailableError(f"no higher bandwidth keeps a modulus margin of {WANTED:g}")
+        raise UnavailableError(f"no higher bandwidth keeps a modulus margin of {COMFORTABLE_MARGIN:g}")
     factor = float(highest / present)
     changes = {key: value for key, value in sped_up(flat, factor).items() if value != flat[key]}
     return Variant(stage.with_numbers(changes), factor=factor)

@@ -93,20 +93,20 @@ def needed_bandwidth(machines: Machines, locked: Stage, within: float) -> Needed
     return NeededBandwidth(bandwidths_at(ideal, factors), rests.reshape(tried, count).mean(axis=1), factors)
 
 
-INTERVAL = 1e-3
+LEAST_INTERVAL = 1e-3
 """Least time [s] between evaluated samples. It is rounded up to a whole number of the drive's samples."""
 
-FOLLOWED, LONGER = 40, 6
+FOLLOWED_MACHINES, LONGER_FACTOR = 40, 6
 """Number of machines that are run again, and the factor on their duration. An integrator that was reset may swing that
 slowly."""
 
 NOT_FOLLOWED = Later(np.zeros(0, bool), np.zeros(0, bool))
 """Result for an option whose machines are not run again for longer."""
 
-ENOUGH = 0.99
+ENOUGH_MACHINES = 0.99
 """Fraction of the machines that an option must bring into position to count as bringing them to rest."""
 
-LATEST = 0.5
+LATEST_STAND = 0.5
 """Latest time, over the duration, at which the reference may come to stand, because lasting swings are sought
 afterwards."""
 
@@ -146,7 +146,7 @@ class OptionResult:
 
     @property
     def stays(self) -> Share:
-        """Return the probability of staying in position in the last half of a `LONGER` run.
+        """Return the probability of staying in position in the last half of a `LONGER_FACTOR` run.
 
         The result is NaN without longer runs.
         """
@@ -188,11 +188,11 @@ class OptionResult:
     def rests(self) -> bool:
         """Tell whether enough machines come into position with the option, and stay there.
 
-        `ENOUGH` is the fraction required of all machines in position, and of those run for longer that stay. Without
-        longer runs the result is false.
+        `ENOUGH_MACHINES` is the fraction required of all machines in position, and of those run for longer that stay.
+        Without longer runs the result is false.
         """
-        in_position = self.in_position_count >= ENOUGH * len(self.measures.settling)
-        return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH)
+        in_position = self.in_position_count >= ENOUGH_MACHINES * len(self.measures.settling)
+        return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH_MACHINES)
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ class Comparison:
         needed = self.needed
         if needed is None:
             return None
-        at = needed.turning(ENOUGH)
+        at = needed.turning(ENOUGH_MACHINES)
         built = (
             result.option.factor
             for result in self.results
@@ -338,9 +338,9 @@ def _places(stage: Stage) -> list[Stand]:
     if not rests(flat):
         example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
         raise InputError("motion.kind", f'"{flat["motion.kind"]}"', "a reference that stands in the end", example)
-    if corner > LATEST * duration:
-        expected = f"at least {corner / LATEST:g} s: the reference stands by half of it"
-        raise InputError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST:g} s"')
+    if corner > LATEST_STAND * duration:
+        expected = f"at least {corner / LATEST_STAND:g} s: the reference stands by half of it"
+        raise InputError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST_STAND:g} s"')
     return [*stands(flat)]
 
 
@@ -370,10 +370,13 @@ class _Work:
 
     def longer(self, option: Option) -> Later:
         """Run an option on the first machines for longer, and return which stay in position."""
-        task = replace(self.task, duration=LONGER * self.task.duration)
-        count = min(FOLLOWED, self.machines.count)
+        task = replace(self.task, duration=LONGER_FACTOR * self.task.duration)
+        count = min(FOLLOWED_MACHINES, self.machines.count)
         return Later.joined(
-            [staying_in_position(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)]
+            [
+                staying_in_position(recorded, self.within)
+                for recorded in self._recorded(option, task, count, LONGER_FACTOR)
+            ]
         )
 
     def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[RecordedRuns]:
@@ -382,7 +385,7 @@ class _Work:
         The samples are `coarser` times as far apart as usual.
         """
         sample = self.machines.stage.flat()["drive.sample_time"]
-        interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample
+        interval = coarser * max(1, int(np.ceil(LEAST_INTERVAL / sample * (1 - 1e-9)))) * sample
         drawn = self.machines.changes(option.stage, option.changes)
         changes = {key: value[:count] if np.ndim(value) else value for key, value in drawn.items()}
         return run(option.stage, task, self.machines.seeds[:count].tolist(), interval, changes)

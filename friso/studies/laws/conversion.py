@@ -63,13 +63,13 @@ def hysteresis_loop(flat: Mapping[str, Any], amplitude: float, speed: float) -> 
     return HysteresisLoop(amplitude, float(np.sum(last * moved)), float(stiffness))
 
 
-ELEMENTS = 6
+DEFAULT_ELEMENTS = 6
 """Default number of elements, for a law that has several."""
 
-KEPT = 1e-6
+UNCHANGED_SHARE = 1e-6
 """Relative difference below which a number counts as unchanged."""
 
-SPEEDS = np.geomspace(1e-2, 1e3, 201)
+COMPARED_SPEEDS = np.geomspace(1e-2, 1e3, 201)
 """Speeds, in Stribeck velocities, at which steady friction is compared."""
 
 
@@ -97,7 +97,7 @@ class MeasuredChange:
     before: float
     after: float
     off: float
-    allowed: float = KEPT
+    allowed: float = UNCHANGED_SHARE
     amplitude: float | None = None
 
     @property
@@ -157,7 +157,7 @@ def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
 
 
 def convert(
-    stage: Stage, law: str, elements: int = ELEMENTS, virgin: str | os.PathLike[str] | None = None
+    stage: Stage, law: str, elements: int = DEFAULT_ELEMENTS, virgin: str | os.PathLike[str] | None = None
 ) -> LawConversion:
     """Replace the friction law of a stage by another that measurements can hardly tell apart.
 
@@ -277,7 +277,7 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
 
     Motion forward and back is compared.
     """
-    speeds = SPEEDS * before.levels.stribeck_velocity
+    speeds = COMPARED_SPEEDS * before.levels.stribeck_velocity
     old, new = (
         np.stack([steady_force(stage.flat(), speeds, way) for way in (True, False)]) for stage in (source, made)
     )

@@ -18,7 +18,7 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import (
-    ELEMENTS,
+    DEFAULT_ELEMENTS,
     LawConversion,
     MeasuredKind,
     compared,
@@ -200,7 +200,7 @@ class VerdictsByLaw:
 
 
 def verdicts_by_law(
-    stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = ELEMENTS, progress: Progress = silent
+    stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = DEFAULT_ELEMENTS, progress: Progress = silent
 ) -> VerdictsByLaw:
     """Check a stage for hunting under each friction law that keeps its measured friction.
 
@@ -251,7 +251,7 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
     return kept, left_out
 
 
-def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
+def frictions_that_keep(stages: Sequence[Stage], elements: int = DEFAULT_ELEMENTS) -> OtherLaws:
     """Return friction keys of stages under each other law that keeps their measured friction.
 
     The stages differ only in numbers of their friction. The keys come with SI values, by a name of the law: as

@@ -55,14 +55,14 @@ class ConcaveFit:
     @property
     def slope(self) -> float:
         """Return the slope at the start of the curve."""
-        return float(np.sum(self.strength * _SLOPES[:, None] / self.knots))
+        return float(np.sum(self.strength * INITIAL_SLOPES[:, None] / self.knots))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Return the curve's values at x, shape (m,); it is constant beyond the last knot."""
         return _shapes(x, self.knots) @ self.strength.ravel()
 
 
-_SLOPES = np.array([1.0, 2.0])
+INITIAL_SLOPES = np.array([1.0, 2.0])
 """Initial slopes of both kinds of parts, in units of their end value over their knot."""
 
 
@@ -140,7 +140,7 @@ def _fit(rows: np.ndarray, knots: np.ndarray, first: int, bent: bool, points: in
     strength.flat[used] = weights
     free = used[weights > 0]
     misfit = float(points * np.log(away**2 / points + (settings.rounded_points * end) ** 2))
-    gain = (_SLOPES[:, None] / knots).ravel()[free]
+    gain = (INITIAL_SLOPES[:, None] / knots).ravel()[free]
     spread = np.linalg.pinv(rows[:, free]).T @ gain
     noise = away / np.sqrt(max(points - len(free), 1))
     if points <= settings.most_knots:
@@ -153,7 +153,7 @@ EXAMPLE = "displacement [um],force [N]"
 """Example heading of a file with a virgin curve."""
 
 
-ELSEWHERE = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
+TRIED_OFFSETS = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
 """Displacements at which the force may begin, relative to the displacement at a third of static friction."""
 
 
@@ -262,7 +262,7 @@ def with_virgin_curve(
     )
     if len(moved) > settings.most_knots:  # many points show where the force begins, if not at displacement 0
         third = np.interp(settings.first_friction * static, fit(np.sort(moved)), np.sort(moved))
-        fits += [other for share in ELSEWHERE for other in concave_fits(moved - share * third, rising, static)]
+        fits += [other for share in TRIED_OFFSETS for other in concave_fits(moved - share * third, rising, static)]
         likeliest = min(likeliest, *(other.akaike for other in fits))
     likely = [
         (a.slope, settings.slope_errors * a.error)

@@ -32,27 +32,27 @@ from friso.studies.rig.outcome import RigLog, interval, longest_travel, pace, qu
 from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs
 
-FASTER = (4.0, 3.0, 2.0, 1.5, 1.0)
+FASTER_CROSSOVERS = (4.0, 3.0, 2.0, 1.5, 1.0)
 """Crossovers over the stage's own that are tried in turn (friso's choice)."""
 
-SPEEDS, RATIO = 14, 500.0
+SPEED_COUNT, SPEED_RATIO = 14, 500.0
 """Number of speeds, and ratio of highest to lowest: 0.48 to 240 mm/s on the thesis's rig, at four times its crossover.
 """
 
-CURVE = 200
+CURVE_POINTS = 200
 """Number of points of the true curve."""
 
-SHORTEST = 20.0
+SHORTEST_WAY = 20.0
 """Periods of the crossover for the longest way at the highest speed."""
 
-MOST = 0.5
+STEADY_PASSES = 0.5
 """Least fraction of steady passes at an accepted crossover."""
 
-SHARED, PLACES = 1 / 8, 3
+SHARED_STRETCH, SHARED_PLACES = 1 / 8, 3
 """Stretch that all passes cover, as a fraction of the longest, and number of places along the travel (friso's
 choice)."""
 
-STANDS, SAMPLES = 16.0, 62.5
+STANDING_TIME, SAMPLES_PER_PERIOD = 16.0, 62.5
 """Periods of the crossover for which the reference stands between passes, and samples of the log per period of the
 stage's own crossover (2 ms)."""
 
@@ -97,8 +97,8 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
     for log, begin in zip(logs, _begins(stage), strict=True):
         velocity = friction_velocity(log.log, moving_mass(stage.flat()))
         low, *_, high = controller_speeds(log.stage)
-        speeds = np.geomspace(low, high, CURVE)
-        ends = velocity.places if len(velocity.velocities) else (begin, begin + SHARED * longest_travel(stage))
+        speeds = np.geomspace(low, high, CURVE_POINTS)
+        ends = velocity.places if len(velocity.velocities) else (begin, begin + SHARED_STRETCH * longest_travel(stage))
         drag = log.stage.flat().get("cable.drag", 0.0)
         true = mean_friction(log.stage, speeds, np.linspace(*ends, 1000)) + drag * speeds
         places.append(PlaceOnRail(log, velocity, speeds, true))
@@ -111,11 +111,11 @@ def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
     If there is no such crossover, the one with the most steady passes is taken.
     """
     tried = []
-    for factor in FASTER:
+    for factor in FASTER_CROSSOVERS:
         quick = stage.with_numbers(quicker(stage, factor))
         logs = tuple(_log(quick, pace(stage), n, low, seed + n) for n, low in enumerate(_begins(stage)))
         steady = sum(stretch.steady for log in logs if not log.failure for stretch in passes(log.log))
-        if steady > MOST * len(logs) * 2 * SPEEDS:
+        if steady > STEADY_PASSES * len(logs) * 2 * SPEED_COUNT:
             return logs
         tried.append((steady, logs))
     return max(tried, key=lambda candidate: candidate[0])[1]
@@ -130,18 +130,18 @@ def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.nd
 
 
 def _begins(stage: Stage) -> np.ndarray:
-    """Return the positions [m] at which the stretches of rail begin, (PLACES,)."""
+    """Return the positions [m] at which the stretches of rail begin, (SHARED_PLACES,)."""
     low, high = travel(stage)
-    return np.linspace(low, high - SHARED * longest_travel(stage), PLACES)
+    return np.linspace(low, high - SHARED_STRETCH * longest_travel(stage), SHARED_PLACES)
 
 
 def controller_speeds(stage: Stage) -> np.ndarray:
-    """Return the speeds [m/s] of the passes, shape (`SPEEDS`,), rising.
+    """Return the speeds [m/s] of the passes, shape (`SPEED_COUNT`,), rising.
 
     The stage is one whose controller was made faster.
     """
-    top = longest_travel(stage) * pace(stage) / SHORTEST
-    return np.geomspace(top / RATIO, top, SPEEDS)
+    top = longest_travel(stage) * pace(stage) / SHORTEST_WAY
+    return np.geomspace(top / SPEED_RATIO, top, SPEED_COUNT)
 
 
 def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
@@ -149,31 +149,31 @@ def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> R
 
     `own_pace` is the crossover [Hz] of the user's stage, and `number` the index of the stretch.
     """
-    period, shared = 1 / pace(stage), SHARED * longest_travel(stage)
-    parts, before = [(0.0, STANDS * period)], 0.0
+    period, shared = 1 / pace(stage), SHARED_STRETCH * longest_travel(stage)
+    parts, before = [(0.0, STANDING_TIME * period)], 0.0
     for speed in controller_speeds(stage):
-        run_up = max(0.0, speed * SHORTEST * period - shared) / 2
+        run_up = max(0.0, speed * SHORTEST_WAY * period - shared) / 2
         for span in (shared + run_up + before, -(shared + 2 * run_up)):
-            parts += [(float(np.sign(span) * speed), abs(span) / speed), (0.0, STANDS * period)]
+            parts += [(float(np.sign(span) * speed), abs(span) / speed), (0.0, STANDING_TIME * period)]
         before = run_up
-    (recorded,) = run(stage, legs(low, parts), [seed], interval(stage, 1 / (SAMPLES * own_pace)))
+    (recorded,) = run(stage, legs(low, parts), [seed], interval(stage, 1 / (SAMPLES_PER_PERIOD * own_pace)))
     return rig_log(recorded, 0, f"many_speeds_{number + 1}", "constant-speed", stage, seed)
 
 
-UNSTEADY, STEADY, SLOW_PLACES = 2, 1, 8
+UNSTEADY_SPEEDS, STEADY_SPEEDS, SLOW_PLACES = 2, 1, 8
 """Numbers of speeds and places.
 
-UNSTEADY is the number of the fastest speeds that were not steady, and STEADY that of the slowest that were. SLOW_PLACES
-is the number of places along the travel, because each log shows the friction of a few millimetres.
+UNSTEADY_SPEEDS is the number of the fastest speeds that were not steady, and STEADY_SPEEDS that of the slowest that
+were. SLOW_PLACES is the number of places along the travel, because each log shows the friction of a few millimetres.
 """
 
-APART = 4
+SKIPPED_SPEEDS = 4
 """Number of speeds skipped at a time, from the lowest on, if motion was steady at all speeds."""
 
-POINTS = 500
+WAY_POINTS = 500
 """Number of points along a way at which its mean friction is computed."""
 
-LASTS, SLOW_STANDS, SLOW_SAMPLES = 3.0, 1.0, 1000.0
+SPEED_DURATION, SLOW_STANDS, SLOW_SAMPLES = 3.0, 1.0, 1000.0
 """Periods of the stage's crossover for which each speed lasts, and for the stand before.
 
 SLOW_SAMPLES are those of the log per period. On the thesis's rig these are 0.4 s, 0.125 s and 0.1 ms.
@@ -213,7 +213,7 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
     period = 1 / pace(stage)
     parts = [
         (0.0, SLOW_STANDS * period),
-        *((float(sign * speed), LASTS * period) for speed in speeds for sign in (1, -1)),
+        *((float(sign * speed), SPEED_DURATION * period) for speed in speeds for sign in (1, -1)),
     ]
     logs = []
     for number, low in enumerate(np.linspace(*travel(stage), SLOW_PLACES)):
@@ -236,9 +236,9 @@ def _edge(passed: Sequence[RigLog]) -> np.ndarray:
         if not stretch.steady
     }
     if not unsteady:
-        return speeds[::APART][: UNSTEADY + STEADY]
+        return speeds[::SKIPPED_SPEEDS][: UNSTEADY_SPEEDS + STEADY_SPEEDS]
     fastest = max(unsteady)
-    return speeds[max(fastest + 1 - UNSTEADY, 0) : fastest + 1 + STEADY]
+    return speeds[max(fastest + 1 - UNSTEADY_SPEEDS, 0) : fastest + 1 + STEADY_SPEEDS]
 
 
 def _analysed(log: RigLog) -> SlowSliding:
@@ -251,7 +251,7 @@ def _analysed(log: RigLog) -> SlowSliding:
 
 def _true(log: RigLog) -> np.ndarray:
     places = log.true.get("cart_position", log.true["position"])
-    places_between = np.linspace(places.min(), places.max(), POINTS) if len(places) else np.full(1, np.nan)
+    places_between = np.linspace(places.min(), places.max(), WAY_POINTS) if len(places) else np.full(1, np.nan)
     flat = anywhere(log.stage.flat())
     levels = [level_under_conditions(flat, name) for name in ("coulomb", "static")]
     return levels * friction_factors(flat, places_between).mean(axis=1)[::-1]

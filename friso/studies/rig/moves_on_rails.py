@@ -22,19 +22,19 @@ from friso.studies.rig.outcome import free_stage, interval, locked_stage, pace, 
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, point_to_point
 
-RAILS = 20
+RAIL_COUNT = 20
 """Rails on which a machine is repeated (friso's choice)."""
 
-DURATION = 20.0
+LEAST_DURATION = 20.0
 """Least duration of a run [s], as in the thesis (Sec. 3.2.2), whose peaks count after 10 s."""
 
-INTERVAL = 1e-3
+LONGEST_INTERVAL = 1e-3
 """Longest sample time of a log [s]; the thesis states none."""
 
 BAND = COUNTED_ABOVE
 """Band about the reference [m] within which a run rests: the height above which the thesis counts peaks."""
 
-ROUND = (1.0, 2.0, 5.0, 10.0)
+ROUND_MANTISSAS = (1.0, 2.0, 5.0, 10.0)
 """Mantissas to which a length is rounded."""
 
 
@@ -47,12 +47,12 @@ def distance(stage: Stage) -> float:
     if not exact:
         raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that moves the stage", '"step"')
     power = 10.0 ** np.floor(np.log10(exact))
-    return float(power * min(ROUND, key=lambda digit: abs(np.log(digit * power / exact))))
+    return float(power * min(ROUND_MANTISSAS, key=lambda digit: abs(np.log(digit * power / exact))))
 
 
 def duration(stage: Stage) -> float:
     """Return the duration of a run of a stage [s], at least that of the thesis."""
-    return max(DURATION, float(stage.flat()["motion.duration"]))
+    return max(LEAST_DURATION, float(stage.flat()["motion.duration"]))
 
 
 def move(stage: Stage) -> MoveTask:
@@ -118,7 +118,7 @@ def rails(stage: Stage) -> np.ndarray:
     """
     if stage.rail is None:
         return np.array([np.nan])
-    return stage.flat()["rail.seed"] + np.arange(float(RAILS))
+    return stage.flat()["rail.seed"] + np.arange(float(RAIL_COUNT))
 
 
 def on_rails(stage: Stage, cases: Mapping[str, np.ndarray], seeds: np.ndarray) -> dict[str, np.ndarray]:
@@ -192,7 +192,7 @@ def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[st
 
     `changes` of keys are SI numbers, or arrays with one value for each run.
     """
-    (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
+    (recorded,) = run(stage, task, seeds, interval(stage, LONGEST_INTERVAL), changes)
     return recorded
 
 
@@ -210,7 +210,7 @@ def run_moves(
     """
     parts: list[RailRuns] = []
     progress(0, len(seeds), label)
-    for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
+    for chunk in run(stage, task, seeds, interval(stage, LONGEST_INTERVAL), changes):
         parts.append(rail_runs(chunk))
         progress(int(chunk.numbers[-1]) + 1, len(seeds), label)
     return RailRuns.joined(parts)

@@ -31,19 +31,19 @@ from friso.stage.tables import moving_mass
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import own_motion, standing
 
-WIDE = 8.0
+WIDE_STROKE = 8.0
 """Stroke during identification over the stage's own stroke.
 
 It is 8 mm in the thesis (Sec. 4.2.1), "for safety reasons".
 """
 
-WAY = 5 / 3
+WAY_FACTOR = 5 / 3
 """Way at constant speed over the length of the stage's own motion: 150 mm for 90 mm (Sec. 4.2.3)."""
 
-ALPHA = 0.1
+VAN_DIJK_ALPHA = 0.1
 """Alpha of the van Dijk controller to which plain gains are compared, as in the thesis."""
 
-FIXED = 1e9
+FIXED_MASS = 1e9
 """Mass [kg] of a cart that practically does not move."""
 
 
@@ -66,7 +66,7 @@ def freed(stage: Stage) -> Stage:
     stroke = free.flat()["joint.stroke"]
     if not stroke > 0:
         raise InputError("joint.stroke", f"{stroke:g} m", "a stroke greater than 0", 'stroke = "1 mm"')
-    return free.with_numbers({"joint.stroke": WIDE * stroke})
+    return free.with_numbers({"joint.stroke": WIDE_STROKE * stroke})
 
 
 def free_stage(stage: Stage) -> Stage:
@@ -95,7 +95,7 @@ def pace(stage: Stage) -> float:
     named = bandwidth(flat)
     if named is not None:
         return float(named)
-    return float(np.sqrt(proportional_stiffness(flat) / (moving_mass(flat) * np.sqrt(ALPHA)))) / (2 * np.pi)
+    return float(np.sqrt(proportional_stiffness(flat) / (moving_mass(flat) * np.sqrt(VAN_DIJK_ALPHA)))) / (2 * np.pi)
 
 
 def friction(stage: Stage) -> float:
@@ -116,7 +116,7 @@ def travel(stage: Stage) -> tuple[float, float]:
 def longest_travel(stage: Stage) -> float:
     """Return the length [m] of the way at constant speed, a fixed fraction of the travel."""
     low, high = travel(stage)
-    return WAY * (high - low)
+    return WAY_FACTOR * (high - low)
 
 
 def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
@@ -196,7 +196,7 @@ def stopped(log: RigLog) -> InputError:
     return InputError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
 
 
-WINDOWS, SATURATED = 20, 0.1
+LOG_PARTS, SATURATED_SHARE = 20, 0.1
 """Number of parts into which a log is divided to test stability, and a fraction of a part.
 
 The command of an unstable loop spends at least this fraction of a part at its two limits.
@@ -209,9 +209,9 @@ def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
     `force` has the shape (n,). The result is 0 if the command does not end so, or has no limits.
     """
     limit = stage.flat().get(FORCE_LIMIT, np.inf)
-    parts = np.array_split(force, WINDOWS)
+    parts = np.array_split(force, LOG_PARTS)
     ways = [(np.mean(part >= 0.999 * limit), np.mean(part <= -0.999 * limit)) for part in parts]
-    swings = np.array([min(sides) > 0 and sum(sides) > SATURATED for sides in ways])
+    swings = np.array([min(sides) > 0 and sum(sides) > SATURATED_SHARE for sides in ways])
     if not swings[-1]:
         return 0
     rests = np.flatnonzero(~swings)
@@ -219,13 +219,13 @@ def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
     return sum(len(part) for part in parts[: first + 1])
 
 
-PERIOD, PERIODS = 8.0, 8
+MULTISINE_PERIOD, MULTISINE_PERIODS = 8.0, 8
 """Period of the multisine in periods of the crossover, and number of periods.
 
 The period is the inverse of the multisine's lowest frequency (1 Hz on the thesis's rig).
 """
 
-FINEST = 0.4
+HIGHEST_SHARE = 0.4
 """Highest frequency of the multisine over the sampling rate of the log."""
 
 PHASES = int.from_bytes(b"sines")
@@ -266,10 +266,12 @@ def excite(
     are arrays of shape (runs,). Returns the recorded runs, which share the seed.
     """
     step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
-    period = round(PERIOD / pace(stage) / slow) * slow
-    lines = np.geomspace(1, min(kind.top * PERIOD, FINEST * period / slow), kind.lines)
+    period = round(MULTISINE_PERIOD / pace(stage) / slow) * slow
+    lines = np.geomspace(1, min(kind.top * MULTISINE_PERIOD, HIGHEST_SHARE * period / slow), kind.lines)
     force = kind.strength * friction(stage) * sines(round(period / step), np.unique(np.rint(lines).astype(int)), seed)
-    task = replace(standing(place, PERIODS * period), injected=np.tile(force, PERIODS), injected_each=step)
+    task = replace(
+        standing(place, MULTISINE_PERIODS * period), injected=np.tile(force, MULTISINE_PERIODS), injected_each=step
+    )
     (recorded,) = run(stage, task, [seed] * runs, slow, changes)
     return recorded
 

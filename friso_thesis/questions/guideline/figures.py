@@ -24,14 +24,14 @@ ENDS = {
     LOST: Category("just beyond, no orbit can be closed", VERMILLION),
 }
 HALVES = (Category("samples of the fit", LIGHT), Category("samples held out", BLUE))
-FULL = 1.0
+FULL_STROKE_SHARE = 1.0
 """Joint force at full stroke, over static friction, from which the chart of the joint counts a stroke as ample."""
 
 
-SHARES = 5.0
+LARGEST_EFFECT_SHARE = 5.0
 """Upper end of the chart of the stroke, as a multiple of the joint's effect."""
 
-FINER = 10
+FINER_POINTS = 10
 """Number of points of a drawn law per step between two computed edges."""
 
 
@@ -75,7 +75,7 @@ def _free(guideline: Guideline) -> Figure:
 
     Edge and frequency are relative to the edge with the joint locked.
     """
-    sweep = _both(guideline.free, lambda values: values["stroke"] > FULL)
+    sweep = _both(guideline.free, lambda values: values["stroke"] > FULL_STROKE_SHARE)
     joint = np.exp(guideline.free.law.log_rates(sweep.values)[0])
     x, y = joint / sweep.locked, sweep.edge / sweep.locked
     line = np.geomspace(*_ends(x), 200)
@@ -103,7 +103,7 @@ def _stroke(guideline: Guideline) -> Figure:
     line = np.geomspace(*_ends(x[felt]), 200)
     y = effect[felt]
     visible = (float(min(0.0, *(1.05 * y))), float(max(1.6, *(1.05 * y))))
-    visible = max(visible[0], -SHARES), min(visible[1], SHARES)
+    visible = max(visible[0], -LARGEST_EFFECT_SHARE), min(visible[1], LARGEST_EFFECT_SHARE)
     out = int(np.count_nonzero((y < visible[0]) | (y > visible[1])))
     panel = Panel(
         "Joints slower than the locked edge",
@@ -171,7 +171,7 @@ PANELS: Mapping[str, tuple[str, Axis]] = {
 def _studied(title: str, x: Axis, cases: Sequence[ThesisCase], laws: Laws) -> Panel:
     name = next(name for name, (heading, _) in PANELS.items() if heading == title)
     at, computed = np.array([(STUDIED[name](case.changes), case.computed) for case in cases]).T
-    places = np.linspace(0, len(cases) - 1, FINER * (len(cases) - 1) + 1)
+    places = np.linspace(0, len(cases) - 1, FINER_POINTS * (len(cases) - 1) + 1)
     changes = {
         key: np.interp(places, np.arange(len(cases)), [case.changes[key] for case in cases]) for key in cases[0].changes
     }

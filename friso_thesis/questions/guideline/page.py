@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.evidence import findings_on_file, value
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import COMFORTABLE_MARGIN
 from friso.quantities import percent
 from friso.shown.files import Content, pictures
 from friso.shown.pages import environment
@@ -18,17 +18,17 @@ from friso.version import VERSION
 from friso_thesis.questions.guideline.figures import guideline_figures
 from friso_thesis.questions.guideline.words import formulas, log_error, number, parasitic_edges, parasitic_sentences
 from friso_thesis.studies.guideline.claims import judged_claims
-from friso_thesis.studies.guideline.compute import ABOVE, BELOW, MOVES, PERIODS_BESIDE, Guideline
-from friso_thesis.studies.guideline.edges import DISTANCES, KINDS, ROUNDS, STEP
+from friso_thesis.studies.guideline.compute import ABOVE_EDGE, BELOW_EDGE, MOVES_PER_SAMPLE, PERIODS_BESIDE, Guideline
+from friso_thesis.studies.guideline.edges import CROSSOVER_STEP, EDGE_BISECTIONS, KINDS, START_DISTANCES
 from friso_thesis.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
-from friso_thesis.studies.guideline.laws import FOLDS, GAIN, Errors
+from friso_thesis.studies.guideline.laws import LEAST_GAIN, VALIDATION_PARTS, Errors
 from friso_thesis.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
 from friso_thesis.studies.guideline.worked import (
+    CHOSEN_STIFFNESS,
     CLAIMED_AT,
     DRIVE,
-    GAPS,
-    MARGIN,
-    STATIC,
+    FRICTION_GAPS,
+    STATIC_FRICTIONS,
     STUDIED,
     ThesisCase,
     plain_rig,
@@ -37,31 +37,31 @@ from friso_thesis.studies.guideline.worked import (
 PAGE, TABLE = "guideline.md", "guideline_edges.csv"
 
 
-FAR = 1.5
+FAR_OFF_RATIO = 1.5
 """Ratio of computed edge to law from which the edge counts as far off."""
 
-RESOLVED = max(float(grid[1] / grid[0]) ** 0.5**ROUNDS - 1 for grid in (LOCKED_GRID, FREE_GRID))
+RESOLVED = max(float(grid[1] / grid[0]) ** 0.5**EDGE_BISECTIONS - 1 for grid in (LOCKED_GRID, FREE_GRID))
 """Relative width of the last step of a bisection."""
 
 CONSTANTS: Mapping[str, Any] = {
-    "below": BELOW,
-    "above": ABOVE,
-    "distances": len(DISTANCES),
-    "moves": MOVES,
+    "below": BELOW_EDGE,
+    "above": ABOVE_EDGE,
+    "distances": len(START_DISTANCES),
+    "moves": MOVES_PER_SAMPLE,
     "periods": PERIODS_BESIDE,
-    "folds": FOLDS,
-    "gain": GAIN,
+    "folds": VALIDATION_PARTS,
+    "gain": LEAST_GAIN,
     "limiter": LIMITER_OVER_BRISTLES,
-    "static": STATIC,
-    "gaps": GAPS,
-    "margin": MARGIN,
+    "static": STATIC_FRICTIONS,
+    "gaps": FRICTION_GAPS,
+    "margin": CHOSEN_STIFFNESS,
     "at": CLAIMED_AT,
-    "step": f"{percent(STEP - 1)}",
-    "apart": f"{percent(DISTANCES[1] / DISTANCES[0] - 1)}",
+    "step": f"{percent(CROSSOVER_STEP - 1)}",
+    "apart": f"{percent(START_DISTANCES[1] / START_DISTANCES[0] - 1)}",
     "resolved": f"{percent(RESOLVED, 1)}",
     "largest_gap": LOCKED_BOX["gap"][1],
-    "far": FAR,
-    "comfortable": WANTED,
+    "far": FAR_OFF_RATIO,
+    "comfortable": COMFORTABLE_MARGIN,
 }
 """Settings of the computation that the page states."""
 
@@ -138,13 +138,13 @@ def _worst(guideline: Guideline) -> dict[str, Any] | None:
     """
     used = guideline.locked.sweep.usable
     off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
-    far = used.take(off > np.log(FAR))
+    far = used.take(off > np.log(FAR_OFF_RATIO))
     if not len(far.edge):
         return None
     kinds = Counter(far.edges.kind.astype(str))
     ends = {name: _span(far.values[name]) for name in ("gap", "stribeck")}
     words = ", ".join(f"{kind} ({count})" for kind, count in kinds.most_common())
-    return {"count": len(far.edge), "of": len(used.edge), "factor": FAR, "kinds": words, **ends}
+    return {"count": len(far.edge), "of": len(used.edge), "factor": FAR_OFF_RATIO, "kinds": words, **ends}
 
 
 def _between(low: float, high: float) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from friso.interface.answer import Answer, question
 from friso.progress import Progress, silent
-from friso_thesis.studies.guideline.compute import SAMPLES
+from friso_thesis.studies.guideline.compute import FIT_SAMPLES
 
 
 class GuidelineAnswer(Answer):
@@ -19,7 +19,9 @@ class GuidelineAnswer(Answer):
 
 
 @question
-def guideline(samples: int = SAMPLES, *, folder: Path | None = None, progress: Progress = silent) -> GuidelineAnswer:
+def guideline(
+    samples: int = FIT_SAMPLES, *, folder: Path | None = None, progress: Progress = silent
+) -> GuidelineAnswer:
     """Two formulas for the crossover at which hunting ends: guideline.md, its charts, guideline_edges.csv.
 
     Parameters

@@ -21,7 +21,7 @@ BASES = {
 """Formula of each rate [rad/s], without its factor and fitted powers."""
 
 
-RULE = 2.0
+ONE_RULE_RATIO = 2.0
 """Largest ratio between multiples of the crossover that still make one rule."""
 
 
@@ -97,7 +97,7 @@ def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
     """
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
     conclusion = "Actuator and sensor are on the same part here."
-    if ratios and max(ratios) > RULE * min(ratios):
+    if ratios and max(ratios) > ONE_RULE_RATIO * min(ratios):
         conclusion = (
             f"At the upper end of a range the mode is {_spread(ratios)} times the crossover: no single multiple of the "
             f"crossover is a rule for all modes. {conclusion}"

@@ -11,7 +11,7 @@ from friso.version import VERSION
 from friso_thesis.questions.reproduce.words import laws_document, numbers
 from friso_thesis.studies.thesis.claims import COUNT, CYCLE
 from friso_thesis.studies.thesis.reading import CONVENTIONS
-from friso_thesis.studies.thesis.space import OPEN, SEED
+from friso_thesis.studies.thesis.space import DRAW_SEED, OPEN
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None
         "cycles": {name: vars(cycles.comparison) for name, cycles in reproduction.cycles.items()},
         "ways": [COUNT, CYCLE],
         "unstated_values": [_open(value) for value in OPEN],
-        "draws": [{"seed": [SEED, draw.number], "values": dict(draw.values)} for draw in reproduction.plausible.draws],
+        "draws": [
+            {"seed": [DRAW_SEED, draw.number], "values": dict(draw.values)} for draw in reproduction.plausible.draws
+        ],
         "best_fit": _fit(reproduction.plausible),
         "claims": [_entry(verdict) for verdict in reproduction.verdicts],
         **({"friction_laws": laws_document(laws)} if laws else {}),

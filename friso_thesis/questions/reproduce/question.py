@@ -11,8 +11,8 @@ from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import ClaimName, StudyName, Tolerance, tolerance_of
 from friso.platform.extras import need
 from friso.progress import Progress, silent
-from friso_thesis.studies.thesis.plausible import DRAWS
-from friso_thesis.studies.thesis.reproduce import POINTS
+from friso_thesis.studies.thesis.plausible import DRAW_COUNT
+from friso_thesis.studies.thesis.reproduce import MAP_POINTS
 
 if TYPE_CHECKING:
     from friso.shown.drawing.figure import Figure
@@ -91,11 +91,11 @@ def _drawn(space: dict[str, Any] | None) -> str:
 @question
 def reproduce(
     names: Iterable[StudyName] | None = None,
-    points: int = POINTS,
+    points: int = MAP_POINTS,
     rtol: Tolerance = 1e-6,
     *,
     only: Iterable[ClaimName] | None = None,
-    draws: int = DRAWS,
+    draws: int = DRAW_COUNT,
     laws: bool = False,
     folder: Path | None = None,
     progress: Progress = silent,

@@ -122,8 +122,8 @@ def question_rows() -> list[Sequence[str]]:
     return [(question.asked, question.command, question.shows, question.answer()) for question in QUESTIONS]
 
 
-_STATIC, _STROKE = 3.0, 1e-3
-_PARASITIC, _LARGEST = 360.0, 2.5
+STATIC_FRICTION, JOINT_STROKE = 3.0, 1e-3
+PARASITIC_FREQUENCY, LARGEST_FRICTION = 360.0, 2.5
 
 
 def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
@@ -138,7 +138,7 @@ def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
     )
     limits = {v.claim.id: v for v in reproduction.verdicts}
     gap = _number(limits["F12A"], 0)
-    softest = _STATIC / _STROKE
+    softest = STATIC_FRICTION / JOINT_STROKE
     built = partial(value, "design.thesis")
     needed = "an isolator is needed" if built("needed") else "no isolator is needed"
     return [
@@ -157,10 +157,12 @@ def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
         ),
         (
             "3. Drive stiffness from static friction and stroke",
-            f"{_STATIC:g} N over {_STROKE * 1e3:g} mm allow {softest / 1e3:g} N/mm; built: 2.4 N/mm, first parasitic "
-            f"mode {_PARASITIC:g} Hz",
-            f"built: {2.4e3 * _STROKE:.2g} N at full stroke; parasitic mode at {_PARASITIC / rig_crossover():.3g} "
-            f"times the crossover (10 wanted): it would allow {_PARASITIC / 10:.3g} Hz",
+            f"{STATIC_FRICTION:g} N over {JOINT_STROKE * 1e3:g} mm allow {softest / 1e3:g} N/mm; built: 2.4 N/mm, "
+            "first parasitic "
+            f"mode {PARASITIC_FREQUENCY:g} Hz",
+            f"built: {2.4e3 * JOINT_STROKE:.2g} N at full stroke; parasitic mode at "
+            f"{PARASITIC_FREQUENCY / rig_crossover():.3g} "
+            f"times the crossover (10 wanted): it would allow {PARASITIC_FREQUENCY / 10:.3g} Hz",
             f"{built('stiffness_n_per_m') / 1e3:.2g} N/mm over {1e3 * built('stroke_m'):.2g} mm: "
             f"{built('force_n'):.2g} N of the least {built('least_static_n'):.2g} N; first interfering mode "
             f"{built('interfering_hz'):.3g} Hz",
@@ -168,7 +170,7 @@ def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
         (
             "4. Gains for the largest mass",
             "Eq. 7, 8 with the mass identified",
-            "; ".join(f"{mass:g} kg: {_gain_text(*rig_gains(mass))}" for mass in (1.7, _LARGEST)),
+            "; ".join(f"{mass:g} kg: {_gain_text(*rig_gains(mass))}" for mass in (1.7, LARGEST_FRICTION)),
             f"{built('crossover_hz'):g} Hz: {_gain_text(*map(built, _GAINS))}; least modulus margin "
             f"{built('margin'):.2g}",
         ),

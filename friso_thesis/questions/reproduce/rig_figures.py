@@ -14,15 +14,15 @@ from friso.shown.drawing.figure import Axis, Figure, Limit, Map, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, VERMILLION
 from friso_thesis.studies.thesis.experiments import (
     BUILT,
-    FREQUENCIES,
     GRID,
     LINE,
     MOVES,
     ON_RAILS,
-    RANGE,
+    RESPONSE_FREQUENCIES,
     SLIPS,
     SPEEDY,
     STANDSTILL,
+    STATIC_RANGE,
     STEPPED,
 )
 
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 _TIME = Axis("Time", "s")
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
-_WEIGHED, _FITTED = 1.7, 2.5
-_ZOOM = 2e-3  # [m] about the end of the move, Fig. 24B
+WEIGHED_MASS, FITTED_MASS = 1.7, 2.5
+ZOOM_RANGE = 2e-3  # [m] about the end of the move, Fig. 24B
 
 
 def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Figure]:
@@ -49,10 +49,10 @@ def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
 
     The mass lines are those of the mass weighed, and of the one that the thesis reads off.
     """
-    hertz = np.array(FREQUENCIES)
+    hertz = np.array(RESPONSE_FREQUENCIES)
     omega = 2 * np.pi * hertz
     line = experiments.locked_line
-    places = line.magnitude / (_WEIGHED * omega**2)
+    places = line.magnitude / (WEIGHED_MASS * omega**2)
     turns = np.degrees(line.phase) - 180
 
     def mass_line(mass: float, colour: str) -> Series:
@@ -61,12 +61,12 @@ def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
     average = Series(hertz, np.nanmean(places, axis=0), "average of the places", INK, width=2.0)
     average_turn = Series(hertz, np.nanmean(turns, axis=0), "", INK, width=2.0)
     colours = [_COLOURS[number % len(_COLOURS)] for number in range(len(places))]
-    static = np.linspace(*RANGE, len(places))
+    static = np.linspace(*STATIC_RANGE, len(places))
     single, single_turns = (
         tuple(Series(hertz, row, name.format(f), c) for row, f, c in zip(rows, static, colours, strict=True))
         for rows, name in ((places, "static friction {:.2g} N"), (turns, ""))
     )
-    lines = mass_line(_WEIGHED, BLUE), mass_line(_FITTED, VERMILLION)
+    lines = mass_line(WEIGHED_MASS, BLUE), mass_line(FITTED_MASS, VERMILLION)
     caption = (
         "Position over force of the simulated rig, joint locked, with friction, by sines of one force; the mass "
         "weighed and the one that the thesis reads off its own."
@@ -185,13 +185,13 @@ def _moves(experiments: Experiments) -> dict[str, Figure]:
         Series(traces.time, traces.moves[joint, first] + traces.distance, f"joint {joint}", colour)
         for joint, colour in (("locked", VERMILLION), ("free", BLUE))
     )
-    zoom = traces.distance - _ZOOM, traces.distance + _ZOOM
+    zoom = traces.distance - ZOOM_RANGE, traces.distance + ZOOM_RANGE
     reference = (Limit((traces.distance,), "reference", INK, "dotted"),)
     several = tuple(
         Series(traces.time, traces.moves["locked", crossover], f"{crossover:.3g} Hz", colour)
         for crossover, colour in zip(crossovers, _COLOURS, strict=False)
     )
-    near = Axis("Position minus reference", "m", (-_ZOOM, _ZOOM))
+    near = Axis("Position minus reference", "m", (-ZOOM_RANGE, ZOOM_RANGE))
     return {
         "24": Figure(
             "figure-24",

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
     from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
-_A4 = 8.27, 11.69
+A4_SIZE = 8.27, 11.69
 _COLUMNS = {"id": 0.05, "where": 0.105, "text": 0.22, "word": 0.71, "met": 0.80, "share": 0.87}
-_LETTERS = 84
-_TOP, _BOTTOM = 0.915, 0.035
-_BETWEEN = 0.6
+LETTERS_PER_LINE = 84
+PAGE_TOP, PAGE_BOTTOM = 0.915, 0.035
+ROW_SPACE = 0.6
 """Space between two rows, in lines of text."""
 
 
@@ -41,7 +41,7 @@ def summary_sheet(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Ma
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from matplotlib.figure import Figure
 
-    sheet = Figure(figsize=_A4)
+    sheet = Figure(figsize=A4_SIZE)
     FigureCanvasPdf(sheet)
     sheet.text(0.05, 0.965, "Reproduction of the thesis of J. A. Fix (Univ. of Twente)", size=12, weight="bold")
     sheet.text(0.05, 0.948, conclusion, size=8)
@@ -49,12 +49,12 @@ def summary_sheet(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Ma
              "met": "criteria", "share": "holds in draws"}  # fmt: skip
     for name, head in heads.items():
         sheet.text(_COLUMNS[name], 0.925, head, size=6.5, weight="bold")
-    rows = [(verdict, textwrap.wrap(verdict.claim.text, _LETTERS)) for verdict in words.in_order(verdicts)]
-    line = (_TOP - _BOTTOM) / max(1.0, sum(len(text) + _BETWEEN for _, text in rows))
-    y = _TOP
+    rows = [(verdict, textwrap.wrap(verdict.claim.text, LETTERS_PER_LINE)) for verdict in words.in_order(verdicts)]
+    line = (PAGE_TOP - PAGE_BOTTOM) / max(1.0, sum(len(text) + ROW_SPACE for _, text in rows))
+    y = PAGE_TOP
     for verdict, text in rows:
-        middle = y - (len(text) + _BETWEEN) / 2 * line
-        y -= (len(text) + _BETWEEN) * line
+        middle = y - (len(text) + ROW_SPACE) / 2 * line
+        y -= (len(text) + ROW_SPACE) * line
         space = verdict.space
         cells = {
             "id": verdict.claim.id,

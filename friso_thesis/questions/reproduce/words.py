@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from friso.quantities import percent
 from friso.questions.convert.words import SHOWN
 from friso.shown.drawing.prefixes import listed
-from friso_thesis.studies.thesis.plausible import POINTS
+from friso_thesis.studies.thesis.plausible import MAP_POINTS
 from friso_thesis.studies.thesis.space import OPEN, draw_name
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
@@ -76,7 +76,7 @@ def laws_document(laws: ConclusionsByLaw) -> dict[str, Any]:
     }
 
 
-SHORT = 160
+SHORT_FORM = 160
 """Longest short form of a finding, in letters."""
 
 AGREEMENT = {
@@ -96,10 +96,10 @@ def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
 
 
 def short(text: str) -> str:
-    """Return the first statements of a text that fit into `SHORT` characters, at least one."""
+    """Return the first statements of a text that fit into `SHORT_FORM` characters, at least one."""
     first = text.split(". Assumed", 1)[0]
     ends = [match.start() for match in re.finditer(r"; |\. (?=[A-Z])|$", first)]
-    return first[: max((end for end in ends if end <= SHORT), default=ends[0])]
+    return first[: max((end for end in ends if end <= SHORT_FORM), default=ends[0])]
 
 
 def numbers(verdict: ClaimVerdict) -> str:
@@ -239,7 +239,9 @@ def fit_sentence(plausible: Plausible) -> str:
     units = {value.name: value.unit for value in OPEN}
     values = ", ".join(f"{name} {value:.3g} {units[name]}".rstrip() for name, value in fit.draw.values.items())
     count, claims = len(fit.numbers), ", ".join(dict.fromkeys(item.claim for item in fit.numbers))
-    compared = f"{count} printed number{'s' if count > 1 else ''} ({claims}), all on maps of {POINTS} x {POINTS}"
+    compared = (
+        f"{count} printed number{'s' if count > 1 else ''} ({claims}), all on maps of {MAP_POINTS} x {MAP_POINTS}"
+    )
     off = f"off by a factor of {math.exp(fit.misfit):.2f} (RMS of the logarithm)"
     tried = f"Of friso's own choice and {len(plausible.draws)} joint draws"
     if fit.draw.number < 0:

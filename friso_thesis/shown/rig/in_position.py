@@ -12,7 +12,7 @@ from friso.shown.drawing.figure import Axis, Figure, Limit, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.outcome import Outcome
-from friso_thesis.studies.rig.in_position import BITS, CASES, SETTLING, SOURCES, InPosition, Standstill
+from friso_thesis.studies.rig.in_position import CASES, FORCE_BITS, SETTLING_TIME, SOURCES, InPosition, Standstill
 
 COLOURS = {"locked": VERMILLION, "free": BLUE}
 PARTS = (GREEN, ORANGE, GREY)
@@ -29,7 +29,7 @@ def sentences(outcome: Outcome) -> list[str]:
         f"(peak {with_unit(locked[1], 'm')}) with the joint locked and by {with_unit(free[0], 'm')} RMS "
         f"(peak {with_unit(free[1], 'm')}) with it free: {result.ratio('all'):.2g} times as much.",
         f"Disturbances: {floor}, and force noise of the drive of {with_unit(result.amplifier, 'N')} RMS (assumed: "
-        f"rounding to {BITS} bits). Each one alone, RMS with the joint locked and free: "
+        f"rounding to {FORCE_BITS} bits). Each one alone, RMS with the joint locked and free: "
         f"{'; '.join(_source(result, source) for source in SOURCES[:-1])}.",
         _damping(result),
         *_after(result),
@@ -64,7 +64,7 @@ def _damping(result: InPosition) -> str:
 def _after(result: InPosition) -> list[str]:
     creeps = {case: abs(float(result.after_move[case].mean[0])) for case in CASES}
     parts = [f"{with_unit(value, 'm')} with the joint {case}" for case, value in creeps.items()]
-    return [f"From {SETTLING:.3g} s after a move on, the mean position is still off by {' and '.join(parts)}."]
+    return [f"From {SETTLING_TIME:.3g} s after a move on, the mean position is still off by {' and '.join(parts)}."]
 
 
 def figures(outcome: Outcome) -> list[Figure]:

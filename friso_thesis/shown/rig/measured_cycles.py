@@ -14,10 +14,18 @@ from friso.shown.drawing.palette import BLUE, INK, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.rig.outcome import Outcome
-from friso_thesis.studies.rig.measured_cycles import AS_SLOW, BINS, COULOMB, MOTORS, SIMILAR, STATIC, CycleComparison
+from friso_thesis.studies.rig.measured_cycles import (
+    AS_SLOW,
+    BINS,
+    COULOMB_FACTORS,
+    MOTORS,
+    SIMILAR_SWING,
+    STATIC_FACTORS,
+    CycleComparison,
+)
 
 AREA = "#cfdfee"
-LATE = 10.0
+COUNTED_FROM = 10.0
 """Time [s] from which cycles are drawn and counted."""
 
 ASYMMETRY = "Difference of friction between the two sides"
@@ -49,7 +57,8 @@ def _field(result: CycleComparison) -> str:
     slowest = np.nanmax(result.slower(result.field)) if swings else np.nan
     return (
         f"On rails with a random field {swings} of {done} runs still swing at their end; {int(as_slow.sum())} of them "
-        f"have at least {AS_SLOW:g} times that period at a similar swing (within a factor of {SIMILAR:g}); the slowest "
+        f"have at least {AS_SLOW:g} times that period at a similar swing (within a factor of {SIMILAR_SWING:g}); the "
+        "slowest "
         f"has {slowest:.3g} times."
     )
 
@@ -119,7 +128,7 @@ def _levels(result: CycleComparison) -> str:
 
 
 def _level(motor: Any, row: Any, column: Any) -> str:
-    named = f"static friction times {STATIC[row]:g}, Coulomb friction times {COULOMB[column]:g}"
+    named = f"static friction times {STATIC_FACTORS[row]:g}, Coulomb friction times {COULOMB_FACTORS[column]:g}"
     return named if MOTORS[motor] == 1 else f"motor giving {MOTORS[motor]:.2g} of its force, {named}"
 
 
@@ -154,7 +163,7 @@ def _cycles(result: CycleComparison) -> Figure:
 
 
 def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    late = time >= LATE
+    late = time >= COUNTED_FROM
     return time[late], values[late]
 
 
@@ -229,7 +238,12 @@ def _level_maps(result: CycleComparison) -> Figure:
         ("Swing over the file's", result.larger(result.levels)),
     )
     panels = tuple(
-        Panel(_motor(motor), x, y, maps=(Map(np.array(STATIC), np.array(COULOMB), values[row].T, name, ""),))
+        Panel(
+            _motor(motor),
+            x,
+            y,
+            maps=(Map(np.array(STATIC_FACTORS), np.array(COULOMB_FACTORS), values[row].T, name, ""),),
+        )
         for row, motor in enumerate(MOTORS)
         for name, values in quantities
     )
@@ -255,7 +269,11 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     ]
     field = {"deviations": result.deviations, "correlation_lengths_m": result.lengths, "asymmetry": result.asymmetry}
     rolling = {"harmonics": result.harmonics, "pitch_m": result.pitch, "asymmetry": result.rolling_asymmetry}
-    levels = {"motors": np.array(MOTORS), "static_over_file": np.array(STATIC), "coulomb_over_file": np.array(COULOMB)}
+    levels = {
+        "motors": np.array(MOTORS),
+        "static_over_file": np.array(STATIC_FACTORS),
+        "coulomb_over_file": np.array(COULOMB_FACTORS),
+    }
     return {
         "criteria": CRITERIA,
         "even_rail": _cycle_document(result.even),

@@ -20,19 +20,19 @@ FREE_EDGE, LOCKED_EDGES = (5.0, 5.5), (15.0, 14.3)
 """Crossovers [Hz] above which the thesis's rig no longer hunts: two values with the joint free, and two with it
 locked."""
 
-NEAR = 1.1
+NEAR_EDGE = 1.1
 """Ratio within which the free edge may miss its range, and a short stroke's edge may exceed a long one's."""
 
-GAP = (0.5, 2.0)
+ABOUT_ONE_NEWTON = (0.5, 2.0)
 """Range of gaps [N] that counts as "about 1 N"."""
 
-STIFFNESSES = (1000, 2400)
+JOINT_STIFFNESSES = (1000, 2400)
 """Stiffnesses of the softer and of the stiffer joint [N/m]."""
 
-STROKES = (0.3, 1.0, 2.0)
+JOINT_STROKES = (0.3, 1.0, 2.0)
 """Strokes [mm]: the one claimed to be enough, a long one, and the longest."""
 
-SAME = 0.02
+SAME_EDGE = 0.02
 """Largest relative change of an edge that "no longer changes"."""
 
 
@@ -70,8 +70,8 @@ def _gap(worked: Worked) -> GuidelineClaim:
         "hunting needs a friction gap of about 1 N",
         f"locked, at {CLAIMED_AT:g} Hz a cycle attracts from a gap of {words}; by the law this gap grows with the "
         "force and the crossover",
-        f"{GAP[0]:g} to {GAP[1]:g} N at each static friction",
-        _judgement([gap.within(*GAP) for gap in gaps]),
+        f"{ABOUT_ONE_NEWTON[0]:g} to {ABOUT_ONE_NEWTON[1]:g} N at each static friction",
+        _judgement([gap.within(*ABOUT_ONE_NEWTON) for gap in gaps]),
     )
 
 
@@ -108,9 +108,12 @@ def _mass(worked: Worked) -> GuidelineClaim:
 
 def _stiffness(worked: Worked) -> GuidelineClaim:
     cases = {round(STUDIED["stiffness"](case.changes)): case for case in worked.studies["stiffness"]}
-    soft, stiff = (cases[stiffness] for stiffness in STIFFNESSES)
+    soft, stiff = (cases[stiffness] for stiffness in JOINT_STIFFNESSES)
     lower = _verdict(soft.ranked < stiff.ranked, soft.ranked, stiff.ranked)
-    text = f"edge {_edge(soft)} at {STIFFNESSES[0] / 1e3:g} N/mm, {_edge(stiff)} at {STIFFNESSES[1] / 1e3:g} N/mm"
+    text = (
+        f"edge {_edge(soft)} at {JOINT_STIFFNESSES[0] / 1e3:g} N/mm, {_edge(stiff)} at {JOINT_STIFFNESSES[1] / 1e3:g} "
+        "N/mm"
+    )
     return GuidelineClaim("Fig. 16B", "a softer joint lowers the limit", text, "it is lower", _judgement([lower]))
 
 
@@ -118,18 +121,19 @@ def _stroke(worked: Worked) -> GuidelineClaim:
     """Judge the claim that a small stroke is enough, and that a longer one changes nothing."""
     cases = {round(1e3 * STUDIED["stroke"](case.changes), 6): case for case in worked.studies["stroke"]}
     words = ", ".join(f"{_edge(case)} at {stroke:g} mm" for stroke, case in cases.items())
-    short, long, longest = (cases[stroke].ranked for stroke in STROKES)
-    same = abs(long - longest) < SAME * longest
+    short, long, longest = (cases[stroke].ranked for stroke in JOINT_STROKES)
+    same = abs(long - longest) < SAME_EDGE * longest
     return GuidelineClaim(
         "Sec. 4.1, 4.3.3",
         "a stroke of 0.3 mm is enough; above some stroke the limit no longer changes",
         f"edge {words}",
-        f"at {STROKES[0]:g} mm below {CLAIMED_AT:g} Hz and within {percent(NEAR - 1)} of that at {STROKES[2]:g} mm; at "
-        f"{STROKES[1]:g} mm within {percent(SAME)} of it",
+        f"at {JOINT_STROKES[0]:g} mm below {CLAIMED_AT:g} Hz and within {percent(NEAR_EDGE - 1)} of that at "
+        f"{JOINT_STROKES[2]:g} mm; at "
+        f"{JOINT_STROKES[1]:g} mm within {percent(SAME_EDGE)} of it",
         _judgement(
             [
                 _verdict(short < CLAIMED_AT, short),
-                _verdict(short < NEAR * longest, short, longest),
+                _verdict(short < NEAR_EDGE * longest, short, longest),
                 _verdict(same, long, longest),
             ]
         ),
@@ -144,14 +148,15 @@ def _edges(worked: Worked) -> GuidelineClaim:
         f"free {_hertz(free)}, locked {_hertz(locked)} with the friction of Table 2; locked at most {_edge(worst)} "
         "over the measured friction range, both as computed"
     )
-    ends = [FREE_EDGE[0] / NEAR, FREE_EDGE[1] * NEAR]
+    ends = [FREE_EDGE[0] / NEAR_EDGE, FREE_EDGE[1] * NEAR_EDGE]
     near = [_verdict(ends[0] <= free <= ends[1], free)]
     near += [_verdict(about(worst.ranked, edge), worst.ranked) for edge in LOCKED_EDGES]
     return GuidelineClaim(
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
         text,
-        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of {OWN.about:g} of "
+        f"free within {percent(NEAR_EDGE - 1)} of the range, the highest locked edge within a factor of {OWN.about:g} "
+        "of "
         "both numbers",
         _judgement(near),
     )

@@ -27,7 +27,7 @@ from friso.hunting import Ensemble
 from friso.platform.system import usable_cores
 from friso.progress import Progress, Tally, silent
 from friso.quantities import quoted
-from friso_thesis.studies.guideline.edges import DISTANCES, Begin, from_rest, still_swings
+from friso_thesis.studies.guideline.edges import START_DISTANCES, Begin, from_rest, still_swings
 from friso_thesis.studies.guideline.groups import Count, flat_of, group_count, values_of
 from friso_thesis.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fit_law
 from friso_thesis.studies.guideline.sweeps import (
@@ -36,7 +36,7 @@ from friso_thesis.studies.guideline.sweeps import (
     LOCKED,
     LOCKED_FIT,
     LOCKED_TEST,
-    PART,
+    PART_SAMPLES,
     STEPS,
     Keep,
     Sweep,
@@ -55,20 +55,20 @@ from friso_thesis.studies.guideline.worked import (
 )
 from friso_thesis.studies.thesis.studies import thesis_rig
 
-BELOW, ABOVE = 0.9, 1.15
+BELOW_EDGE, ABOVE_EDGE = 0.9, 1.15
 """Crossovers of the check simulations, relative to the edge."""
 
-MOVES = 16
+MOVES_PER_SAMPLE = 16
 """Number of moves tried for each sample."""
 
-SIZES, TIMES = (3.0, 300.0), (0.3, 3.0)
+MOVE_SIZES, MOVE_TIMES = (3.0, 300.0), (0.3, 3.0)
 """Ranges of the moves. The first is a t_acc^2 relative to the deflection by the break-away force; the second is t_acc
 times omega_c. The thesis's move has 90 and 1.5 at 8 Hz."""
 
-PERIODS_BESIDE = {BELOW: 200.0, ABOVE: 2000.0}
+PERIODS_BESIDE = {BELOW_EDGE: 200.0, ABOVE_EDGE: 2000.0}
 """Length of the check simulations in periods. Above the edge, transients of up to a thousand periods were seen."""
 
-APART = 20.0
+MOVES_APART = 20.0
 """Time between the move there and the move back, in periods of the crossover."""
 
 
@@ -96,7 +96,7 @@ def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
     """
     usable = sweep.usable
     samples = usable.take(np.arange(min(most, len(usable.edge))))
-    runs = [_still_swing(samples, share, *begin) for begin in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
+    runs = [_still_swing(samples, share, *begin) for begin in (_STUCK, _MOVED) for share in (BELOW_EDGE, ABOVE_EDGE)]
     numbers = [int(swinging.any(axis=1).sum()) for swinging, _ in runs]
     completed = np.concatenate([done.ravel() for _, done in runs])
     return SimulationCheck(len(samples.edge), *numbers, runs=completed.size, failed=int(np.count_nonzero(~completed)))
@@ -125,10 +125,10 @@ def _random_moves(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
     `count` samples make the same moves. Sizes are multiples of each stage's own length scale (`stages.length`), and
     times of the inverse of its `crossover`.
     """
-    ends = np.log([SIZES, TIMES]).T
-    size, time = np.exp(qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *ends)).T
+    ends = np.log([MOVE_SIZES, MOVE_TIMES]).T
+    size, time = np.exp(qmc.scale(qmc.Sobol(2, rng=0).random(MOVES_PER_SAMPLE), *ends)).T
     duration = np.tile(time, count) / crossover
-    back = 2 * duration + APART * 2 * np.pi / crossover
+    back = 2 * duration + MOVES_APART * 2 * np.pi / crossover
     motion = {
         "motion.kind": "there_and_back",
         "motion.acceleration": np.tile(size, count) * stages.length / duration**2,
@@ -138,14 +138,14 @@ def _random_moves(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
     return Begin(motion, None, back + 2 * duration)
 
 
-_STUCK = (lambda stages, crossover, count: from_rest(stages, np.tile(DISTANCES, count))), len(DISTANCES)
-_MOVED = _random_moves, MOVES
+_STUCK = (lambda stages, crossover, count: from_rest(stages, np.tile(START_DISTANCES, count))), len(START_DISTANCES)
+_MOVED = _random_moves, MOVES_PER_SAMPLE
 
 
-SAMPLES = 512
+FIT_SAMPLES = 512
 """Default number of samples for the fit of the locked law. The other sweeps have fractions of it."""
 
-FEWEST, MOST = 64, 65536
+FEWEST_SAMPLES, MOST_SAMPLES = 64, 65536
 """Smallest and largest number of samples. Fewer do not determine the exponents of a law; more bring no gain with Sobol
 points."""
 
@@ -153,10 +153,10 @@ FREE_SHARE, TEST_SHARE = 3 / 8, 1 / 2
 """Ratios of sample numbers: free joint to rigid mass, and test to fit. The edge of a rigid mass takes a tenth of the
 work."""
 
-CHECKED = 1 / 8
+CHECKED_SHARE = 1 / 8
 """Ratio of simulated samples to samples of the locked fit."""
 
-ROUNDS = (1 / 8, 1 / 4, 1 / 2, 1.0)
+SWEPT_SHARES = (1 / 8, 1 / 4, 1 / 2, 1.0)
 """Fractions of the samples that are swept in turn, so that an interrupted run has an answer from fewer samples."""
 
 RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
@@ -282,7 +282,7 @@ def _ratio(law: FittedLaw, values: Mapping[str, np.ndarray]) -> np.ndarray:
     return slip / drop
 
 
-def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress = silent) -> Guideline:
+def guideline(samples: int = FIT_SAMPLES, keep: Path | None = None, progress: Progress = silent) -> Guideline:
     """Compute the guideline.
 
     `keep` is a folder for finished parts, from which an interrupted run goes on. `progress` is called as work is done.
@@ -301,9 +301,9 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     swept: _Swept | None = None
     interrupted = False
     try:
-        for share in ROUNDS:
-            some = {name: min(size, PART * ceil(share * size / PART)) for name, size in sizes.items()}
-            if share == 1 or some["locked fit"] >= FEWEST:
+        for share in SWEPT_SHARES:
+            some = {name: min(size, PART_SAMPLES * ceil(share * size / PART_SAMPLES)) for name, size in sizes.items()}
+            if share == 1 or some["locked fit"] >= FEWEST_SAMPLES:
                 swept = _Swept.of(some, parts, tally, last=share == 1)
     except KeyboardInterrupt:
         if swept is None:
@@ -312,7 +312,7 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     assert swept is not None  # by the last round
     samples, so_far = len(swept.rigid.edge), "the answer so far (Ctrl-C again ends it): " if interrupted else ""
     tally.add(0, f"{so_far}laws and simulations")
-    few = max(8, int(samples * CHECKED))
+    few = max(8, int(samples * CHECKED_SHARE))
     locked_fit = _locked_fit(swept.rigid, concatenate_sweeps(swept.rigid_test, *swept.beside), few)
     free_fit = _free(swept.free, swept.free_test, locked_fit.law, few)
     tally.add(0, f"{so_far}worked steps")
@@ -351,9 +351,12 @@ class _Swept:
 
 def checked_samples(samples: int) -> None:
     """Check the number of samples. Raises InputError if it is too small or too large."""
-    if not FEWEST <= samples <= MOST:
+    if not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
         raise InputError(
-            "--samples", quoted(samples), f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}"
+            "--samples",
+            quoted(samples),
+            f"a whole number from {FEWEST_SAMPLES} to {MOST_SAMPLES}",
+            f"--samples {FIT_SAMPLES}",
         )
 
 

@@ -24,23 +24,23 @@ from friso.hunting import Ensemble, find_cycles, stuck, wait
 from friso.hunting.criteria import lasts
 from friso.hunting.measures import swing_of
 
-DISTANCES = np.geomspace(0.02, 2.0, 95)
+START_DISTANCES = np.geomspace(0.02, 2.0, 95)
 """Start distances, relative to the loop's deflection by the break-away force, 5 % apart. Cycles have distances from
 0.03, at the smallest friction gaps, to 1.5."""
 
-SMALL = 0.005
+RESTING_BAND = 0.005
 """Band around the reference within which a motion counts as resting, relative to the loop's deflection by the
 break-away force. The smallest cycles of the sweeps swing by at least 0.06 from peak to peak."""
 
-SLOW = 0.05
+SLOW_DISTANCE = 0.05
 """Distance whose cycle sets the length of simulations, relative to the deflection by the break-away force. Small cycles
 have the longest periods, because a stage sticks longer near its reference."""
 
-PERIODS, LAST = 200.0, 2.0
-"""Default length of simulations, and length of the end that is judged, in periods of the cycle at `SLOW`. Near a cycle
-that repels by 1 % per half period, a deviation grows 50 times within the first."""
+RUN_PERIODS, JUDGED_PERIODS = 200.0, 2.0
+"""Default length of simulations, and length of the end that is judged, in periods of the cycle at `SLOW_DISTANCE`. Near
+a cycle that repels by 1 % per half period, a deviation grows 50 times within the first."""
 
-RTOL = 1e-6
+PERSISTENCE_RTOL = 1e-6
 """Relative tolerance of the simulations."""
 
 
@@ -62,16 +62,16 @@ def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
+def still_swings(stages: Ensemble, begin: Begin, periods: float = RUN_PERIODS) -> tuple[np.ndarray, np.ndarray]:
     """Return which stages still swing at the end, and which runs were completed, both (count,).
 
     After the motion is over, runs last as long as `periods` periods of a slow cycle.
     """
-    period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
+    period = 2 * (wait(stages, SLOW_DISTANCE * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
     options = RunOptions(
-        rtol=RTOL,
-        window=1 - LAST / periods,
+        rtol=PERSISTENCE_RTOL,
+        window=1 - JUDGED_PERIODS / periods,
         record_from=float(np.min(end)) / 2,
         least_swing=np.inf,
         threads=stages.threads,
@@ -81,13 +81,13 @@ def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tu
     swings, completed = np.zeros(stages.count, bool), np.zeros(stages.count, bool)
     for runs in run_chunks(kernel(stages.structure), flat, stages.count, options, begin.starts):
         completed[runs.numbers] = np.equal(runs.results.statuses, Status.DONE)
-        lasting = lasts(swing_of(runs), 0.0, SMALL * stages.length[runs.numbers])
+        lasting = lasts(swing_of(runs), 0.0, RESTING_BAND * stages.length[runs.numbers])
         swings[runs.numbers] = completed[runs.numbers] & lasting
     return swings, completed
 
 
 def swings_from_any_distance(
-    stages: Ensemble, periods: float = PERIODS, distances: np.ndarray = DISTANCES
+    stages: Ensemble, periods: float = RUN_PERIODS, distances: np.ndarray = START_DISTANCES
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which stages swing for ever from any of the distances, and for which this is known.
 
@@ -107,18 +107,18 @@ OF = (
 )
 """Description of the cycle whose edges these are."""
 
-ROUNDS = 6
+EDGE_BISECTIONS = 6
 """Number of bisections of the grid step that contains the edge."""
 
-MEETS = 0.9, 1.1
+FLIP_BOUNDS = 0.9, 1.1
 """Bounds of the multiplier's size below and above a flip. A multiplier beyond its bound belongs to another cycle. The
 final bracket of an edge is less than 1 % wide."""
 
-STEP, STEPS = 1.02, 16
+CROSSOVER_STEP, MOST_STEPS = 1.02, 16
 """Factor and largest number of upward steps in crossover, if another cycle has taken over above an edge. The steps
 continue while simulations hunt, at most to the next crossover of the grid."""
 
-LONG = 2000.0
+LONG_RUN_PERIODS = 2000.0
 """Length of simulations of small cycles, in periods of these cycles. Transients near an unstable cycle may be long."""
 
 FLIP, JUMP, FOLD, LOST = "flip", "jump", "fold", "lost"
@@ -193,7 +193,7 @@ def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> 
     return _AtCrossovers(attracts, cycles.multiplier, cycles.uncertain, failed)
 
 
-def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
+def find_edges(stages: Stages, grid: np.ndarray, rounds: int = EDGE_BISECTIONS) -> Edges:
     """Find the edges of stages on a grid of crossovers, shape (count, points), ascending.
 
     The step above the last crossover at which a cycle attracts is halved `rounds` times. If another cycle takes over
@@ -274,22 +274,22 @@ class _Search:
     @property
     def jumps(self) -> np.ndarray:
         """Return at which edges another cycle takes over, so that cycles above and below differ."""
-        meets = (self.inside < -MEETS[0]) & (-MEETS[1] < self.outside) & (self.outside < 0)
+        meets = (self.inside < -FLIP_BOUNDS[0]) & (-FLIP_BOUNDS[1] < self.outside) & (self.outside < 0)
         return np.isfinite(self.outside) & ~meets
 
     def follow(self) -> None:
         """Move the step upward where another cycle takes over, as long as simulations hunt there."""
         jumping = np.flatnonzero(self.jumps)
-        for _ in range(STEPS):
+        for _ in range(MOST_STEPS):
             if not jumping.size:
                 return
             hunts, decided = swings_from_any_distance(
-                self.stages(self.which[jumping], np.exp(self.high[jumping])), LONG
+                self.stages(self.which[jumping], np.exp(self.high[jumping])), LONG_RUN_PERIODS
             )
             self.failed[jumping] |= ~decided
             jumping = jumping[hunts]
             self.low[jumping] = self.high[jumping]
-            self.high[jumping] += np.log(STEP)
+            self.high[jumping] += np.log(CROSSOVER_STEP)
         self.failed[jumping] = True
 
     def columns(self) -> dict[str, np.ndarray]:
@@ -298,7 +298,7 @@ class _Search:
         crossed = self.low - excess[0] * (self.flip - self.low) / (excess[1] - excess[0])
         within = (self.low <= crossed) & (crossed <= self.high)
         surely = np.isfinite(self.outside) & ~self.jumps
-        flips = within & (surely | (self.unsure & (self.inside < -MEETS[0]) & (self.flipped < 0)))
+        flips = within & (surely | (self.unsure & (self.inside < -FLIP_BOUNDS[0]) & (self.flipped < 0)))
         kind = np.where(flips, FLIP, np.where(self.jumps, JUMP, np.where(self.unsure, LOST, FOLD)))
         edge = np.exp(np.where(flips, crossed, (self.low + self.high) / 2))
         return {

@@ -26,7 +26,7 @@ LIMITER_OVER_BRISTLES = 200.0
 hardly matters."""
 
 
-EXPONENT = 2.0
+STRIBECK_EXPONENT = 2.0
 """Stribeck exponent of all sweeps, from the thesis (Table 2). The exponent is a group by itself."""
 
 RIGID_SHARE = 0.3
@@ -260,7 +260,7 @@ def flat_of(values: GroupValues, scale: GroupScale = _UNIT) -> dict[str, Any]:
         "friction.static": force,
         "friction.coulomb": force * (1 - values["gap"]),
         "friction.stribeck_velocity": values["stribeck"] * values["gap"] * force / impedance,
-        "friction.stribeck_exponent": EXPONENT,
+        "friction.stribeck_exponent": STRIBECK_EXPONENT,
         "friction.bristle_stiffness": stiffness,
         "friction.bristle_damping": 2 * values["bristle_damping"] * impedance,
         "friction.viscous": 2 * values["viscous"] * impedance,

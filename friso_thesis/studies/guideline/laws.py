@@ -36,10 +36,10 @@ REFERENCE: Mapping[str, float] = {
 }
 """Values of the groups that serve as references in the laws: round numbers near the thesis rig."""
 
-SCALE = 0.1
+LINEAR_LOSS_FROM = 0.1
 """Error of the logarithm above which the loss grows linearly instead of quadratically."""
 
-FOLDS, GAIN, MOST = 8, 0.02, 8
+VALIDATION_PARTS, LEAST_GAIN, MOST_EXPONENTS = 8, 0.02, 8
 """Settings of the cross-validation: the number of parts, the relative loss that a further exponent must save, and the
 largest number of exponents."""
 
@@ -190,13 +190,13 @@ def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.nd
     """
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
-    folds = np.random.default_rng(0).permutation(len(edges)) % FOLDS
+    folds = np.random.default_rng(0).permutation(len(edges)) % VALIDATION_PARTS
     chosen: tuple[Exponent, ...] = ()
     path = [_validated(law, chosen, values, target, offset, folds)]
-    while len(chosen) < MOST:
+    while len(chosen) < MOST_EXPONENTS:
         remaining = [exponent for exponent in law.candidates if exponent not in chosen]
         scores = [_validated(law, (*chosen, exponent), values, target, offset, folds) for exponent in remaining]
-        if not scores or min(scores) > (1 - GAIN) * path[-1]:
+        if not scores or min(scores) > (1 - LEAST_GAIN) * path[-1]:
             break
         path.append(min(scores))
         chosen = (*chosen, remaining[int(np.argmin(scores))])
@@ -209,9 +209,9 @@ def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.nd
 def loss(off: np.ndarray) -> float:
     """Return the size of errors `off` of the logarithm: nearly the rms if they are small.
 
-    Errors beyond `SCALE` count linearly.
+    Errors beyond `LINEAR_LOSS_FROM` count linearly.
     """
-    return float(np.sqrt(np.mean(2 * SCALE**2 * (np.sqrt(1 + (off / SCALE) ** 2) - 1))))
+    return float(np.sqrt(np.mean(2 * LINEAR_LOSS_FROM**2 * (np.sqrt(1 + (off / LINEAR_LOSS_FROM) ** 2) - 1))))
 
 
 def _validated(
@@ -228,7 +228,7 @@ def _validated(
     logarithms of edges, and `offset` are logarithms of edges with the joint locked.
     """
     off = np.empty(len(target))
-    for fold in range(FOLDS):
+    for fold in range(VALIDATION_PARTS):
         out, rest = folds == fold, folds != fold
         solution = _log_coefficients(law, chosen, _some(values, rest), target[rest], offset[rest])
         rates = _log_rates(law, chosen, _some(values, out), solution)
@@ -254,7 +254,7 @@ def _log_coefficients(
         return np.einsum("rc,rpc->cp", weights, features)
 
     start = np.zeros(len(law.rates) + len(chosen))
-    return least_squares(off, start, slopes, loss="soft_l1", f_scale=SCALE).x  # type: ignore[arg-type]
+    return least_squares(off, start, slopes, loss="soft_l1", f_scale=LINEAR_LOSS_FROM).x  # type: ignore[arg-type]
 
 
 def _features(law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues) -> np.ndarray:

@@ -53,7 +53,7 @@ LOCKED_GRID = np.geomspace(0.004, 1.0, 20)
 FREE_GRID = np.geomspace(0.03, 1.6, 12)
 """Crossovers tried with a free joint, in units of the locked edge."""
 
-PART = 32
+PART_SAMPLES = 32
 """Number of samples that are computed and saved together."""
 
 LOCKED_FIT, LOCKED_TEST, FREE_FIT, FREE_TEST = 1, 2, 3, 4
@@ -145,7 +145,7 @@ def free_sweep(count: int, seed: int, keep: Keep, tally: Tally, last: bool = Tru
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     locked = _in_parts(f"locked beside free {seed}", rigid, grid, keep, tally, LOCKED)
     has = np.flatnonzero(locked.located)
-    has = has if last or len(has) < PART else has[: len(has) // PART * PART]
+    has = has if last or len(has) < PART_SAMPLES else has[: len(has) // PART_SAMPLES * PART_SAMPLES]
     values = {name: value[has] for name, value in drawn_values.items() if name != "ratio"}
     at = locked.crossover[has]
     values["joint"] = (drawn_values["ratio"][has] * at) ** 2
@@ -157,8 +157,8 @@ def _in_parts(
     name: str, values: Mapping[str, np.ndarray], grid: np.ndarray, keep: Keep, tally: Tally, label: str
 ) -> Edges:
     parts = []
-    for first in range(0, len(grid), PART):
-        part = slice(first, min(first + PART, len(grid)))
+    for first in range(0, len(grid), PART_SAMPLES):
+        part = slice(first, min(first + PART_SAMPLES, len(grid)))
         subset = {group: value[part] for group, value in values.items()}
         title, done = f"{name} {first} {part.stop}", len(keep.parts)
         parts.append(keep.part(title, lambda subset=subset, part=part: find_edges(_stages(subset), grid[part])))

@@ -142,7 +142,7 @@ def direct(stage: Stage) -> float:
     return edge.crossover if edge and edge.crossover else np.nan
 
 
-FREQUENCIES = (100.0, 200.0, 300.0, 600.0, 1000.0)
+PARASITIC_FREQUENCIES = (100.0, 200.0, 300.0, 600.0, 1000.0)
 """Frequencies of parasitic modes [Hz]."""
 
 DAMPING_RATIOS = (0.01, 0.001)
@@ -174,7 +174,7 @@ def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
     """
     modes = []
     for damping in DAMPING_RATIOS:
-        for frequency in FREQUENCIES:
+        for frequency in PARASITIC_FREQUENCIES:
             mode = {"parasitic.frequency": f"{frequency!r} Hz", "parasitic.damping_ratio": damping, **DRIVE}
             flats = [stage.replace({**mode, "joint.locked": held}).flat() for held in (True, False)]
             locked, free = (holding(limits(flat).comfortable, flat[CROSSOVER]) for flat in flats)
@@ -196,17 +196,17 @@ def holding(ranges: Sequence[Range], crossover: float) -> Range | None:
     return next((window for window in ranges if window[0] <= crossover <= window[1]), None)
 
 
-STATIC = (1.0, 1.5, 2.0, 2.5)
+STATIC_FRICTIONS = (1.0, 1.5, 2.0, 2.5)
 """Static friction of the rig [N]: the range that the thesis measured (Fig. 20). Table 2 has 3 N."""
 
-GAPS = (0.15, 0.3, 0.5, 0.7, 0.85)
+FRICTION_GAPS = (0.15, 0.3, 0.5, 0.7, 0.85)
 """Friction gaps tried, over the range of the law, because dynamic friction could not be measured."""
 
-LIMITS = (8.0, 48.0)
+BANDWIDTH_LIMITS = (8.0, 48.0)
 """Bandwidth limits [Hz]: the crossover at which the thesis evaluates its isolator (Sec. 3.4.2), and the highest stable
 crossover of its rig (Sec. 4.3.1)."""
 
-AMPLE = 1.0
+AMPLE_STROKE = 1.0
 """Stroke [m] that exceeds every cycle."""
 
 CLAIMED_AT = 8.0
@@ -318,12 +318,15 @@ class Worked:
         return max(self.friction, key=lambda case: case.ranked if case.ranked == case.ranked else np.inf)
 
 
-def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
+def friction_range(gaps: Sequence[float] = FRICTION_GAPS) -> list[dict[str, float]]:
     """Return the pairs of static and Coulomb friction [N] that the rig may have, as keys.
 
     Each static friction is combined with each of the `gaps`, fractions of it.
     """
-    return [{"friction.static": force, "friction.coulomb": force * (1 - gap)} for force, gap in product(STATIC, gaps)]
+    return [
+        {"friction.static": force, "friction.coulomb": force * (1 - gap)}
+        for force, gap in product(STATIC_FRICTIONS, gaps)
+    ]
 
 
 def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
@@ -333,7 +336,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
     """
     friction = cases(laws, friction_range(), free=False)
     highest_law = safe_locked * max(case.law for case in friction)
-    needs = tuple(IsolatorNeed(limit, highest_law) for limit in LIMITS)
+    needs = tuple(IsolatorNeed(limit, highest_law) for limit in BANDWIDTH_LIMITS)
     return Worked(
         {name: float(rate[0]) for name, rate in laws.rates(plain_rig("joint")).items()},
         machines(laws),
@@ -372,16 +375,16 @@ def highest(laws: Laws) -> float:
 
 
 def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
-    """Design isolators until their computed edges are below the limit, at most `CORRECTED`.
+    """Design isolators until their computed edges are below the limit, at most `MOST_DESIGNS`.
 
     The first is designed by the law, with its edge a safety factor below the limit. As long as computed edges are above
-    the limit, another isolator follows. Its aim is lower by the ratio of limit to edge, and by `BLIND` or more if an
-    edge is unknown. A factor `CLOSER` lowers it further.
+    the limit, another isolator follows. Its aim is lower by the ratio of limit to edge, and by `BLIND_AIM_FACTOR` or
+    more if an edge is unknown. A factor `AIM_FACTOR` lowers it further.
     """
     designs = [_design(laws, limit, limit / safe)]
-    while not designs[-1].does and len(designs) < CORRECTED:
-        share = min(limit / designs[-1].worst, BLIND if designs[-1].unknown else 1.0)
-        designs.append(_design(laws, limit, CLOSER * designs[-1].aim * share))
+    while not designs[-1].does and len(designs) < MOST_DESIGNS:
+        share = min(limit / designs[-1].worst, BLIND_AIM_FACTOR if designs[-1].unknown else 1.0)
+        designs.append(_design(laws, limit, AIM_FACTOR * designs[-1].aim * share))
     return tuple(designs)
 
 
@@ -399,8 +402,8 @@ def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
         edges = laws.free_edge(base | {"joint.stiffness": stiffness, "joint.stroke": stroke})
         return float(np.log(edges.max() / aim))
 
-    stiffness = MARGIN * _root(lambda log: over(np.exp(log), AMPLE), np.log(1.0), np.log(1e7))
-    stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE))
+    stiffness = CHOSEN_STIFFNESS * _root(lambda log: over(np.exp(log), AMPLE_STROKE), np.log(1.0), np.log(1e7))
+    stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE_STROKE))
     changes = [pair | {"joint.stiffness": stiffness, "joint.stroke": stroke} for pair in forces]
     joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
     margin = margin_with(thesis_rig(), joint | {CROSSOVER: limit})
@@ -410,13 +413,13 @@ def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
 DESIGN_GAPS = (0.3, 0.6, 0.85)
 """Friction gaps over which a design is computed."""
 
-CORRECTED, CLOSER = 5, 0.98
+MOST_DESIGNS, AIM_FACTOR = 5, 0.98
 """Largest number of designs, including the first by the law, and safety factor on each new aim."""
 
-BLIND = 0.85
+BLIND_AIM_FACTOR = 0.85
 """Factor on the new aim if an edge is unknown."""
 
-MARGIN = 0.9
+CHOSEN_STIFFNESS = 0.9
 """Chosen stiffness of the joint over the stiffest allowed, which would need an infinite stroke."""
 
 

@@ -21,16 +21,16 @@ from friso.studies.rig.outcome import Outcome, interval, rig_log
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import MoveTask, standing
 
-FASTER = 2.0
+FASTER_CROSSOVER = 2.0
 """Raised crossover relative to that of the stage: 16 Hz for the 8 Hz of the thesis's rig (Sec. 4.3.2)."""
 
-SETTLING, WATCHED = 4.0, 12.0
+SETTLING_TIME, RECORD_LENGTH = 4.0, 12.0
 """Settling time before the record [s], and length of the record [s]."""
 
-INTERVAL = 5e-4
+LONGEST_INTERVAL = 5e-4
 """Longest time between samples [s]."""
 
-BITS = 14
+FORCE_BITS = 14
 """Resolution of the drive's force between its limits [bits]: our choice. The noise of the amplifier is taken to be that
 of rounding to uniform steps."""
 
@@ -44,7 +44,7 @@ velocity stays below 2.4 um/s RMS, and so below VC-E (3.1 um/s) of the usual vib
 DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """Damping ratios of the joint with the stage's mass, our choice."""
 
-SEGMENTS = 6
+SPECTRUM_SEGMENTS = 6
 """Number of segments of the record for its spectrum."""
 
 CASES = {"locked": True, "free": False}
@@ -117,13 +117,15 @@ def in_position(
 
     With all disturbances, the noise of the force is also multiplied by the factors `noises`.
     """
-    fast = with_joint(stage, locked=False).replace({crossover_key(stage): f"{FASTER * crossover(stage):.6g} Hz"})
+    fast = with_joint(stage, locked=False).replace(
+        {crossover_key(stage): f"{FASTER_CROSSOVER * crossover(stage):.6g} Hz"}
+    )
     shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
     force = amplifier_noise(stage)
     step = as_built_keys(stage)["drive.sample_time"]
-    noisy = with_noise(standing(0.0, SETTLING + WATCHED), force, seed, step)
-    after_move = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, step)
+    noisy = with_noise(standing(0.0, SETTLING_TIME + RECORD_LENGTH), force, seed, step)
+    after_move = with_noise(replace(move(stage), duration=SETTLING_TIME + RECORD_LENGTH), force, seed, step)
     # "all" stands first: its run is the one recorded
     plans = (
         (quiet, {"encoder": 0.0, "amplifier": 1.0}),
@@ -136,23 +138,23 @@ def in_position(
             fixed = machine.replace({"joint.locked": locked})
             task = replace(noisy, injected=np.outer([*factors.values()], noisy.injected))
             recorded = _recorded(fixed, task, seed, _silenced(fixed, factors), len(factors))
-            stands = _standstill(recorded, SETTLING)
+            stands = _standstill(recorded, SETTLING_TIME)
             runs |= {(case, source): stands.take([row]) for row, source in enumerate(factors)}
             if "all" in factors:
                 recordings[case] = (recorded, fixed)
-                after[case] = _standstill(_recorded(fixed, after_move, seed), SETTLING)
+                after[case] = _standstill(_recorded(fixed, after_move, seed), SETTLING_TIME)
     progress(len(CASES), len(CASES) + 1, "joint free, more and less damping")
     peaks = {key: float(stands.true[0, 1]) for key, stands in runs.items()}
     louder = {factor: (peaks["locked", _louder(factor)], peaks["free", _louder(factor)]) for factor in noises}
     flat = stage.flat()
     damping = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"]) * np.array(DAMPING_RATIOS)
-    damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING)
+    damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING_TIME)
     progress(len(CASES) + 1, len(CASES) + 1, "done")
-    traces = {case: _watched(recorded, SETTLING) for case, (recorded, _) in recordings.items()}
-    logged_each = interval(stage, INTERVAL)
+    traces = {case: _watched(recorded, SETTLING_TIME) for case, (recorded, _) in recordings.items()}
+    logged_each = interval(stage, LONGEST_INTERVAL)
     frequencies = np.fft.rfftfreq(segment(logged_each), logged_each)
     return InPosition(
-        FASTER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
+        FASTER_CROSSOVER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
         float(flat["joint.damping"]), damped, traces, louder,
     ), recordings  # fmt: skip
 
@@ -162,13 +164,13 @@ def _louder(factor: float) -> str:
 
 
 def amplifier_noise(stage: Stage) -> float:
-    """Return the RMS [N] of the drive's force noise, as from rounding to `BITS`.
+    """Return the RMS [N] of the drive's force noise, as from rounding to `FORCE_BITS`.
 
     The bits divide the range between its limits.
     """
     flat = stage.flat()
     limit = flat.get(FORCE_LIMIT, LIMIT_FACTOR * flat.get("friction.static", 1.0))
-    return float(2 * limit / 2**BITS / np.sqrt(12))
+    return float(2 * limit / 2**FORCE_BITS / np.sqrt(12))
 
 
 def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask:
@@ -193,7 +195,7 @@ def _silenced(stage: Stage, sources: Iterable[str]) -> dict[str, Any]:
 def _recorded(
     stage: Stage, task: MoveTask, seed: int, changes: Mapping[str, Any] | None = None, count: int = 1
 ) -> RecordedRuns:
-    (recorded,) = run(stage, task, [seed] * count, interval(stage, INTERVAL), changes)
+    (recorded,) = run(stage, task, [seed] * count, interval(stage, LONGEST_INTERVAL), changes)
     return recorded
 
 
@@ -221,7 +223,7 @@ def segment(step: float) -> int:
 
     Segments overlap by half.
     """
-    return 2 * int(WATCHED / step / (SEGMENTS + 1))
+    return 2 * int(RECORD_LENGTH / step / (SPECTRUM_SEGMENTS + 1))
 
 
 def _rms_and_peak(deviation: np.ndarray) -> np.ndarray:

@@ -35,25 +35,25 @@ from friso.studies.rig.moves_on_rails import (
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.virtual_rig.task import MoveTask
 
-DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
+FRICTION_DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
 """Relative standard deviations of static and of Coulomb friction: our choice."""
 
-LENGTHS = (2.0, 5.0, 10.0, 20.0)
+CORRELATION_LENGTHS = (2.0, 5.0, 10.0, 20.0)
 """Correlation lengths relative to the swing of the cycle on an even rail: our choice."""
 
-HARMONICS = (0.01, 0.02, 0.05, 0.1)
+ELEMENT_HARMONICS = (0.01, 0.02, 0.05, 0.1)
 """Amplitudes of the rolling elements' harmonic, relative to mean friction: our choice."""
 
-PITCH = 4.0
+ELEMENT_PITCH = 4.0
 """Pitch of the rolling elements relative to the swing on an even rail, for a stage that states none."""
 
-STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
+STATIC_FACTORS, COULOMB_FACTORS = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
 """Static and Coulomb friction relative to those of the stage, on an even rail: our choice."""
 
-STARTS = (0.0, 0.005, 0.01, 0.02)
+CYCLE_STARTS = (0.0, 0.005, 0.01, 0.02)
 """Starts of a cycle: the move (0), or a release from a fraction of the move's distance."""
 
-LONGER = 1.5
+LONGER_RUNS = 1.5
 """Length of the runs relative to others, so that slow cycles repeat often enough."""
 
 MASS_FACTOR = 1.47
@@ -63,7 +63,7 @@ MOTORS = (1.0, 1 / MASS_FACTOR)
 """Motor constants relative to the stage's. With the weaker motor, the weighed mass would show the measured mass
 line."""
 
-AS_SLOW, SIMILAR = 1.8, 1.5
+AS_SLOW, SIMILAR_SWING = 1.8, 1.5
 """Thresholds of periods and swings relative to the even rail. A period from the first on is "nearly twice"; swings
 within the second factor are "similar"."""
 
@@ -112,7 +112,7 @@ class CycleComparison:
     def as_measured(self, runs: RailRuns) -> np.ndarray:
         """Return which runs have nearly twice the period of the even rail at a similar swing."""
         swing = self.larger(runs)
-        return (self.slower(runs) >= AS_SLOW) & (swing <= SIMILAR) & (swing >= 1 / SIMILAR)
+        return (self.slower(runs) >= AS_SLOW) & (swing <= SIMILAR_SWING) & (swing >= 1 / SIMILAR_SWING)
 
     @property
     def by_asymmetry(self) -> list[tuple[Share, float]]:
@@ -137,7 +137,9 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """
     locked = with_joint(stage, locked=True)
     crossover(stage)
-    result = compare_cycles(locked, seed, DEVIATIONS, LENGTHS, HARMONICS, len(rails(on_rail(locked))), progress)
+    result = compare_cycles(
+        locked, seed, FRICTION_DEVIATIONS, CORRELATION_LENGTHS, ELEMENT_HARMONICS, len(rails(on_rail(locked))), progress
+    )
     logs, notes = [], ()
     if result.slowest is None:
         notes = ("no varied rail has a slower cycle of a similar swing",)
@@ -170,7 +172,7 @@ def compare_cycles(
     cases = {"rail.static_deviation": first, "rail.coulomb_deviation": first, "rail.correlation_length": second}
     field, asymmetry = moves_on_varied_rails(even, seed, cases, seeds, swing, progress, "rails with a random field")
     shape = (len(deviations), len(long), machines)
-    pitch = stage.flat().get("rail.rolling_pitch", PITCH * swing)
+    pitch = stage.flat().get("rail.rolling_pitch", ELEMENT_PITCH * swing)
     rolling = even.replace({"rail.rolling_pitch": f"{pitch!r} m"})
     waves = {"rail.first_harmonic": np.array(harmonics)}
     rolled, rolled_asymmetry = moves_on_varied_rails(
@@ -196,7 +198,7 @@ def on_rail(stage: Stage) -> Stage:
 
 
 def _longer(task: MoveTask) -> MoveTask:
-    return replace(task, duration=LONGER * task.duration)
+    return replace(task, duration=LONGER_RUNS * task.duration)
 
 
 def started(
@@ -207,7 +209,7 @@ def started(
     `changes` are their keys. Each machine is run from the move and from several other starts; the first run that keeps
     swinging counts, or else the run from the move.
     """
-    tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
+    tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in CYCLE_STARTS]
     runs = [run_moves(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
     all_runs = RailRuns.joined(runs).shaped(len(tasks), count)
     first = np.argmax(all_runs.swings, axis=0)
@@ -244,12 +246,14 @@ def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
     Static friction is at least as large as Coulomb friction.
     """
     flat = stage.flat()
-    motor, first, second = (axis.ravel() for axis in np.meshgrid(MOTORS, STATIC, COULOMB, indexing="ij"))
+    motor, first, second = (
+        axis.ravel() for axis in np.meshgrid(MOTORS, STATIC_FACTORS, COULOMB_FACTORS, indexing="ij")
+    )
     coulomb = second * flat["friction.coulomb"]
     changes = {"friction.static": np.maximum(first * flat["friction.static"], coulomb), "friction.coulomb": coulomb}
     changes["drive.motor_constant_ratio"] = motor * flat.get("drive.motor_constant_ratio", 1.0)
     cycles = started(stage, seed, changes, len(first), progress, "other friction levels")
-    return cycles.shaped(len(MOTORS), len(STATIC), len(COULOMB))
+    return cycles.shaped(len(MOTORS), len(STATIC_FACTORS), len(COULOMB_FACTORS))
 
 
 def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
@@ -281,7 +285,7 @@ def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, Rai
 
 def _with_slowest(result: CycleComparison, even: Stage, seed: int, seeds: np.ndarray) -> CycleComparison:
     """Add the trace over time of the slowest cycle with a similar swing on a random rail."""
-    similar = abs(np.log(result.larger(result.field))) <= np.log(SIMILAR)
+    similar = abs(np.log(result.larger(result.field))) <= np.log(SIMILAR_SWING)
     slower = np.where(similar, np.nan_to_num(result.slower(result.field)), 0.0)
     if not slower.max(initial=0.0) > 1:
         return result

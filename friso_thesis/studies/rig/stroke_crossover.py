@@ -23,11 +23,11 @@ from friso.studies.rig.moves_on_rails import (
 )
 from friso.studies.rig.outcome import Outcome, rig_log
 
-CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
+RELATIVE_CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
 """Crossovers relative to the stage's. The range is that of the thesis's rig (Table 3, Fig. 16); the steps are our
 choice."""
 
-STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
+RELATIVE_STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
 """Strokes relative to the stage's: up to 1 mm in Table 3. The steps are our choice."""
 
 AT_ONCE = 5
@@ -85,7 +85,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     Raises InputError without a joint.
     """
     free = with_joint(stage, locked=False)
-    result = stroke_crossover(free, seed, STROKES, CROSSOVERS, rails(stage), progress)
+    result = stroke_crossover(free, seed, RELATIVE_STROKES, RELATIVE_CROSSOVERS, rails(stage), progress)
     corners = {"joint.stroke": result.strokes[[0, -1]], crossover_key(stage): np.full(2, crossover(stage))}
     recorded = once(free, move(free), [seed, seed], corners)
     logs = []

@@ -18,7 +18,7 @@ from friso.progress import silent
 from friso.stage import Stage
 from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT
 from friso.studies.rig.experiments.frf import (
-    SETTINGS,
+    CROSSOVER_SETTINGS,
     MeasuredLoop,
     Plant,
     apparent_masses,
@@ -72,20 +72,20 @@ COULOMB_LEVEL = 2.0
 """Coulomb friction relative to the rig's, with the weaker motor. It is our choice among the levels of `friso rig
 measured-cycles`."""
 
-SEED = 1
-RAILS = 20
+RAIL_SEED = 1
+RAIL_COUNT = 20
 """Seed and number of the moves and of the varied rails."""
 
-CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
+RELATIVE_CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
 """Crossovers relative to 8 Hz (Sec. 4.3.2)."""
 
-DISPLACEMENTS = (-0.05, 0.05)
+RELEASE_DISTANCES = (-0.05, 0.05)
 """Displacements of the releases over the distance of the move: 5 mm to either side."""
 
-STROKES, LOOPS = np.array([0.02, 0.1, 0.3, 1.0]), np.array([3.0, 4.0, 5.0, 6.0, 8.0, 12.0]) / 8
-"""Strokes over the rig's and crossovers over 8 Hz, for Fig. 26. Each cell has `RAILS`."""
+RELATIVE_STROKES, STROKE_CROSSOVERS = np.array([0.02, 0.1, 0.3, 1.0]), np.array([3.0, 4.0, 5.0, 6.0, 8.0, 12.0]) / 8
+"""Strokes over the rig's and crossovers over 8 Hz, for Fig. 26. Each cell has `RAIL_COUNT`."""
 
-NOISES = (0.1, 0.3, 1.0, 3.0, 10.0)
+NOISE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
 """Factors on friso's choice of the drive's force noise in Fig. 28, which the thesis does not state."""
 
 
@@ -137,38 +137,47 @@ def moves(stage: Stage) -> MovesOnRails:
     """Run the moves of Fig. 24 and 25 with the rig's real drive on several rails."""
     machine = _prescribed(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
-    seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
+    seeds, frequencies = 1.0 + np.arange(float(RAIL_COUNT)), crossover(machine) * RELATIVE_CROSSOVERS
     keys = CROSSOVER
     held = run_moves(
-        locked, move(machine), numbers_of(SEED, len(CROSSOVERS), RAILS), on_rails(machine, {keys: frequencies}, seeds)
+        locked,
+        move(machine),
+        numbers_of(RAIL_SEED, len(RELATIVE_CROSSOVERS), RAIL_COUNT),
+        on_rails(machine, {keys: frequencies}, seeds),
     )
     first, second = (on_rails(machine, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
-    loose = run_moves(free, move(machine), numbers_of(SEED, 1, RAILS), first)
-    tasks = [released(machine, share * distance(machine)) for share in DISPLACEMENTS]
-    let_go = RailRuns.joined([run_moves(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
-    return MovesOnRails(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
+    loose = run_moves(free, move(machine), numbers_of(RAIL_SEED, 1, RAIL_COUNT), first)
+    tasks = [released(machine, share * distance(machine)) for share in RELEASE_DISTANCES]
+    let_go = RailRuns.joined([run_moves(locked, task, numbers_of(RAIL_SEED, 1, RAIL_COUNT), second) for task in tasks])
+    return MovesOnRails(
+        frequencies, held.shaped(len(RELATIVE_CROSSOVERS), RAIL_COUNT), loose, let_go.shaped(len(tasks), RAIL_COUNT)
+    )
 
 
 def grid(stage: Stage) -> StrokeCrossover:
     """Run moves with the real drive over strokes and crossovers, as far as limits need (Fig. 26)."""
-    seeds = 1.0 + np.arange(float(RAILS))
-    return limits_of_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds)
+    seeds = 1.0 + np.arange(float(RAIL_COUNT))
+    return limits_of_crossover(
+        with_joint(_prescribed(stage), locked=False), RAIL_SEED, RELATIVE_STROKES, STROKE_CROSSOVERS, seeds
+    )
 
 
 def cycles(stage: Stage) -> CyclesOnRails:
     """Run cycles on an even rail and on varied rails, with the joint locked (Fig. 27)."""
     machine = _prescribed(stage)
     even = on_rail(with_joint(machine, locked=True))
-    run = started(even, SEED, {}, 1, silent, "")
+    run = started(even, RAIL_SEED, {}, 1, silent, "")
     swing = float(run.swing[0]) if run.swings[0] else 0.01 * distance(machine)
     flat = machine.flat()
     cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
-    rails, asymmetry = moves_on_varied_rails(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")
+    rails, asymmetry = moves_on_varied_rails(
+        even, RAIL_SEED, cases, 1.0 + np.arange(float(RAIL_COUNT)), swing, silent, ""
+    )
     changes = {
         "drive.motor_constant_ratio": np.array([MOTORS[1] * flat.get("drive.motor_constant_ratio", 1.0)]),
         "friction.coulomb": np.array([COULOMB_LEVEL * flat["friction.coulomb"]]),
     }
-    return CyclesOnRails(run, rails, asymmetry, started(even, SEED, changes, 1, silent, ""))
+    return CyclesOnRails(run, rails, asymmetry, started(even, RAIL_SEED, changes, 1, silent, ""))
 
 
 _FIELD = tuple(key.removeprefix("rail.") for key in AS_BUILT if key.startswith("rail.") and key != "rail.seed")
@@ -176,7 +185,7 @@ _FIELD = tuple(key.removeprefix("rail.") for key in AS_BUILT if key.startswith("
 
 def standstill(stage: Stage) -> InPosition:
     """Run the rig with its real drive at a standstill under each disturbance (Fig. 28)."""
-    return in_position(rig_with_drive(stage), SEED, silent, NOISES)[0]
+    return in_position(rig_with_drive(stage), RAIL_SEED, silent, NOISE_FACTORS)[0]
 
 
 @dataclass(frozen=True)
@@ -196,13 +205,13 @@ class RailTraces:
 def traces(stage: Stage, rail: int) -> RailTraces:
     """Run single moves on a numbered rail, from 0, and on an even one (Fig. 24, 25, 27)."""
     machine = _prescribed(stage)
-    frequencies, task, length = crossover(machine) * CROSSOVERS, move(machine), distance(machine)
+    frequencies, task, length = crossover(machine) * RELATIVE_CROSSOVERS, move(machine), distance(machine)
     held, loose = (with_joint(machine, locked) for locked in (True, False))
     key = CROSSOVER
     place = {"rail.seed": 1.0 + rail}
-    locked = once(held, task, [SEED + rail] * len(frequencies), {key: frequencies, **place})
-    free = once(loose, task, [SEED + rail], {key: frequencies[:1], **place})
-    even = once(on_rail(held), task, [SEED])
+    locked = once(held, task, [RAIL_SEED + rail] * len(frequencies), {key: frequencies, **place})
+    free = once(loose, task, [RAIL_SEED + rail], {key: frequencies[:1], **place})
+    even = once(on_rail(held), task, [RAIL_SEED])
     logged = locked.logged["position"] - length
     moves = {("locked", float(f)): row for f, row in zip(frequencies, logged, strict=True)}
     moves |= {("free", float(frequencies[0])): free.logged["position"][0] - length}
@@ -234,8 +243,8 @@ def rig_loops(stage: Stage) -> RigLoops:
     """Measure the loops of a rig with its real drive."""
     built = rig_with_drive(stage)
     fixed, free, place = locked_stage(built), freed(built), travel(built)[0]
-    log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)
-    settings, stable = stable_settings(free, place, SEED)
-    apparent = np.array([apparent_masses(machine, place, SEED) for machine in (fixed, free)])
-    _, loops = open_loops(fixed, place, SEED, SETTINGS)
+    log = rig_log(excite(free, place, RAIL_SEED), 0, "free", "frequency", free, RAIL_SEED)
+    settings, stable = stable_settings(free, place, RAIL_SEED)
+    apparent = np.array([apparent_masses(machine, place, RAIL_SEED) for machine in (fixed, free)])
+    _, loops = open_loops(fixed, place, RAIL_SEED, CROSSOVER_SETTINGS)
     return RigLoops(loops, measured_loop(log, pace(built)), free_plant([log]), settings, stable, apparent)

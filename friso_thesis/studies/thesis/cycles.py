@@ -22,13 +22,13 @@ from friso_thesis.studies.thesis.studies import ThesisStudy
 if TYPE_CHECKING:
     import xarray as xr
 
-SURVEYED = 14
+SURVEYED_VALUES = 14
 """Approximate number of values per axis at which stages are surveyed. Each survey takes a hundred runs."""
 
-NODES = 9
+CURVE_NODES = 9
 """Number of stages along either axis from which curves are searched for."""
 
-SMALLEST = 1e-3
+SMALLEST_SHARE = 1e-3
 """Start of curves on a linear range that begins at zero, as a fraction of the range. There may be no stage at zero."""
 
 
@@ -142,7 +142,7 @@ def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
 
 def every(values: int) -> int:
     """Return the step between surveyed values on a map axis that has `values` values."""
-    return max(1, round((values - 1) / (SURVEYED - 1)))
+    return max(1, round((values - 1) / (SURVEYED_VALUES - 1)))
 
 
 def _survey(coarse: xr.Dataset) -> dict[str, np.ndarray]:
@@ -179,7 +179,7 @@ def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
     source = study_of(runs)
     ranges = tuple(_range(runs[span.key].values, span.key, span.log) for span in study.spans)
     space = Space(ranges, lambda values: flat_cells(source.stage, source.links, values))
-    curves = edge_curves(space, nodes=NODES)
+    curves = edge_curves(space, nodes=CURVE_NODES)
     lines = [space.values(curve.points) for curve in curves]
     x, y = (swept.key for swept in ranges)
     return tuple(Edge(curve.kind, line[x], line[y]) for curve, line in zip(curves, lines, strict=True))
@@ -187,4 +187,4 @@ def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
 
 def _range(values: np.ndarray, key: str, log: bool) -> KeyRange:
     low, high = float(values[0]), float(values[-1])
-    return KeyRange(key, low if low > 0 else SMALLEST * high, high, log)
+    return KeyRange(key, low if low > 0 else SMALLEST_SHARE * high, high, log)

@@ -29,7 +29,7 @@ from friso.studies.rig.outcome import freed, locked_stage, pace
 from friso_thesis.studies.rig.in_position import InPosition
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import (
-    SEED,
+    RAIL_SEED,
     CyclesOnRails,
     MovesOnRails,
     RailTraces,
@@ -46,28 +46,28 @@ from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import PartNeeded
 from friso_thesis.studies.thesis.studies import LOCKED
 
-FORCE = 5.0
+FORCE_AMPLITUDE = 5.0
 """Force amplitude [N] of the identification with the joint locked, which the thesis does not give: some times the
 friction that it finds."""
 
-RANGE, PLACES, COULOMB = (1.0, 2.5), 4, 1 / 3
+STATIC_RANGE, RAIL_PLACES, COULOMB_SHARE = (1.0, 2.5), 4, 1 / 3
 """Static friction by Fig. 20 [N], over which the places of the rail spread evenly; number of places; and Coulomb
 friction as a fraction of static friction (as in Table 2). Number and fraction are our choice."""
 
-FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)
+RESPONSE_FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)
 """Frequencies [Hz] of the response with friction."""
 
 SAMPLE_TIME = 1e-3
 """Sample time of the records [s]: the thesis gives none."""
 
-STEP, STEPS, STANDS = 0.3e-3, (1, 1, -1, -1, 1, -1), 2.0
+STEP_SIZE, STEP_DIRECTIONS, STANDING_TIME = 0.3e-3, (1, 1, -1, -1, 1, -1), 2.0
 """Size of a step [m] (Sec. 4.2.2), directions of the steps, and the time [s] for which each stands. The latter two are
 our choice."""
 
 FIXED_CART = "1e9 kg"
 """Mass of a cart that does not move: 1 N displaces it by less than a thousandth of a micrometre in 10 s."""
 
-SLOW, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
+SLOW_SPEEDS, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
 """Speeds of slow motion [m/s], and their time [s]. The thesis gives neither; the speeds go up to the slower one of Fig.
 21."""
 
@@ -80,7 +80,7 @@ class LockedLine:
     """The locked rig's response as measured at several places of the rail (Fig. 17).
 
     Magnitude and phase [rad] over those of the mass line have the shape (places, frequencies). The scatter of the phase
-    over the places [rad] has the shape (frequencies,). All are at FREQUENCIES.
+    over the places [rad] has the shape (frequencies,). All are at RESPONSE_FREQUENCIES.
     """
 
     magnitude: np.ndarray
@@ -207,9 +207,10 @@ def _experiment(name: str, stage_file: str) -> Any:
 def locked_line(stage: Stage) -> LockedLine:
     """Simulate the locked rig's response to sines of force, with friction as at several places."""
     places = [
-        {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
+        {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB_SHARE * f} N"}
+        for f in np.linspace(*STATIC_RANGE, RAIL_PLACES)
     ]
-    line = mass_line(stage.replace(dict(LOCKED)), places, [FORCE], FREQUENCIES)
+    line = mass_line(stage.replace(dict(LOCKED)), places, [FORCE_AMPLITUDE], RESPONSE_FREQUENCIES)
     return LockedLine(line["magnitude"].values[:, 0], line["phase"].values[:, 0], line["spread_phase"].values[0])
 
 
@@ -219,14 +220,14 @@ def joint_steps(stage: Stage) -> JointSteps:
     The limiter is not touched, so the rig is linear. The response to all steps is the sum of the responses to each.
     """
     fixed = stage.replace({"masses.cart": FIXED_CART, "joint.stroke": STROKE, "joint.locked": False})
-    duration = STANDS * (len(STEPS) + 1)
+    duration = STANDING_TIME * (len(STEP_DIRECTIONS) + 1)
     run = simulate(
-        _with_motion(fixed, kind="step", size=f"{STEP!r} m", duration=f"{duration} s"), sample_time=SAMPLE_TIME
+        _with_motion(fixed, kind="step", size=f"{STEP_SIZE!r} m", duration=f"{duration} s"), sample_time=SAMPLE_TIME
     )
-    count, signals = round(STANDS / SAMPLE_TIME), {}
+    count, signals = round(STANDING_TIME / SAMPLE_TIME), {}
     for name in ("reference", "position", "force"):
-        step, total = run[name].values, np.zeros(count * (len(STEPS) + 1))
-        for number, direction in enumerate(STEPS, start=1):
+        step, total = run[name].values, np.zeros(count * (len(STEP_DIRECTIONS) + 1))
+        for number, direction in enumerate(STEP_DIRECTIONS, start=1):
             total[number * count :] += direction * step[: len(total) - number * count]
         signals[name] = total
     log = record("0.3 mm steps, cart fixed", SAMPLE_TIME, **signals)
@@ -243,7 +244,7 @@ def slow_motion(stage: Stage, speed: float) -> SlowMotion:
 
 def constant_speed(machine: Stage) -> ConstantSpeed:
     """Simulate passes over 150 mm with the real drive, there and back at both speeds."""
-    whole, flat = passes_log("constant speed", machine, SEED).log, machine.flat()
+    whole, flat = passes_log("constant speed", machine, RAIL_SEED).log, machine.flat()
     stretches = passes(whole)
     log = replace(whole, segments=tuple(stretch.span for stretch in stretches))
     friction = friction_position(whole, flat["masses.cart"] + flat["masses.stage"], pace(machine))
@@ -279,7 +280,7 @@ _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
     {
         LINE: locked_line,
         STEPPED: joint_steps,
-        SLIPS: lambda stage: tuple(slow_motion(stage, speed) for speed in SLOW),
+        SLIPS: lambda stage: tuple(slow_motion(stage, speed) for speed in SLOW_SPEEDS),
         SPEEDY: lambda stage: tuple(constant_speed(joint(rig_with_drive(stage))) for joint in (freed, locked_stage)),
         BUILT: rig_loops,
         MOVES: moves,

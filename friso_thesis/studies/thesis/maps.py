@@ -54,7 +54,7 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
         with np.errstate(divide="ignore", invalid="ignore"):
             inside, outside = (np.log(size[row, columns]) for row in (last, after))
             between = inside / (inside - outside)
-        share = np.where((inside > 0) & (outside < 0) & (outside > np.log(GONE)), between, share)
+        share = np.where((inside > 0) & (outside < 0) & (outside > np.log(GONE_SWING)), between, share)
     within = values[last] + share * (values[after] - values[last])
     return np.where(last < 0, values[0], within)
 
@@ -77,7 +77,7 @@ def limit_error(values: np.ndarray, limits: int = 1) -> float:
     return min(step / 2, step / (3 * limits) ** 0.5)
 
 
-GONE = 1e-3
+GONE_SWING = 1e-3
 """Swing, over the least that counts, below which no swing is left."""
 
 

@@ -21,23 +21,23 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
-from friso_thesis.studies.thesis.space import OPEN, SEED, Draw, baseline, draw, enters
+from friso_thesis.studies.thesis.space import DRAW_SEED, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
 
-DRAWS, EVERY = 48, 3
+DRAW_COUNT, ANALYSED_EVERY = 48, 3
 """Default number of joint draws, and interval between draws with linear analysis and experiments, which take longer
 than all maps."""
 
-POINTS = 21
+MAP_POINTS = 21
 """Values per axis of the maps of a draw, whatever the baseline has. Limits are interpolated."""
 
 DRAW_RTOL = 1e-5
 """Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
 
-MAP_WORK, COSTLY_WORK = POINTS**2 * len(STUDIES), 6 * POINTS**2 * len(STUDIES)
+MAP_WORK, COSTLY_WORK = MAP_POINTS**2 * len(STUDIES), 6 * MAP_POINTS**2 * len(STUDIES)
 """Progress steps for the maps of a draw, and for its linear analysis and experiments."""
 
-DOUBT = 0.05
+CHANCE_PROBABILITY = 0.05
 """Probability of a chance separation above which it is not reported, for all values of a claim together."""
 
 PARTS = {**NEEDS, **EXPERIMENTS}
@@ -113,8 +113,8 @@ class BestFit:
     """The random choice of open values whose numbers are nearest to the printed ones.
 
     friso's own choice counts as one, numbered -1. `misfit` is the root mean square of the logarithms of found over
-    printed numbers, and `at_baseline` that of friso's choice. All are on maps of `POINTS` values per axis. `numbers`
-    are the numbers compared.
+    printed numbers, and `at_baseline` that of friso's choice. All are on maps of `MAP_POINTS` values per axis.
+    `numbers` are the numbers compared.
     """
 
     draw: Draw
@@ -127,8 +127,8 @@ class BestFit:
 class Plausible:
     """Results on all claims, by name, for random choices of the open values.
 
-    There are the best fit (None without draws), and the findings at friso's `own` choice, on maps of `POINTS` values
-    per axis.
+    There are the best fit (None without draws), and the findings at friso's `own` choice, on maps of `MAP_POINTS`
+    values per axis.
     """
 
     draws: tuple[Draw, ...]
@@ -142,9 +142,9 @@ def plausible(
 ) -> Plausible:
     """Judge the claims for `draws` random choices of the values that the thesis leaves open.
 
-    Claims on linear analysis or experiments are judged in one of `EVERY` draws. Claims on maps and responses alone are
-    also judged at friso's own choice, which may be the best fit. `kept` has saved findings, and `tally` counts the
-    progress.
+    Claims on linear analysis or experiments are judged in one of `ANALYSED_EVERY` draws. Claims on maps and responses
+    alone are also judged at friso's own choice, which may be the best fit. `kept` has saved findings, and `tally`
+    counts the progress.
     """
     cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
     costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
@@ -153,10 +153,10 @@ def plausible(
     by_claim_tried: dict[str, list[tuple[Draw, Finding | None]]] = {name: [] for name in (*cheap, *costly)}
     failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
     pieces = [(one, cheap, MAP_WORK) for one in (*drawn, baseline()) if drawn and cheap]
-    pieces += [(one, costly, COSTLY_WORK) for one in drawn[EVERY - 1 :: EVERY] if costly]
+    pieces += [(one, costly, COSTLY_WORK) for one in drawn[ANALYSED_EVERY - 1 :: ANALYSED_EVERY] if costly]
 
     def judged(one: Draw, group: Mapping[str, Registered], work: int) -> Findings:
-        about = ("draw", sorted(group), POINTS, DRAW_RTOL, SEED, one.number)
+        about = ("draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
         findings = kept.findings(about, partial(_judged, group, one))
         if tally:
             tally.add(work, f"{one.name} of {draws}" if one in drawn else "friso's own choice")
@@ -182,7 +182,7 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
     """Return the amount of work for `draws` random rigs, in units of the progress tally."""
     cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
     costly = any(entry.needs & PARTS.keys() for entry in entries.values())
-    return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK
+    return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // ANALYSED_EVERY) * COSTLY_WORK
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:
@@ -197,7 +197,7 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
     """
     needs = {need for entry in entries.values() for need in entry.needs}
     try:
-        base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
+        base = evidence(needs, MAP_POINTS, DRAW_RTOL, changes=one.changes)
     except _SHOWS_NOTHING as error:
         return {f"{name} {FAILED}": _failure(error) for name in entries}
     findings: Findings = {}
@@ -229,7 +229,7 @@ def _in_space(
     decided = [(one, finding) for one, finding in findings if finding.judgement == "holds" or False in finding.pattern]
     holds = np.array([finding.judgement == "holds" for _, finding in decided], bool)
     return ClaimInSpace(
-        tuple((SEED, one.number) for one, _ in tried),
+        tuple((DRAW_SEED, one.number) for one, _ in tried),
         _share(holds, len(tried)),
         int(holds.sum()),
         tuple(_met(column, len(tried)) for column in zip(*(finding.pattern for _, finding in findings), strict=True)),
@@ -271,7 +271,7 @@ def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) ->
     for value in values:
         numbers = np.array([one.values[value.name] for one in drawn])
         every.append(Separation(value.name, *separation(numbers, holds)))
-    chosen = [item for item in every if item.chance < DOUBT / len(values)]
+    chosen = [item for item in every if item.chance < CHANCE_PROBABILITY / len(values)]
     yield from sorted(chosen, key=lambda item: -abs(item.correlation))
 
 

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import cast
 
 from friso.quantities import percent
-from friso_thesis.studies.rig.measured_cycles import AS_SLOW, SIMILAR
+from friso_thesis.studies.rig.measured_cycles import AS_SLOW, SIMILAR_SWING
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class WordReading:
     half: float = 0.5
     long: float = 0.5
     twice: float = AS_SLOW
-    similar: float = SIMILAR
+    similar: float = SIMILAR_SWING
     unequal: float = 1.1
     uneven: float = 0.05
 

@@ -30,7 +30,7 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence, map_of
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS, Experiments
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS, Linear
-from friso_thesis.studies.thesis.plausible import DRAWS, PARTS, Plausible, counted, plausible, work_of
+from friso_thesis.studies.thesis.plausible import DRAW_COUNT, PARTS, Plausible, counted, plausible, work_of
 from friso_thesis.studies.thesis.reading import others_of, read_as, words_read
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
@@ -38,26 +38,26 @@ from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verd
 if TYPE_CHECKING:
     import xarray as xr
 
-POINTS, MOST_POINTS = 41, 1001
+MAP_POINTS, MOST_POINTS = 41, 1001
 """Default and largest number of values per axis. The default gives 0.4 Hz steps in Fig. 16, the largest a million cells
 per map."""
 
-JUDGED = 21
+JUDGED_POINTS = 21
 """Smallest number of values per axis of maps on which claims are judged. Coarser maps miss regions between two values,
 and "few" or a trend has no meaning on a handful of cells."""
 
 MOST_DRAWS = 10_000
 
-RTOL = 1e-4
+THESIS_RTOL = 1e-4
 """The thesis's relative tolerance (Sec. 3.2.3)."""
 
-VERIFIED = 0.05
+VERIFIED_SHARE = 0.05
 """Fraction of the cells of a shown map that are run again at a tighter tolerance."""
 
-TIGHT = 1e-8
+TIGHT_RTOL = 1e-8
 """Second relative tolerance for Fig. 14B, besides the thesis's own."""
 
-SHOWN = (1e-2, 3e3)
+SHOWN_FREQUENCIES = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
 PART_WORK, LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 6000, 5000, 65_000
@@ -99,26 +99,26 @@ class Reproduction:
 
 def reproduce(
     names: Iterable[str] | None = None,
-    points: int = POINTS,
+    points: int = MAP_POINTS,
     rtol: float = 1e-6,
     progress: Progress = silent,
     with_cycles: bool = True,
-    draws: int = DRAWS,
+    draws: int = DRAW_COUNT,
     only: Iterable[str] | None = None,
     kept: Kept = NOT_KEPT,
 ) -> Reproduction:
     """Run the studies `names` (default: all of Table 3), and judge the claims.
 
-    Maps have `points` values per axis, and for judging at least `JUDGED`. With `only`, just these claims are judged,
-    with what they need; a claim that is left out is "not yet covered". `with_cycles` also computes the hunting cycles
-    behind every map, and adds to each judgement what attracts the stages. With `draws`, every claim is judged in as
-    many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not computed again.
-    `progress` is called with steps done, steps in all and what comes next. Raises InputError for an unknown study or
-    claim and for numbers that are too low or too high, ValueError for an unusable rtol.
+    Maps have `points` values per axis, and for judging at least `JUDGED_POINTS`. With `only`, just these claims are
+    judged, with what they need; a claim that is left out is "not yet covered". `with_cycles` also computes the hunting
+    cycles behind every map, and adds to each judgement what attracts the stages. With `draws`, every claim is judged in
+    as many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not computed
+    again. `progress` is called with steps done, steps in all and what comes next. Raises InputError for an unknown
+    study or claim and for numbers that are too low or too high, ValueError for an unusable rtol.
     """
     chosen, asked = _studies(names), _claims(only)
     _check("points", points, 3, MOST_POINTS, "41")
-    _check("draws", draws, 0, MOST_DRAWS, str(DRAWS))
+    _check("draws", draws, 0, MOST_DRAWS, str(DRAW_COUNT))
     entries = {
         name: entry
         for name, entry in registered().items()
@@ -127,7 +127,7 @@ def reproduce(
     needs = _needs(entries, chosen, asked)
     studies = {name: study for name, study in chosen.items() if name in needs}
     parts = sorted(needs & PARTS.keys())
-    judged_points = max(points, JUDGED)
+    judged_points = max(points, JUDGED_POINTS)
     half = -(-judged_points // 2)
     total = len(studies) * (judged_points**2 + half**2) + PART_WORK * len(parts) + work_of(entries, draws)
     total += with_cycles * sum(map(_survey_work, studies.values())) + 2 * points**2 * ("isolator-damping" in studies)
@@ -137,9 +137,9 @@ def reproduce(
     maps: dict[str, xr.Dataset] = {}
     loose: dict[str, xr.Dataset] = {}
     for name, study in studies.items():
-        maps[name] = map_of(study, judged_points, rtol, VERIFIED, kept=kept)
+        maps[name] = map_of(study, judged_points, rtol, VERIFIED_SHARE, kept=kept)
         tally.add(judged_points**2, f"map {study.panel}")
-        loose[name] = map_of(study, half, RTOL, kept=kept)
+        loose[name] = map_of(study, half, THESIS_RTOL, kept=kept)
         tally.add(half**2, f"map {study.panel} at the thesis's tolerance")
     base = replace(base, maps=maps)
     tolerances = _tolerances(studies, points, kept, tally)
@@ -182,11 +182,11 @@ def reproduce(
         else _left_out(claim, chosen)
         for claim in claims()
     )
-    curves = bode(thesis_rig(), SHOWN, series=True) if base.linear is not None else None
+    curves = bode(thesis_rig(), SHOWN_FREQUENCIES, series=True) if base.linear is not None else None
     judged = by_way(base, by_peak_count)
     shown = judged.maps
     if points < judged_points:
-        shown = {name: by_peak_count(map_of(study, points, rtol, VERIFIED)) for name, study in studies.items()}
+        shown = {name: by_peak_count(map_of(study, points, rtol, VERIFIED_SHARE)) for name, study in studies.items()}
     return Reproduction(
         shown, judged.maps, judged.responses, base.linear, curves, base.identified if parts else None,
         frozenset(parts) & EXPERIMENTS.keys(), tolerances,
@@ -246,7 +246,7 @@ def _others(
     """
     grids = {
         "every second value of each axis": {name: _second(runs) for name, runs in base.maps.items()},
-        f"the thesis's relative tolerance, {RTOL:g},": dict(loose),
+        f"the thesis's relative tolerance, {THESIS_RTOL:g},": dict(loose),
     }
     return {
         method: {
@@ -278,7 +278,7 @@ def _tolerances(studies: Mapping[str, ThesisStudy], points: int, kept: Kept, tal
     """Return the map of Fig. 14B at the thesis's tolerance and at a tight one, by tolerance."""
     maps = {}
     for study in studies.values():
-        for tolerance in (RTOL, TIGHT) if study.panel == "14B" else ():
+        for tolerance in (THESIS_RTOL, TIGHT_RTOL) if study.panel == "14B" else ():
             maps[tolerance] = by_peak_count(map_of(study, points, tolerance, kept=kept))
             tally.add(points**2, f"map 14B at {tolerance:g}")
     return maps

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 LIMITER_PULLS = "joint.limiter_pulls"
 
-SEED = 1
+DRAW_SEED = 1
 """Seed of the draws. Seed and number determine a draw, whatever the total number."""
 
 _OPEN_JOINT_KEYS = frozenset({"joint.damping", LIMITER_PULLS})
@@ -176,7 +176,7 @@ def draw(number: int) -> Draw:
 
     The values are independent of each other, and of choices with other numbers.
     """
-    shares = np.random.default_rng([SEED, number]).random(len(OPEN))
+    shares = np.random.default_rng([DRAW_SEED, number]).random(len(OPEN))
     return Draw(number, {value.name: value.at(float(share)) for value, share in zip(OPEN, shares, strict=True)})
 
 

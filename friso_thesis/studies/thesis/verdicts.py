@@ -12,7 +12,7 @@ from friso_thesis.studies.thesis.claims import Claim, ClaimJudgement, Finding
 from friso_thesis.studies.thesis.plausible import ClaimInSpace
 from friso_thesis.studies.thesis.space import OPEN
 
-ROBUST = 0.25
+ROBUST_SHARE = 0.25
 """Largest fraction of the space in which a claim may hold while its contradiction counts as robust. Thirteen draws in
 which it does not hold show that."""
 
@@ -65,10 +65,10 @@ class ClaimVerdict:
         """Tell whether a claim fails for every plausible choice of what is left open.
 
         The claim holds in no draw of the open values, and there are enough draws: the upper end of the 95 % interval of
-        the fraction in which it holds is at most `ROBUST`. No assumption outside the draws decides on it.
+        the fraction in which it holds is at most `ROBUST_SHARE`. No assumption outside the draws decides on it.
         """
         fails = self.judgement in ("holds in part", "differs")
-        return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST)
+        return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST_SHARE)
 
     @property
     def dependence(self) -> str:

@@ -21,7 +21,7 @@ from friso.identification.logs.text import as_numbers, read_frame
 from friso.identification.logs.units import spelled
 from friso.quantities import quoted
 
-_FILETIME = 1e15
+LEAST_FILETIME = 1e15
 """Value above which a time is a FILETIME, which counts 100 ns since 1601 (1.3e17 in 2022). As milliseconds the value
 would be 30 000 years. A double resolves a FILETIME to 16 steps, 1.6 us, which the fit of an even time base averages
 out."""
@@ -102,7 +102,7 @@ def _channels(
         if not time.size:
             notes.append(f"left out: {', '.join(labels[start + 1 : end])}, without samples")
             continue
-        seconds = (time - time[0]) * 1e-7 if time[0] > _FILETIME else time * 1e-3
+        seconds = (time - time[0]) * 1e-7 if time[0] > LEAST_FILETIME else time * 1e-3
         for column in range(start + 1, end):
             if not labels[column]:
                 continue  # files of old versions end each row with a delimiter

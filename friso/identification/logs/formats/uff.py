@@ -14,7 +14,7 @@ from friso.identification.logs.format import LogFormat
 from friso.identification.logs.measured_response import MeasuredResponse, check_response, response_unit
 from friso.identification.logs.units import unit_factor
 
-TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
+TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE_TYPE = 1, 4, 6
 """Function types in record 6 of a dataset 58."""
 _SYSTEMS = {
     1: ("m", "N"),
@@ -106,7 +106,7 @@ def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray |
         actual = f"{len(responses)} frequency responses: {', '.join(label(d, 'id1') for d in responses)}".rstrip(": ")
         raise LogError("log", actual, "a file with one frequency response", "", str(path))
     axis = _axis(responses[0])
-    fitting = [d for d in sets if d["func_type"] == COHERENCE and np.size(d["data"]) == axis.size]
+    fitting = [d for d in sets if d["func_type"] == COHERENCE_TYPE and np.size(d["data"]) == axis.size]
     coherence = np.real(fitting[0]["data"]).astype(float) if len(fitting) == 1 else None
     return responses[0], axis, coherence
 

@@ -30,13 +30,13 @@ from friso.shown.drawing.prefixes import range_with_unit
 FORCE = "force"
 """Name of the figure that opens the page."""
 
-WORST = 5.0
+LARGEST_MISFIT = 5.0
 """Upper end of the axis of a profile, in units of the misfit at the ends of the 95 % interval."""
 
-WIDE = 8.0
+LOGARITHMIC_RATIO = 8.0
 """Ratio of its ends above which a profile has a logarithmic axis."""
 
-LONG = 40.0
+SHOWN_PERIODS = 40.0
 """Length of the force record at the head of the page, in periods of the motion's bandwidth."""
 
 PALE = "#dbe9f4"
@@ -69,7 +69,7 @@ def _liveliest(moves: IdentifiedMoves) -> slice:
     """Return the samples of the stretch of a log with the most motion, a few periods long."""
     position = moves.log["position"][moves.part]
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
-    length = min(len(position), max(2, round(LONG / (moves.inverse.bandwidth * moves.log.sample_time))))
+    length = min(len(position), max(2, round(SHOWN_PERIODS / (moves.inverse.bandwidth * moves.log.sample_time))))
     first = int(np.argmax(way[length - 1 :] - way[: len(way) - length + 1]))
     return slice(first, first + length)
 
@@ -187,7 +187,8 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
     panels = tuple(_profile(profile, parameters[key], best, key in fitted) for key, profile in moves.profiles.items())
     caption = (
         "How much worse the best fit gets with one parameter held and the others refitted; 1 is the end of "
-        f"the 95 % interval (shaded), drawn up to {WORST:g}. Where a curve stays below 1 to the end of its range, the "
+        f"the 95 % interval (shaded), drawn up to {LARGEST_MISFIT:g}. Where a curve stays below 1 to the end of its "
+        "range, the "
         "record does not determine the parameter."
     )
     if any((profile.cost < best - (profile.limit - best)).any() for profile in moves.profiles.values()):
@@ -205,16 +206,16 @@ def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: boo
     determine the parameter, which sets the colour.
     """
     worse = (profile.cost - best) / (profile.limit - best)
-    log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]
+    log = parameter.logarithmic and profile.values[-1] > LOGARITHMIC_RATIO * profile.values[0]
     lowest = min(-0.2, 1.2 * float(worse.min()))
-    y = Axis("Worse by", "", (lowest, WORST))
+    y = Axis("Worse by", "", (lowest, LARGEST_MISFIT))
     unit = unit_of(parameter.unit)
     ends = (float(profile.values[0]), float(profile.values[-1]))
     x = Axis(name_of(profile.name), unit, ends, log=log, prefixed=log or unit.startswith("m"))
-    shade = Band(np.array([profile.low, profile.high]), np.full(2, lowest), np.full(2, WORST), "", PALE)
+    shade = Band(np.array([profile.low, profile.high]), np.full(2, lowest), np.full(2, LARGEST_MISFIT), "", PALE)
     colour = BLUE if fitted else ORANGE
     line = Series(profile.values, np.where(np.isfinite(worse), worse, np.nan), "", colour)
-    points = Markers(profile.values, np.where(worse <= WORST, worse, np.nan), "", colour)
+    points = Markers(profile.values, np.where(worse <= LARGEST_MISFIT, worse, np.nan), "", colour)
     return Panel("", x, y, (line,), (points,), (Limit((1.0,), "", INK),), bands=(shade,))
 
 

@@ -18,7 +18,7 @@ from friso.shown.documents import entries
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.drawing.palette import BLUE, INK, ORANGE
 
-POINTS, CURVE = 5000, 200
+RECORD_POINTS, CURVE_POINTS = 5000, 200
 """Numbers of points drawn: of a record of slow sliding, and of the curve at steady velocities."""
 
 
@@ -59,7 +59,7 @@ def slow_sliding_caption(result: SlowSliding) -> str:
 def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
     """Draw measured and modelled friction over time and over velocity."""
     friction = Axis("Friction, low-passed", "N")
-    thinned = slice(None, None, max(len(result.time) // POINTS, 1))
+    thinned = slice(None, None, max(len(result.time) // RECORD_POINTS, 1))
 
     def both(x: np.ndarray) -> tuple[Series, ...]:
         """Draw measured and modelled friction over a signal."""
@@ -77,7 +77,7 @@ def _steady_friction(result: SlowSliding) -> tuple[Series, ...]:
     coulomb, static, stribeck = (estimate.value for estimate in result.estimates)
     if not all(estimate.determined for estimate in result.estimates):
         return ()
-    speeds = np.linspace(0, float(np.abs(result.velocity).max()), CURVE)
+    speeds = np.linspace(0, float(np.abs(result.velocity).max()), CURVE_POINTS)
     level = stribeck_curve(speeds, coulomb, static, stribeck, result.exponent)
     velocities, forces = (np.concatenate([-values[::-1], [np.nan], values]) for values in (speeds, level))
     return (Series(velocities, forces, "at steady velocity", BLUE, width=2.0),)

@@ -16,7 +16,7 @@ from friso.questions.rig.outcome_view import OutcomeView
 from friso.shown.drawing.figure import Array, Axis, Figure, Limit, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, INK, LIGHT, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import listed, pretty, with_unit
-from friso.studies.rig.experiments.frf import RATIOS, Frf, MeasuredLoop, Plant, crossing_near_target
+from friso.studies.rig.experiments.frf import MOTOR_CONSTANT_RATIOS, Frf, MeasuredLoop, Plant, crossing_near_target
 from friso.studies.rig.outcome import Outcome
 
 COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
@@ -39,8 +39,9 @@ def sentences(outcome: Outcome) -> list[str]:
         f"{with_unit(result.locked.band[0], 'Hz')} to {with_unit(result.locked.band[1], 'Hz')}.",
         f"Joint free: first mode near {with_unit(result.free.first_mode, 'Hz')}, above it a mass of "
         f"{_mass(result.free.mass)}.",
-        f"With a motor that gives {RATIOS[1]:g} times the assumed force these masses read {result.apparent[0, 1]:.3g} "
-        f"and {result.apparent[1, 1]:.3g} {pretty('kg')}; with {RATIOS[2]:g} times the force, "
+        f"With a motor that gives {MOTOR_CONSTANT_RATIOS[1]:g} times the assumed force these masses read "
+        f"{result.apparent[0, 1]:.3g} "
+        f"and {result.apparent[1, 1]:.3g} {pretty('kg')}; with {MOTOR_CONSTANT_RATIOS[2]:g} times the force, "
         f"{result.apparent[0, 2]:.3g} and {result.apparent[1, 2]:.3g} {pretty('kg')}: a machine that reads heavy has a "
         "motor weaker than assumed.",
         f"Joint locked, open loops cross 0 dB as follows: tuned to {tuned}; at the highest setting {above}.{unstable}",
@@ -158,7 +159,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     plants = {"locked": result.locked, "free": result.free}
     return {
         **{name: _numbers(plant) for name, plant in plants.items()},
-        "motor_constant_ratios": [*RATIOS],
+        "motor_constant_ratios": [*MOTOR_CONSTANT_RATIOS],
         "apparent_mass_locked_kg": result.apparent[0].tolist(),
         "apparent_mass_free_kg": result.apparent[1].tolist(),
         "loops": [_loop_numbers(loop) for loop in result.loops],

@@ -27,7 +27,7 @@ TIME = Axis("Time", "s")
 COLOURS = {"locked": VERMILLION, "free": BLUE}
 AREAS = {"locked": "#f6dccb", "free": "#cfdfee"}
 LINES = (GREY, GREEN, VERMILLION, ORANGE, PINK, SKY, BLUE, INK, GREY)
-AFTERWARDS = 5.0
+SHOWN_AFTER = 5.0
 """Time [s] after which the remaining deviation sets the height of a panel."""
 
 
@@ -160,7 +160,7 @@ def _rail(moves: HuntingResult, number: int, before: str) -> str:
 
 def _reach(traces: list[Trace]) -> float:
     """Return half the height [m] of a panel in which the motion after the move is well seen."""
-    late = [np.abs(t.deviation[t.time >= AFTERWARDS]).max() for t in traces]
+    late = [np.abs(t.deviation[t.time >= SHOWN_AFTER]).max() for t in traces]
     return 1.6 * max(float(np.nanmax(late)), 2 * COUNTED_ABOVE)
 
 

@@ -12,10 +12,10 @@ from friso.questions.rig.outcome_view import OutcomeView
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.drawing.palette import BLUE
 from friso.shown.drawing.prefixes import with_unit
-from friso.studies.rig.experiments.presliding import LOOPS, Bristles
+from friso.studies.rig.experiments.presliding import LOOP_AMPLITUDES, Bristles
 from friso.studies.rig.outcome import Outcome
 
-ROWS = 4
+LOOP_ROWS = 4
 """Number of rows of loops in the figure."""
 
 
@@ -25,7 +25,8 @@ def sentences(outcome: Outcome) -> list[str]:
     lines = [f"Place {number}: {_place(place)}." for number, place in enumerate(result.by_place, start=1)]
     stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)
     loops = (
-        f"{len(result.loops)} loops of force over displacement, to {percent(LOOPS[0])} up to {percent(LOOPS[-1])} of "
+        f"{len(result.loops)} loops of force over displacement, to {percent(LOOP_AMPLITUDES[0])} up to "
+        f"{percent(LOOP_AMPLITUDES[-1])} of "
         "static friction, tell friction laws apart: friso identify --laws."
     )
     return [*lines, f"True bristles: stiffness {stiffness}, damping {damping}.", loops]
@@ -59,13 +60,13 @@ def _small(result: Presliding, outcome: Outcome) -> Figure:
 def _loops(bristles: Bristles, outcome: Outcome) -> Figure:
     """Draw force over displacement, from the smallest loop to the largest."""
     panels = []
-    for share, log in zip(LOOPS, bristles.loops, strict=True):
+    for share, log in zip(LOOP_AMPLITUDES, bristles.loops, strict=True):
         displacement = log.logged["position"] - log.logged["position"][:1]
         line = Series(displacement, log.logged["force"], "", BLUE, width=1.0)
         title = f"To {percent(share)} of static friction"
         panels.append(Panel(title, Axis("Displacement", "m"), Axis("Force", "N"), (line,)))
     caption = "Commanded force over displacement at one place, four turns each. One far wider than others broke away."
-    columns = len(LOOPS) // ROWS
+    columns = len(LOOP_AMPLITUDES) // LOOP_ROWS
     return Figure(
         "rig_presliding_loops", "Loops before sliding", caption, tuple(panels), columns, subject=outcome.stage.name
     )
@@ -87,7 +88,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         "places": places,
         "true_stiffness_n_per_m": bristles.stiffness,
         "true_damping_n_s_per_m": bristles.damping,
-        "loops_share_of_static": [*LOOPS],
+        "loops_share_of_static": [*LOOP_AMPLITUDES],
     }
 
 

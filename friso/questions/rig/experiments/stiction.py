@@ -10,7 +10,7 @@ from friso.questions.rig.outcome_view import OutcomeView
 from friso.shown.drawing.figure import Array, Axis, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, INK, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit, with_unit
-from friso.studies.rig.experiments.stiction import SPEEDS, Stiction
+from friso.studies.rig.experiments.stiction import SPEED_MULTIPLES, Stiction
 from friso.studies.rig.outcome import Outcome
 
 
@@ -25,7 +25,8 @@ def sentences(outcome: Outcome) -> list[str]:
             f"The cart does not slip on any of {rails} stretches of rail; the true static friction there is {truth}."
         ]
     return [
-        f"At {with_unit(result.speed, 'm/s')} and {with_unit(SPEEDS[1] * result.speed, 'm/s')} the cart breaks away "
+        f"At {with_unit(result.speed, 'm/s')} and {with_unit(SPEED_MULTIPLES[1] * result.speed, 'm/s')} the cart "
+        "breaks away "
         f"{len(forces)} times on {rails} stretches of rail, at "
         f"{range_with_unit(float(forces.min()), float(forces.max()), 'N')}.",
         f"The true static friction there is {truth}; its mean along the travel lies within the 95 % interval on "

@@ -14,7 +14,15 @@ from friso.identification.readings.friction_velocity import FrictionVelocity, fr
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.stage.tables import moving_mass
-from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, Slow, many_speeds, mean_friction, slow_sliding
+from friso.studies.rig.many_speeds import (
+    SAMPLES_PER_PERIOD,
+    STANDING_TIME,
+    ManySpeeds,
+    Slow,
+    many_speeds,
+    mean_friction,
+    slow_sliding,
+)
 from friso.studies.rig.outcome import (
     Outcome,
     RigLog,
@@ -30,7 +38,7 @@ from friso.studies.rig.outcome import (
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
 
-DURATIONS = (480.0, 120.0)
+PASS_DURATIONS = (480.0, 120.0)
 """Durations of the two passes in periods of the crossover. On the thesis's rig they give 2.5 and 10 mm/s."""
 
 
@@ -85,7 +93,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 def pass_speeds(stage: Stage) -> tuple[float, ...]:
     """Return the two speeds [m/s] of the thesis for a stage, the slow one first."""
-    return tuple(longest_travel(stage) * pace(stage) / periods for periods in DURATIONS)
+    return tuple(longest_travel(stage) * pace(stage) / periods for periods in PASS_DURATIONS)
 
 
 def _passes(name: str, stage: Stage, seed: int) -> Passes:
@@ -103,10 +111,10 @@ def passes_log(name: str, stage: Stage, seed: int) -> RigLog:
 
     `name` says whether the joint of the stage is free or locked.
     """
-    period, parts = 1 / pace(stage), [(0.0, STANDS / pace(stage))]
-    for speed, periods in zip(pass_speeds(stage), DURATIONS, strict=True):
+    period, parts = 1 / pace(stage), [(0.0, STANDING_TIME / pace(stage))]
+    for speed, periods in zip(pass_speeds(stage), PASS_DURATIONS, strict=True):
         for velocity in (speed, -speed):
-            parts += [(velocity, periods * period), (0.0, STANDS * period)]
+            parts += [(velocity, periods * period), (0.0, STANDING_TIME * period)]
     task = legs(travel(stage)[0], parts)
-    (recorded,) = run(stage, task, [seed], interval(stage, period / SAMPLES))
+    (recorded,) = run(stage, task, [seed], interval(stage, period / SAMPLES_PER_PERIOD))
     return rig_log(recorded, 0, name, "constant-speed", stage, seed)

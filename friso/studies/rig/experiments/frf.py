@@ -17,7 +17,7 @@ from friso.identification.response.response import FrequencyResponse
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.studies.rig.outcome import (
-    WIDE,
+    WIDE_STROKE,
     Outcome,
     RigLog,
     estimate_plant,
@@ -35,25 +35,25 @@ from friso.studies.rig.outcome import (
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import standing
 
-PLACES, FREE_PLACES = 10, 3
+LOCKED_PLACES, FREE_PLACES = 10, 3
 """Places along the travel at which the plant is identified, locked (Fig. 29) and free (the thesis shows one)."""
 
-SETTINGS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
+CROSSOVER_SETTINGS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 """Crossovers of the open loops over the stage's own: 8 to 48 Hz (Fig. 22)."""
 
-RATIOS = (1.0, 0.68, 1.47)
+MOTOR_CONSTANT_RATIOS = (1.0, 0.68, 1.47)
 """Ratios of true to assumed motor constant that are compared: 1.7 kg weighed over 2.5 kg seen, and its inverse."""
 
-BESIDE = 3.0
+BESIDE_MODES = 3.0
 """Factor in frequency between the free joint's mass line and the modes on both sides of it."""
 
-FASTER, STEPS = 1.1, 33
+TRIED_FACTOR, TRIED_STEPS = 1.1, 33
 """Factor between successive crossovers that are tried for stability, and their number.
 
-They begin at a third of the highest of `SETTINGS`.
+They begin at a third of the highest of `CROSSOVER_SETTINGS`.
 """
 
-RELEASED, WAIT = 0.01, 8.0
+RELEASE_DISTANCE, RELEASE_DURATION = 0.01, 8.0
 """Distance of the free stage from its reference at release, in strokes, and run duration.
 
 The duration is in periods of the stage's crossover. A loop with a larger error in the last quarter is not stable.
@@ -97,8 +97,9 @@ class Frf:
     """Results of the frequency-response experiment.
 
     Fields are the plants, and the open loops, locked at several crossovers and free. `apparent` [kg], shape (2,
-    ratios), are the masses that the locked and the free plant show for the motor constants of `RATIOS`. `settings`
-    [Hz], shape (STEPS,), are crossovers tried with the free joint, and `stable` says which of them were stable.
+    ratios), are the masses that the locked and the free plant show for the motor constants of `MOTOR_CONSTANT_RATIOS`.
+    `settings` [Hz], shape (TRIED_STEPS,), are crossovers tried with the free joint, and `stable` says which of them
+    were stable.
     """
 
     locked: Plant
@@ -136,13 +137,13 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     Raises InputError for a stage without a joint.
     """
     fixed, free = locked_stage(jointed(stage)), freed(stage)
-    places = np.linspace(*travel(stage), PLACES)
-    progress(0, 4, f"plant, joint locked, at {PLACES} places")
+    places = np.linspace(*travel(stage), LOCKED_PLACES)
+    progress(0, 4, f"plant, joint locked, at {LOCKED_PLACES} places")
     held = [plant_log(fixed, f"locked_{n + 1:02d}", place, seed + n) for n, place in enumerate(places)]
     progress(1, 4, f"plant, joint free, at {FREE_PLACES} places")
     loose = [plant_log(free, f"free_{n + 1:02d}", place, seed + n) for n, place in enumerate(places[:FREE_PLACES])]
     progress(2, 4, "open loops")
-    logs, loops = open_loops(fixed, places[0], seed, SETTINGS[1:])
+    logs, loops = open_loops(fixed, places[0], seed, CROSSOVER_SETTINGS[1:])
     loops = (measured_loop(held[0], pace(stage)), *loops)
     apparent = np.array([apparent_masses(machine, places[0], seed) for machine in (fixed, free)])
     progress(3, 4, "highest stable setting, joint free")
@@ -211,9 +212,9 @@ def free_plant(logs: list[RigLog]) -> Plant:
     averaged, flat = estimate_plant(logs), logs[0].stage.flat()
     above = flat.get("parasitic.frequency", float(averaged.frequency[-1]))
     level = np.abs(averaged.accelerations().response)
-    low = averaged.frequency < above / BESIDE
+    low = averaged.frequency < above / BESIDE_MODES
     first = float(averaged.frequency[low][np.argmax(level[low])])
-    band = (BESIDE * first, above / BESIDE)
+    band = (BESIDE_MODES * first, above / BESIDE_MODES)
     return Plant(tuple(estimate_plant([log]) for log in logs), averaged, first, mass_between(averaged, *band), band)
 
 
@@ -233,11 +234,11 @@ def mass_between(response: FrequencyResponse, low: float, high: float) -> Estima
 
 
 def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
-    """Return the masses [kg] that a stage's response shows for the motor constants of `RATIOS`.
+    """Return the masses [kg] that a stage's response shows for the motor constants of `MOTOR_CONSTANT_RATIOS`.
 
     The result has the shape (ratios,). The response is measured at a place [m] on the rail.
     """
-    ratios = np.array(RATIOS)
+    ratios = np.array(MOTOR_CONSTANT_RATIOS)
     recorded = excite(stage, place, seed, len(ratios), {"drive.motor_constant_ratio": ratios})
     logs = [rig_log(recorded, row, "", None, stage, seed) for row in range(len(ratios))]
     if stage.flat()["joint.locked"]:
@@ -246,15 +247,17 @@ def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
 
 
 def stable_settings(stage: Stage, place: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the crossovers [Hz] tried, and which of them are stable, both of shape (STEPS,).
+    """Return the crossovers [Hz] tried, and which of them are stable, both of shape (TRIED_STEPS,).
 
     The stage is released beside its reference, at a place [m]. A crossover counts as stable if the stage is not farther
     off in the last quarter of the run.
     """
-    factors = SETTINGS[-1] / 3 * FASTER ** np.arange(STEPS)
-    off = RELEASED * stage.flat()["joint.stroke"] / WIDE
-    task = replace(standing(place, WAIT / pace(stage)), displacement=off)
-    (recorded,) = run(stage, task, [seed] * STEPS, interval(stage, 1 / (125 * pace(stage))), quicker(stage, factors))
+    factors = CROSSOVER_SETTINGS[-1] / 3 * TRIED_FACTOR ** np.arange(TRIED_STEPS)
+    off = RELEASE_DISTANCE * stage.flat()["joint.stroke"] / WIDE_STROKE
+    task = replace(standing(place, RELEASE_DURATION / pace(stage)), displacement=off)
+    (recorded,) = run(
+        stage, task, [seed] * TRIED_STEPS, interval(stage, 1 / (125 * pace(stage))), quicker(stage, factors)
+    )
     late = recorded.true["position"][:, -(recorded.true["position"].shape[1] // 4) :] - place
     worst = np.abs(late).max(axis=1, initial=0.0)
     return factors * pace(stage), worst <= off

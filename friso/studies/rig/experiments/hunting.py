@@ -33,13 +33,13 @@ from friso.studies.rig.outcome import Outcome, pace, rig_log
 from friso.virtual_rig.run import RecordedRuns
 from friso.virtual_rig.task import MoveTask
 
-CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
+RELATIVE_CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
 """Crossovers over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others friso's choice."""
 
-SHOWN = (2, 3, 6)
-"""Indices of the thesis's crossovers among `CROSSOVERS`."""
+SHOWN_CROSSOVERS = (2, 3, 6)
+"""Indices of the thesis's crossovers among `RELATIVE_CROSSOVERS`."""
 
-DISPLACEMENTS = (-0.05, -0.005, 0.005, 0.05)
+RELEASE_DISTANCES = (-0.05, -0.005, 0.005, 0.05)
 """Distances from the reference at which the stage is released, over that of the move.
 
 They are 0.5 and 5 mm to either side on the thesis's rig (friso's choice).
@@ -126,21 +126,21 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     stage without joint, or a motion that does not move it.
     """
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
-    frequencies, seeds = pace(stage) * CROSSOVERS, rails(stage)
+    frequencies, seeds = pace(stage) * RELATIVE_CROSSOVERS, rails(stage)
     moves, started = _moves_and_releases(stages, move(stage), seed, frequencies, seeds, progress)
-    rail = int(np.argmax(moves["locked"].counted[SHOWN[0]]))
+    rail = int(np.argmax(moves["locked"].counted[SHOWN_CROSSOVERS[0]]))
     machine = on_rails(stage, at_crossovers(stage, frequencies), seeds[[rail]])
     again = {
         case: once(variant, move(stage), [seed + rail] * len(frequencies), machine) for case, variant in stages.items()
     }
     traces = {(case, row): _trace(again[case], row) for case in CASES for row in range(len(frequencies))}
     startable = _startable(stages["locked"], seed, frequencies, seeds, moves["locked"], started)
-    displacements = distance(stage) * np.array(DISPLACEMENTS)
+    displacements = distance(stage) * np.array(RELEASE_DISTANCES)
     result = HuntingResult(
-        distance(stage), frequencies, seeds, moves, displacements, started, SHOWN, rail, traces, startable
+        distance(stage), frequencies, seeds, moves, displacements, started, SHOWN_CROSSOVERS, rail, traces, startable
     )  # fmt: skip
     logs = []
-    for case, row in product(CASES, SHOWN):
+    for case, row in product(CASES, SHOWN_CROSSOVERS):
         name = f"hunting_{case}_{frequencies[row]:.3g}_hz"
         tuned = {key: float(f"{value:.6g}") for key, value in at_crossovers(stage, frequencies[row]).items()}
         file = machine_file(stages[case].with_numbers(tuned), seeds[rail])
@@ -170,7 +170,9 @@ def _moves_and_releases(
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
     numbers = numbers_of(seed, *shape)
     moved = [(variant, there, f"moves, joint {case}") for case, variant in stages.items()]
-    let_go = [(stage, released(stage, share * distance(stage)), "releases, joint locked") for share in DISPLACEMENTS]
+    let_go = [
+        (stage, released(stage, share * distance(stage)), "releases, joint locked") for share in RELEASE_DISTANCES
+    ]
     lots = [*moved, *let_go]
     runs = side_by_side(
         [
@@ -179,7 +181,7 @@ def _moves_and_releases(
         ]
     )
     moves = {case: part.shaped(*shape) for case, part in zip(stages, runs, strict=False)}
-    return moves, RailRuns.joined(runs[len(moved) :]).shaped(len(DISPLACEMENTS), *shape)
+    return moves, RailRuns.joined(runs[len(moved) :]).shaped(len(RELEASE_DISTANCES), *shape)
 
 
 def _startable(
@@ -195,7 +197,7 @@ def _startable(
     if not len(places):
         return None
     row, size, rail = map(int, places[0])
-    displacement = DISPLACEMENTS[size] * distance(stage)
+    displacement = RELEASE_DISTANCES[size] * distance(stage)
     changes = on_rails(stage, at_crossovers(stage, frequencies[[row]]), seeds[[rail]])
     tasks = (move(stage), released(stage, displacement))
     quiet, swings = (_trace(once(stage, task, [seed + rail], changes), 0) for task in tasks)

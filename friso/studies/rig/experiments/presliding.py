@@ -33,24 +33,24 @@ from friso.studies.rig.outcome import (
 from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import standing
 
-PLACES = 3
+TRAVEL_PLACES = 3
 """Number of places along the travel (friso's choice)."""
 
-GENTLE, LONGEST = Excitation(0.05, 12.0, 60, 160.0), 1e-3
+GENTLE, LONGEST_EXCITATION = Excitation(0.05, 12.0, 60, 160.0), 1e-3
 """Excitation with an RMS of a twentieth of static friction, up to 96 Hz on the thesis's rig, logged every 0.75 ms; and
 the longest sample time [s], for slower rigs."""
 
-LOOPS = np.linspace(0.2, 0.9, 8)
+LOOP_AMPLITUDES = np.linspace(0.2, 0.9, 8)
 """Force amplitudes of loops over static friction.
 
 At the largest, some places along the rail break away.
 """
 
-PERIOD, TURNS, SAMPLES = 4.0, 4, 125.0
+LOOP_PERIOD, LOOP_COUNT, SAMPLES_PER_PERIOD = 4.0, 4, 125.0
 """Periods of the crossover that a loop takes, and number of loops.
 
-SAMPLES are those of the log per period of the crossover. On the thesis's rig a loop takes 0.5 s, with samples 1 ms
-apart.
+SAMPLES_PER_PERIOD are those of the log per period of the crossover. On the thesis's rig a loop takes 0.5 s, with
+samples 1 ms apart.
 """
 
 
@@ -78,29 +78,29 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         actual = f"model = {flat.get('friction.model', 'none')!r}"
         raise InputError("friction.model", actual, "friction with bristles", 'model = "lugre"')
     held = locked_stage(stage) if stage.joint else stage
-    places = np.linspace(*travel(stage), PLACES)
-    logs, loops, count = [], [], PLACES + len(LOOPS)
+    places = np.linspace(*travel(stage), TRAVEL_PLACES)
+    logs, loops, count = [], [], TRAVEL_PLACES + len(LOOP_AMPLITUDES)
     for number, place in enumerate(places):
-        progress(number, count, f"place {number + 1} of {PLACES}")
+        progress(number, count, f"place {number + 1} of {TRAVEL_PLACES}")
         logs.append(presliding_log(held, f"presliding_{number + 1}", place, seed + number))
-    for number, share in enumerate(LOOPS):
-        progress(PLACES + number, count, f"loop {number + 1} of {len(LOOPS)}")
-        name, own_seed = f"presliding_loop_{number + 1}", seed + PLACES + number
-        loops.append(loop_log(held, name, float(places[PLACES // 2]), own_seed, float(share)))
+    for number, share in enumerate(LOOP_AMPLITUDES):
+        progress(TRAVEL_PLACES + number, count, f"loop {number + 1} of {len(LOOP_AMPLITUDES)}")
+        name, own_seed = f"presliding_loop_{number + 1}", seed + TRAVEL_PLACES + number
+        loops.append(loop_log(held, name, float(places[TRAVEL_PLACES // 2]), own_seed, float(share)))
     progress(count, count, "")
     contact = machine_between(as_built_keys(stage))
     results = tuple(bristles_from_presliding(log.log, contact) for log in logs)
     shown = Bristles(results, measured.stiffness, measured.damping, tuple(loops))
     notes = ["the joint is held by its limiter, as an engineer would clamp it"] if stage.joint else []
     reach = flat.get(FORCE_LIMIT, np.inf) / friction(stage)
-    if reach < LOOPS[-1]:
+    if reach < LOOP_AMPLITUDES[-1]:
         notes.append(f"the force limit is {percent(reach)} of static friction: larger loops are cut off there")
     return Outcome("presliding", stage, seed, (*logs, *loops), shown, tuple(notes))
 
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
     """Return the log of a small multisine (sum of sines) at a place [m] on the rail."""
-    kind = replace(GENTLE, samples=max(GENTLE.samples, 1 / (LONGEST * pace(stage))))
+    kind = replace(GENTLE, samples=max(GENTLE.samples, 1 / (LONGEST_EXCITATION * pace(stage))))
     return rig_log(excite(stage, place, seed, kind=kind), 0, name, "presliding", stage, seed)
 
 
@@ -110,9 +110,9 @@ def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> 
     The amplitude of the force is a fraction `share` of static friction.
     """
     step = as_built_keys(stage)["drive.sample_time"]
-    samples = round(PERIOD / pace(stage) / step)
+    samples = round(LOOP_PERIOD / pace(stage) / step)
     turn = share * friction(stage) * np.sin(2 * np.pi * np.arange(samples) / samples)
-    task = standing(place, TURNS * samples * step)
-    task = replace(task, injected=np.tile(turn, TURNS), injected_each=step)
-    (recorded,) = run(stage, task, [seed], interval(stage, 1 / (SAMPLES * pace(stage))))
+    task = standing(place, LOOP_COUNT * samples * step)
+    task = replace(task, injected=np.tile(turn, LOOP_COUNT), injected_each=step)
+    (recorded,) = run(stage, task, [seed], interval(stage, 1 / (SAMPLES_PER_PERIOD * pace(stage))))
     return rig_log(recorded, 0, name, "presliding", stage, seed)

@@ -21,20 +21,20 @@ from friso.studies.rig.outcome import Outcome, RigLog, freed, friction, interval
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import legs
 
-RAILS = 10
+STICTION_RAILS = 10
 """Number of rails, each drawn anew (friso's choice); the thesis has "multiple experiments"."""
 
-LOADS, STANDS, SAMPLES = 16.0, 16.0, 125.0
+LOADING_TIME, STANDING_TIME, SAMPLES_PER_PERIOD = 16.0, 16.0, 125.0
 """Timing of the experiment in periods of the crossover, and samples of the log per period.
 
-LOADS is the time in which the joint is loaded up to the friction force (2 s on the thesis's rig, at 0.63 mm/s). STANDS
-is the time for which the reference stands between velocities. Samples are 1 ms apart on the thesis's rig.
+LOADING_TIME is the time in which the joint is loaded up to the friction force (2 s on the thesis's rig, at 0.63 mm/s).
+STANDING_TIME is the time for which the reference stands between velocities. Samples are 1 ms apart on the thesis's rig.
 """
 
-SLIPS = 8
+LOADINGS_PER_LEG = 8
 """Number of times that the joint is loaded in each leg."""
 
-SPEEDS = (1, 2, -1, -2)
+SPEED_MULTIPLES = (1, 2, -1, -2)
 """Successive velocities as multiples of the slow speed: forward and back (friso's choice)."""
 
 
@@ -64,7 +64,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     if "friction.static" not in stage.flat():
         actual = f"model = {stage.flat().get('friction.model', 'none')!r}"
         raise InputError("friction.model", actual, "friction with a static level", 'model = "lugre"')
-    progress(0, 1, f"slow motion on {RAILS} rails")
+    progress(0, 1, f"slow motion on {STICTION_RAILS} rails")
     logs = slow_legs(stage, seed)
     progress(1, 1, "")
     flat = freed(stage).flat()
@@ -83,27 +83,34 @@ def _note(flat: Mapping[str, Any]) -> str:
 
 
 def slow_speed(stage: Stage) -> float:
-    """Return the speed [m/s] that loads a sticking cart up to its friction in `LOADS` periods.
+    """Return the speed [m/s] that loads a sticking cart up to its friction in `LOADING_TIME` periods.
 
     The periods are those of the crossover.
     """
-    return friction(stage) / freed(stage).flat()["joint.stiffness"] * pace(stage) / LOADS
+    return friction(stage) / freed(stage).flat()["joint.stiffness"] * pace(stage) / LOADING_TIME
 
 
-def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
+def slow_legs(stage: Stage, seed: int, rails: int = STICTION_RAILS) -> tuple[RigLog, ...]:
     """Return logs of slow motion to and fro, on `rails` rails of successive seeds.
 
     All motions start from the same place.
     """
     free, period, slow = freed(stage), 1 / pace(stage), slow_speed(stage)
-    parts = [(0.0, STANDS * period / 4)]
-    for factor in SPEEDS:
-        parts += [(factor * slow, SLIPS * LOADS * period / abs(factor)), (0.0, STANDS * period)]
+    parts = [(0.0, STANDING_TIME * period / 4)]
+    for factor in SPEED_MULTIPLES:
+        parts += [
+            (factor * slow, LOADINGS_PER_LEG * LOADING_TIME * period / abs(factor)),
+            (0.0, STANDING_TIME * period),
+        ]
     task = legs(travel(stage)[0], parts)
     rails_of_runs = {"rail.seed": stage.flat()["rail.seed"] + np.arange(rails)} if stage.rail else {}
     logs: list[RigLog] = []
     for chunk in run(
-        free, task, [seed + number for number in range(rails)], interval(stage, period / SAMPLES), rails_of_runs
+        free,
+        task,
+        [seed + number for number in range(rails)],
+        interval(stage, period / SAMPLES_PER_PERIOD),
+        rails_of_runs,
     ):
         logs += [_log(free, chunk, row, int(number), seed) for row, number in enumerate(chunk.numbers)]
     return tuple(logs)

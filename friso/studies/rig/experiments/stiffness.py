@@ -14,18 +14,19 @@ from friso.identification.experiments.steps import StepStiffness, stiffness_from
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
-from friso.studies.rig.outcome import FIXED, Outcome, RigLog, freed, interval, pace, rig_log
+from friso.studies.rig.outcome import FIXED_MASS, Outcome, RigLog, freed, interval, pace, rig_log
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import staircase
 
-STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
+STEP_SIZE, STEP_DIRECTIONS = 0.3, (1, 1, -1, -1, 1, -1)
 """Size of a step in strokes (0.3 mm on the thesis's rig, Sec. 4.2.2), and directions of the steps (friso's choice)."""
 
-STANDS, LONGEST, SETTLED, SAMPLES = 16.0, 64.0, 5.0, 125.0
+STANDING_TIME, LONGEST_STAND, SETTLED_TIME, SAMPLES_PER_PERIOD = 16.0, 64.0, 5.0, 125.0
 """Timing of the steps, all friso's choice.
 
-Each step stands for STANDS (2 s on the thesis's rig) to LONGEST periods of the crossover. In between, it stands for
-SETTLED time constants of the integrator against the joint. SAMPLES are those of the log per period (1 ms apart).
+Each step stands for STANDING_TIME (2 s on the thesis's rig) to LONGEST_STAND periods of the crossover. In between, it
+stands for SETTLED_TIME time constants of the integrator against the joint. SAMPLES_PER_PERIOD are those of the log per
+period (1 ms apart).
 """
 
 
@@ -61,12 +62,12 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 def steps(stage: Stage, seed: int) -> RigLog:
     """Return the log of position steps of a stage with its joint free and its cart fixed."""
     free, period = freed(stage), 1 / pace(stage)
-    step = STEP * stage.flat()["joint.stroke"]
-    stands = np.clip(SETTLED * pulling_time(free), STANDS * period, LONGEST * period)
-    task = staircase([sign * step for sign in WAYS], float(stands))
-    held = {"masses.cart": np.array([FIXED])}
+    step = STEP_SIZE * stage.flat()["joint.stroke"]
+    stands = np.clip(SETTLED_TIME * pulling_time(free), STANDING_TIME * period, LONGEST_STAND * period)
+    task = staircase([sign * step for sign in STEP_DIRECTIONS], float(stands))
+    held = {"masses.cart": np.array([FIXED_MASS])}
     held |= {key: np.array([value]) for key, value in as_tuned(stage.flat()).items()}
-    (recorded,) = run(free, task, [seed], interval(stage, period / SAMPLES), held)
+    (recorded,) = run(free, task, [seed], interval(stage, period / SAMPLES_PER_PERIOD), held)
     return rig_log(recorded, 0, "steps", "steps", free, seed)
 
 

@@ -41,16 +41,16 @@ if TYPE_CHECKING:
 LIGHT, HEAVY = "1.7 kg", "2.5 kg"
 """Names of the responses of the locked rig with the weighed mass and with the identified mass (Sec. 4.2.1)."""
 
-_MEASURED = 1.0, 2.5
+MEASURED_FRICTION = 1.0, 2.5
 """Range of static friction [N] in Fig. 20."""
 
-_PEAK_FORCE, _PRESCRIBED, _GRAVITY, _TENFOLD = 200.0, 100.0, 9.81, 10.0
+_PEAK_FORCE, PRESCRIBED_ACCELERATION, STANDARD_GRAVITY, TENFOLD_GRAVITY = 200.0, 100.0, 9.81, 10.0
 """Peak force of the actuator [N] and accelerations [m/s^2, g] (Sec. 3.5, 4.3.2)."""
 
-_MASSES = 1.7, 2.5
+BOTH_MASSES = 1.7, 2.5
 """Weighed mass, and identified mass [kg]."""
 
-_START = 0.02
+AFTER_BREAK_AWAY = 0.02
 """Time [s] after break-away at which the acceleration is read."""
 
 
@@ -68,9 +68,10 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
     return Finding.of(
         Part("k_j S_j is below the static friction of Table 2", force < static, f"{force:.3g} N of {static:.3g} N"),
         Part(
-            f"k_j S_j is below the static friction that was measured ({_MEASURED[0]:g} to {_MEASURED[1]:g} N)",
-            force < _MEASURED[0],
-            f"{force:.3g} N: {force / _MEASURED[0]:.2g} times the least and {force / _MEASURED[1]:.2g} "
+            f"k_j S_j is below the static friction that was measured ({MEASURED_FRICTION[0]:g} to "
+            f"{MEASURED_FRICTION[1]:g} N)",
+            force < MEASURED_FRICTION[0],
+            f"{force:.3g} N: {force / MEASURED_FRICTION[0]:.2g} times the least and {force / MEASURED_FRICTION[1]:.2g} "
             "times the largest value measured",
             why="The thesis's own rig breaks its rule where friction is lowest.",
         ),
@@ -124,18 +125,23 @@ def the_mass_to_tune_for(evidence: Evidence) -> Finding:
 @judges("S352", figure="Sec. 3.5, acceleration")
 def close_to_ten_g(evidence: Evidence) -> Finding:
     """Judge whether the peak force accelerates the masses weighed and identified by about 10 g."""
-    reached = [_PEAK_FORCE / mass / _GRAVITY for mass in _MASSES]
-    rows = tuple((f"{mass:g} kg", f"{_PRESCRIBED * mass:g} N", f"{_PEAK_FORCE:g} N") for mass in _MASSES)
+    reached = [_PEAK_FORCE / mass / STANDARD_GRAVITY for mass in BOTH_MASSES]
+    rows = tuple(
+        (f"{mass:g} kg", f"{PRESCRIBED_ACCELERATION * mass:g} N", f"{_PEAK_FORCE:g} N") for mass in BOTH_MASSES
+    )
     return Finding.of(
         Part(
-            f"{_PEAK_FORCE:g} N reach about {_TENFOLD:g} g (within a factor of 1.5) with the mass weighed and with "
+            f"{_PEAK_FORCE:g} N reach about {TENFOLD_GRAVITY:g} g (within a factor of 1.5) with the mass weighed and "
+            "with "
             "that identified",
-            all(about(g, _TENFOLD) for g in reached),
-            ", ".join(f"{g:.2g} g with {mass:g} kg" for g, mass in zip(reached, _MASSES, strict=True)),
-            printed=_TENFOLD,
+            all(about(g, TENFOLD_GRAVITY) for g in reached),
+            ", ".join(f"{g:.2g} g with {mass:g} kg" for g, mass in zip(reached, BOTH_MASSES, strict=True)),
+            printed=TENFOLD_GRAVITY,
             read=reached[1],
         ),
-        table=FindingTable(("mass", f"force for the {_PRESCRIBED:g} m/s^2 of Sec. 4.3.2", "peak force"), rows),
+        table=FindingTable(
+            ("mass", f"force for the {PRESCRIBED_ACCELERATION:g} m/s^2 of Sec. 4.3.2", "peak force"), rows
+        ),
     )
 
 
@@ -191,7 +197,7 @@ def _overshooting_slip(response: Response) -> tuple[float, float]:
     stops = [*(first for first, _ in spells[1:]), len(time) - 1]
     for (_, start), stop in zip(spells, stops, strict=False):
         if deviation[start] * deviation[stop] < 0:
-            early = (time >= time[start]) & (time <= time[start] + _START)
+            early = (time >= time[start]) & (time <= time[start] + AFTER_BREAK_AWAY)
             acceleration = float(np.abs(np.gradient(velocity[early], time[early])).max())
             return acceleration, float((np.sign(deviation[stop]) * deviation[start : stop + 1]).max())
     return np.nan, np.nan

@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, as_gains, numbers
-from friso.frequency.crossover import WANTED, settled_margin
+from friso.frequency.crossover import COMFORTABLE_MARGIN, settled_margin
 from friso.frequency.family import loops
 from friso.frequency.members import in_series, member
 from friso.quantities import percent
@@ -203,7 +203,7 @@ def judged_crossovers(margins: dict[float, float], first: float, force: float, s
             "farther from it every one is",
             near[worst] <= 0 < apart,
             f"first eigenfrequency {first:.3g} Hz; least modulus margin {near[worst]:.2g} within, at "
-            f"{worst * first:.3g} Hz, {apart:.2g} farther off ({WANTED:g} is comfortable)",
+            f"{worst * first:.3g} Hz, {apart:.2g} farther off ({COMFORTABLE_MARGIN:g} is comfortable)",
             why="The lead of the controller keeps the loop stable there too.",
         ),
         Part(

@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import WANTED, settled_margin
+from friso.frequency.crossover import COMFORTABLE_MARGIN, settled_margin
 from friso.hunting import find_margin
 from friso.quantities import percent
 from friso.stage import Stage, loads
@@ -17,22 +17,22 @@ from friso_thesis.studies.thesis.maps import begins, ends, sizes, trend, trend_t
 from friso_thesis.studies.thesis.reading import about, words
 from friso_thesis.studies.thesis.studies import LOCKED, masses, thesis_rig
 
-_STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
+LEAST_STROKE, FRICTION_GAP, PARASITIC_RATIO = 0.3e-3, 1.0, 10.0
 """Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
 
-_WORKS, _LOCKED = 5.25, 15.0
+ISOLATED_WORKS, LOCKED_WORKS = 5.25, 15.0
 """Crossovers [Hz] above which the isolated rig works (middle of 5 and 5.5 Hz), and the locked rig."""
 
-_MOVING_MASS, _WEIGHED = 2.5, 1.7
+_MOVING_MASS, WEIGHED_MASS = 2.5, 1.7
 """Moving mass [kg] of the rig to which the abstract ties the crossovers, and the weighed mass of the simulations."""
 
-_EXPERIMENT = 14.3
+EXPERIMENT_CROSSOVER = 14.3
 """Crossover [Hz] at which the locked rig did not hunt (Sec. 4.3.2)."""
 
-_HIGHEST = 48.0
+HIGHEST_STABLE = 48.0
 """Crossover [Hz] up to which the thesis's rig was stable (Sec. 4.3.1, 4.3.3)."""
 
-_RATIOS = np.geomspace(2.0, 80.0, 16)
+PARASITIC_RATIOS = np.geomspace(2.0, 80.0, 16)
 """Parasitic frequencies tried, relative to the crossover."""
 
 
@@ -48,11 +48,12 @@ def _soft(evidence: Evidence) -> Part:
     """Judge whether a joint softer than one that works also works."""
     runs, axes = evidence.maps["isolator-stiffness"], ("joint.stiffness", "joint.stroke")
     stiffness, stroke, moving, _ = verdict_table(runs, *axes)
-    enough = stroke >= _STROKE
+    enough = stroke >= LEAST_STROKE
     softest = ~moving[0, enough]
     limit = begins(stiffness, moving, sizes(runs, *axes))[enough]
     return Part(
-        f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range comes to rest, "
+        f"at 8 Hz, at every stroke of {LEAST_STROKE * 1e3:g} mm and more, the softest joint of the range comes to "
+        "rest, "
         f"and at most of these strokes, more than {percent(words.half)}, the stage keeps moving with a stiffer one",
         bool(softest.all() and np.mean(limit < stiffness[-1]) > words.half),
         f"softest comes to rest at {softest.sum()} of {softest.size} strokes; the stage keeps moving from "
@@ -69,8 +70,8 @@ def _needed_ratio(stage_file: str) -> float:
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     crossover = flat[CROSSOVER]
     enough = np.nan
-    for ratio in map(float, _RATIOS[::-1]):
-        if settled_margin({**flat, "parasitic.frequency": ratio * crossover}) < WANTED:
+    for ratio in map(float, PARASITIC_RATIOS[::-1]):
+        if settled_margin({**flat, "parasitic.frequency": ratio * crossover}) < COMFORTABLE_MARGIN:
             break
         enough = ratio
     return enough
@@ -83,14 +84,15 @@ def _margins_at_the_top(stage_file: str) -> dict[str, float]:
     Margins in the limit cases count, and those of all states stuck under a bias force. The margin is 0 if one of them
     is unstable.
     """
-    flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
+    flat = {**loads(stage_file).flat(), CROSSOVER: HIGHEST_STABLE}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
 
 
 def _up_to(rig: Stage) -> Part:
     margins = _margins_at_the_top(rig.to_toml())
     return Part(
-        f"the crossover may be up to {_HIGHEST:g} Hz: there all settled states are stable, locked and free, without "
+        f"the crossover may be up to {HIGHEST_STABLE:g} Hz: there all settled states are stable, locked and free, "
+        "without "
         "sampling and delay",
         all(margin > 0 for margin in margins.values()),
         ", ".join(f"modulus margin {margin:.2g} {name}" for name, margin in margins.items()),
@@ -100,10 +102,11 @@ def _up_to(rig: Stage) -> Part:
 def _far(rig: Stage) -> Part:
     ratio = _needed_ratio(rig.to_toml())
     return Part(
-        f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {words.about:g}) for a "
-        f"modulus margin of {WANTED:g} in all settled states, the joint free, 8 Hz",
-        about(ratio, _RATIO),
-        f"{ratio:.3g} times" if np.isfinite(ratio) else f"more than {_RATIOS[-1]:g} times, the highest tried",
+        f"the parasitic mode must be about {PARASITIC_RATIO:g} times the crossover (within a factor of "
+        f"{words.about:g}) for a "
+        f"modulus margin of {COMFORTABLE_MARGIN:g} in all settled states, the joint free, 8 Hz",
+        about(ratio, PARASITIC_RATIO),
+        f"{ratio:.3g} times" if np.isfinite(ratio) else f"more than {PARASITIC_RATIOS[-1]:g} times, the highest tried",
         why="The mass and the damping ratio of the mode, which the thesis leaves open, determine how far away it must "
         "be.",
     )
@@ -125,8 +128,9 @@ def _stroke(evidence: Evidence) -> Part:
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
     needed = float(by_stiffness[nearest])
     return Part(
-        f"with {stiffness[nearest]:.0f} N/m at 8 Hz, nothing keeps moving from a stroke of {_STROKE * 1e3:g} mm on",
-        needed <= _STROKE,
+        f"with {stiffness[nearest]:.0f} N/m at 8 Hz, nothing keeps moving from a stroke of {LEAST_STROKE * 1e3:g} mm "
+        "on",
+        needed <= LEAST_STROKE,
         f"{needed * 1e3:.3g} mm needed",
         why="The stroke needed depends on the limiter's damping, which is open.",
     )
@@ -147,11 +151,12 @@ def _softer_needs_less_stroke(evidence: Evidence) -> Part:
 def _gap(evidence: Evidence) -> Part:
     smallest, error = smallest_gap(evidence)
     return Part(
-        f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {_GAP:g} N (within a factor of "
+        f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {FRICTION_GAP:g} N (within a "
+        "factor of "
         f"{words.about:g})",
-        about(smallest, _GAP),
+        about(smallest, FRICTION_GAP),
         number_text(smallest, ".2g", "N") if np.isfinite(smallest) else "no cell keeps moving",
-        undecided=beside(smallest, (_GAP / words.about, _GAP * words.about), error),
+        undecided=beside(smallest, (FRICTION_GAP / words.about, FRICTION_GAP * words.about), error),
     )
 
 
@@ -172,24 +177,25 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
     """Judge from which crossover the isolated rig, and from which the locked rig, comes to rest."""
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")
-    free = float(np.mean(ends(crossover, moving, sizes(runs, CROSSOVER, "joint.stroke"))[stroke >= _STROKE]))
-    locked, weighed = (locked_limit(evidence, mass) for mass in (_MOVING_MASS, _WEIGHED))
+    free = float(np.mean(ends(crossover, moving, sizes(runs, CROSSOVER, "joint.stroke"))[stroke >= LEAST_STROKE]))
+    locked, weighed = (locked_limit(evidence, mass) for mass in (_MOVING_MASS, WEIGHED_MASS))
     return (
         Part(
-            f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 to 5.5 "
+            f"with the isolator, at strokes of {LEAST_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 "
+            "to 5.5 "
             f"Hz on (within a factor of {words.about:g})",
-            about(free, _WORKS),
+            about(free, ISOLATED_WORKS),
             f"{free:.3g} Hz on average",
-            printed=_WORKS,
+            printed=ISOLATED_WORKS,
             read=free,
         ),
         Part(
             f"locked, with the {_MOVING_MASS:g} kg that the abstract gives, nothing keeps moving from about "
-            f"{_LOCKED:g} Hz on (within a factor of {words.about:g})",
-            about(locked, _LOCKED),
-            f"{locked:.3g} Hz; {weighed:.3g} Hz with the {_WEIGHED:g} kg weighed",
+            f"{LOCKED_WORKS:g} Hz on (within a factor of {words.about:g})",
+            about(locked, LOCKED_WORKS),
+            f"{locked:.3g} Hz; {weighed:.3g} Hz with the {WEIGHED_MASS:g} kg weighed",
             why=_locked_edge(),
-            printed=_LOCKED,
+            printed=LOCKED_WORKS,
             read=locked,
         ),
     )
@@ -208,12 +214,12 @@ def locked_limit(evidence: Evidence, mass: float) -> float:
 @judges("F25P", figure="25", needs=("system",))
 def experiment_needs_more_crossover(evidence: Evidence) -> Finding:
     """Judge whether the experiment needs more crossover than the parameter study at its mass."""
-    weighed, moving = (locked_limit(evidence, mass) for mass in (_WEIGHED, _MOVING_MASS))
+    weighed, moving = (locked_limit(evidence, mass) for mass in (WEIGHED_MASS, _MOVING_MASS))
     return Finding.of(
         Part(
-            f"over the map of Fig. 11B, with the {_WEIGHED:g} kg weighed, nothing keeps moving from "
-            f"{_EXPERIMENT:g} Hz on",
-            weighed < _EXPERIMENT,
+            f"over the map of Fig. 11B, with the {WEIGHED_MASS:g} kg weighed, nothing keeps moving from "
+            f"{EXPERIMENT_CROSSOVER:g} Hz on",
+            weighed < EXPERIMENT_CROSSOVER,
             f"limit {weighed:.3g} Hz; {moving:.3g} Hz with the {_MOVING_MASS:g} kg identified",
             why="Hunting ends no lower in the parameter study: Sec. 4.1 itself says at about 20 Hz.",
         )

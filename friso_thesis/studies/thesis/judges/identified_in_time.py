@@ -18,15 +18,15 @@ from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import (
     BUILT,
-    COULOMB,
-    FORCE,
-    FREQUENCIES,
+    COULOMB_SHARE,
+    FORCE_AMPLITUDE,
     LINE,
-    RANGE,
+    RESPONSE_FREQUENCIES,
     SLIPS,
     SLOW_TIME,
     SPEEDY,
-    STANDS,
+    STANDING_TIME,
+    STATIC_RANGE,
     STEPPED,
     ConstantSpeed,
     JointSteps,
@@ -37,16 +37,16 @@ from friso_thesis.studies.thesis.judges.rig_loops import RAIL, on_the_rig, weake
 from friso_thesis.studies.thesis.linear import PLANT
 from friso_thesis.studies.thesis.reading import words
 
-MEASURED, WEIGHED = (2.5, 0.75), (1.7, 0.5)
+MEASURED_MASSES, WEIGHED_MASSES = (2.5, 0.75), (1.7, 0.5)
 """Masses [kg] of the whole rig and of its stage: measured by mass lines (Fig. 17, 18), and weighed (Sec. 4.2.1)."""
 
-CONSTANTS = (MEASURED[0] / WEIGHED[0], MEASURED[1] / WEIGHED[1])
+CONSTANTS = (MEASURED_MASSES[0] / WEIGHED_MASSES[0], MEASURED_MASSES[1] / WEIGHED_MASSES[1])
 """Ratios by which the motor constant would have to be underestimated to explain the measured masses."""
 
-_LINE_TO, _NOISY = 200.0, (10.0, 80.0)
+_LINE_TO, NOISY_RANGE = 200.0, (10.0, 80.0)
 """Upper end of the visible mass line, and range in which single identifications are noisy [Hz] (Sec. 4.2.1)."""
 
-FIRST, _PARASITIC = 11.0, 300.0
+FIRST_MODE, PARASITIC_MODE = 11.0, 300.0
 """Modes of the free joint [Hz] (Sec. 4.2.1)."""
 
 
@@ -55,7 +55,9 @@ def mass_line_of_the_locked_rig(evidence: Evidence) -> Finding:
     """Judge the locked rig's mass line and its scatter over places with different friction."""
     flat = evidence.rig.flat()
     line = judged_line(evidence.experiments.locked_line, flat["masses.cart"] + flat["masses.stage"])
-    return Finding.of(*line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED[0], WEIGHED[0])))
+    return Finding.of(
+        *line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED_MASSES[0], WEIGHED_MASSES[0]))
+    )
 
 
 def judged_line(line: LockedLine, moved: float) -> Finding:
@@ -63,14 +65,14 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
 
     `line` has the simulated responses at several places; `moved` [kg] is the mass that moves.
     """
-    rates, magnitude, scatter = np.array(FREQUENCIES), line.magnitude, line.scatter
+    rates, magnitude, scatter = np.array(RESPONSE_FREQUENCIES), line.magnitude, line.scatter
     mean = np.nanmean(magnitude, axis=0)
     about_one = (mean > 1 / words.about) & (mean < words.about)
     end = float(max(rates[: len(about_one) if about_one.all() else int(about_one.argmin())], default=0.0))
-    inside = (rates >= _NOISY[0]) & (rates <= _NOISY[1])
+    inside = (rates >= NOISY_RANGE[0]) & (rates <= NOISY_RANGE[1])
     mass = moved / np.nanmedian(magnitude[:, inside], axis=1)
-    worst, above = float(rates[np.nanargmax(scatter)]), float(np.nanmax(scatter[rates >= 1.5 * _NOISY[1]]))
-    weighed, seen = WEIGHED[0], MEASURED[0]
+    worst, above = float(rates[np.nanargmax(scatter)]), float(np.nanmax(scatter[rates >= 1.5 * NOISY_RANGE[1]]))
+    weighed, seen = WEIGHED_MASSES[0], MEASURED_MASSES[0]
     return Finding.of(
         Part(
             f"the response stays on the mass line (within a factor of {words.about:g}) up to about {_LINE_TO:g} Hz (at "
@@ -87,13 +89,15 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
             f"asks for {CONSTANTS[1]:.2f}.",
         ),
         Part(
-            f"identifications at different places differ most between {_NOISY[0]:g} and {_NOISY[1]:g} Hz, by more "
-            f"than {words.about:g} times as much as from {1.5 * _NOISY[1]:g} Hz",
-            bool(_NOISY[0] <= worst <= _NOISY[1] and np.nanmax(scatter) > words.about * above),
+            f"identifications at different places differ most between {NOISY_RANGE[0]:g} and {NOISY_RANGE[1]:g} Hz, by "
+            "more "
+            f"than {words.about:g} times as much as from {1.5 * NOISY_RANGE[1]:g} Hz",
+            bool(NOISY_RANGE[0] <= worst <= NOISY_RANGE[1] and np.nanmax(scatter) > words.about * above),
             f"the phase scatters most at {worst:.3g} Hz, by {np.degrees(np.nanmax(scatter)):.2g} degrees, and by "
-            f"{np.degrees(above):.2g} above. Assumed, as the thesis states neither: sines of {FORCE:g} N; places "
-            f"with static friction spread evenly over the {RANGE[0]:g} to {RANGE[1]:g} N of Fig. 20, "
-            f"{percent(COULOMB)} of it as Coulomb friction",
+            f"{np.degrees(above):.2g} above. Assumed, as the thesis states neither: sines of {FORCE_AMPLITUDE:g} N; "
+            "places "
+            f"with static friction spread evenly over the {STATIC_RANGE[0]:g} to {STATIC_RANGE[1]:g} N of Fig. 20, "
+            f"{percent(COULOMB_SHARE)} of it as Coulomb friction",
         ),
     )
 
@@ -107,18 +111,18 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
     plants = evidence.analysis.plants
     stuck, sliding = plants["stuck"], plants["sliding"]
     reads = sorted((stuck.mass, sliding.mass))
-    seen, weighed = MEASURED[1], WEIGHED[1]
+    seen, weighed = MEASURED_MASSES[1], WEIGHED_MASSES[1]
     factor = seen / float(np.mean(reads))
     both = "would explain" if abs(factor / CONSTANTS[0] - 1) <= words.close else "does not explain"
     return Finding.of(
         Part(
-            f"the first mode is about {FIRST:g} Hz (within {percent(words.close)}) with the cart stuck",
-            bool(abs(stuck.first / FIRST - 1) <= words.close),
+            f"the first mode is about {FIRST_MODE:g} Hz (within {percent(words.close)}) with the cart stuck",
+            bool(abs(stuck.first / FIRST_MODE - 1) <= words.close),
             f"{stuck.first:.3g} Hz stuck, {sliding.first:.3g} Hz sliding: the force hardly moved the cart",
         ),
         Part(
-            f"a parasitic mode is about {_PARASITIC:g} Hz (within {percent(words.close)})",
-            bool(abs(stuck.parasitic / _PARASITIC - 1) <= words.close),
+            f"a parasitic mode is about {PARASITIC_MODE:g} Hz (within {percent(words.close)})",
+            bool(abs(stuck.parasitic / PARASITIC_MODE - 1) <= words.close),
             f"{stuck.parasitic:.4g} Hz (entered in the simulation, from this figure)",
             self_test=True,
         ),
@@ -130,14 +134,14 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
             f"by {CONSTANTS[0]:.2f}; one error of the motor constant, which is not in the model, {both} both (to "
             f"{percent(words.close)}), and the first mode does not depend on it.",
         ),
-        *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED[1], WEIGHED[1])),
+        *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED_MASSES[1], WEIGHED_MASSES[1])),
     )
 
 
-_STIFFNESS = 2.9e3
+JOINT_STIFFNESS = 2.9e3
 """Stiffness of the joint [N/m] in Fig. 19 (Sec. 4.2.2)."""
 
-_SPIKE = 0.1
+SPIKE_DELAY = 0.1
 """Time [s] within which a spike of the velocity follows a peak of the deflection."""
 
 _UNIFORM = "uniform friction along the rail, no noise"
@@ -152,7 +156,7 @@ def stiffness_from_position_steps(evidence: Evidence) -> Finding:
 
 def judged_steps(steps: JointSteps) -> Finding:
     """Judge whether simulated position steps give the joint's true stiffness, and the thesis's."""
-    read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
+    read, apparent = steps.result.stiffness, (2 * np.pi * FIRST_MODE) ** 2 * MEASURED_MASSES[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
     return Finding.of(
         Part(
@@ -161,17 +165,18 @@ def judged_steps(steps: JointSteps) -> Finding:
             bool(read.holds(steps.stiffness) and read.half_width <= words.close * steps.stiffness),
             f"{number_text(read.value / 1e3, '.4g', 'N/mm')} ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
             f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and forth, "
-            f"{STANDS:g} s each; no noise",
+            f"{STANDING_TIME:g} s each; no noise",
             why=read.reason or "The interval misses it, or is wide.",
             self_test=True,
         ),
         Part(
-            f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(words.close)})",
-            bool(abs(read.value / _STIFFNESS - 1) <= words.close),
+            f"it is {JOINT_STIFFNESS / 1e3:g} N/mm (within {percent(words.close)})",
+            bool(abs(read.value / JOINT_STIFFNESS - 1) <= words.close),
             f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
             beyond="Simulation cannot decide this: cables, misalignment and the motor constant (Sec. 4.2.2) "
             "are not in the model. The last alone, wrong by as much as the masses of Fig. 17 and 18 require, would "
-            f"make it {larger / 1e3:.3g} N/mm, and {FIRST:g} Hz with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} "
+            f"make it {larger / 1e3:.3g} N/mm, and {FIRST_MODE:g} Hz with {MEASURED_MASSES[1]:g} kg are "
+            f"{apparent / 1e3:.3g} "
             "too: the force was scaled differently there, or the joint was softer.",
         ),
     )
@@ -197,7 +202,7 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
     return Finding.of(
         Part(
             f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
-            f"relative position within {_SPIKE:g} s",
+            f"relative position within {SPIKE_DELAY:g} s",
             all(len(run.result.forces) > 1 and _spikes(run) for run in runs),
             f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis states neither); {_UNIFORM}",
         ),
@@ -209,8 +214,8 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
             self_test=True,
         ),
         Part(
-            f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
-            bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
+            f"the peaks themselves lie between {STATIC_RANGE[0]:g} and {STATIC_RANGE[1]:g} N",
+            bool(slips and forces.min() >= STATIC_RANGE[0] and forces.max() <= STATIC_RANGE[1]),
             range_read,
             beyond=f"Simulation cannot decide this: the static friction of {truth:g} N is entered (Table 2), "
             "and it is more than was measured.",
@@ -224,7 +229,7 @@ def _spikes(run: SlowMotion) -> bool:
     A spike is more than half of the usual one.
     """
     slips, time = run.result, run.log.time
-    after = [(time >= at) & (time <= at + _SPIKE) for at in slips.times]
+    after = [(time >= at) & (time <= at + SPIKE_DELAY) for at in slips.times]
     return all(np.abs(slips.cart_velocity[window]).max() > np.median(slips.speeds) / 2 for window in after)
 
 

@@ -13,7 +13,7 @@ from friso.studies.axes import Samples
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
 from friso_thesis.studies.thesis.settings import settings
-from friso_thesis.studies.thesis.space import SEED
+from friso_thesis.studies.thesis.space import DRAW_SEED
 from friso_thesis.studies.thesis.studies import STUDIES
 
 _LOCKED, _FREE = ("system", "friction", "control"), ("isolator-stiffness", "isolator-masses", "isolator-friction")
@@ -60,7 +60,7 @@ def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]
     links = {key: text for study in studies for key, text in study.links.items()}
     ranges = {key: span.text(2).rsplit(":", 2)[0] + (":log" if span.log else "") for key, span in spans.items()}
     stage = loads(stage_file).replace({"joint.locked": locked})
-    samples = Samples(ranges, count=settings.influence_draws, seed=SEED)
+    samples = Samples(ranges, count=settings.influence_draws, seed=DRAW_SEED)
     runs = sweep(stage, {}, samples, links, ["peaks", "outcome"], settings.influence_rtol)
     valid = ~runs["outcome"].isin(["invalid", "failed"]).values
     hunts = runs["peaks"].values[valid] > 0

@@ -24,25 +24,27 @@ from friso_thesis.studies.thesis.reading import words
 from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import thesis_rig
 
-STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
+JOINT_STROKE, JOINT_STIFFNESS, FIRST_FREQUENCY, PARASITIC_FREQUENCY, LARGEST_STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
 """Stroke, stiffness, first and parasitic frequency, and stress that the thesis finds with SPACAR [m, N/m, Hz, Hz, Pa]
 (Sec. 3.5)."""
 
-_CLOSE = 0.05
+CLOSE_ENOUGH = 0.05
 """Relative difference within which stiffness and first frequency should agree. For both, the thesis leaves only the
 steel open."""
 
-_YOUNG = (185e9, 195e9, 210e9)
+YOUNGS_MODULI = (185e9, 195e9, 210e9)
 """Young's moduli [Pa] of stainless spring steel: as rolled, tempered, and of steel in general."""
 
-_SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
+LEAF_SPACINGS, CENTRE_HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
 """Spacings of the leaves, and heights of the stage's centre of mass above their ends [m]: the thesis gives neither."""
 
 
 @cache
 def _evaluated() -> tuple[Evaluation, ...]:
     """Evaluate the thesis's leaf springs for all combinations of values that it leaves open."""
-    return tuple(beams(mechanism(*variant), STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
+    return tuple(
+        beams(mechanism(*variant), JOINT_STROKE) for variant in product(YOUNGS_MODULI, LEAF_SPACINGS, CENTRE_HEIGHTS)
+    )
 
 
 def mechanism(young: float, spacing: float, height: float) -> Mechanism:
@@ -77,23 +79,26 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
     stiffness = np.array([evaluation.drive[0] for evaluation in evaluations])
     first = np.array([evaluation.modes[0].frequency for evaluation in evaluations])
     stress = np.array([evaluation.stress for evaluation in evaluations])
-    over = f"over Young's moduli from {_YOUNG[0] / 1e9:g} to {_YOUNG[-1] / 1e9:g} GPa"
+    over = f"over Young's moduli from {YOUNGS_MODULI[0] / 1e9:g} to {YOUNGS_MODULI[-1] / 1e9:g} GPa"
     return Finding.of(
         Part(
-            f"the drive stiffness is {_STIFFNESS:g} N/m within {percent(_CLOSE)} for some stainless spring steel",
-            _met(stiffness / _STIFFNESS),
-            f"{_range(stiffness)} N/m {over}; with {_YOUNG[-1] / 1e9:g} GPa as plain beams, without "
-            f"anticlastic stiffening: {_as_beams(_YOUNG[-1]):.4g} N/m",
+            f"the drive stiffness is {JOINT_STIFFNESS:g} N/m within {percent(CLOSE_ENOUGH)} for some stainless spring "
+            "steel",
+            _met(stiffness / JOINT_STIFFNESS),
+            f"{_range(stiffness)} N/m {over}; with {YOUNGS_MODULI[-1] / 1e9:g} GPa as plain beams, without "
+            f"anticlastic stiffening: {_as_beams(YOUNGS_MODULI[-1]):.4g} N/m",
         ),
         Part(
-            f"with the cart held the first mode is {_FIRST:g} Hz within {percent(_CLOSE)} for some of them",
-            _met(first / _FIRST),
+            f"with the cart held the first mode is {FIRST_FREQUENCY:g} Hz within {percent(CLOSE_ENOUGH)} for some of "
+            "them",
+            _met(first / FIRST_FREQUENCY),
             f"{_range(first)} Hz",
         ),
         _parasitic(evaluations),
         Part(
-            f"the stress at 1 mm is at most {_STRESS / 1e6:g} MPa with the modulus of tempered strip, 195 GPa, or less",
-            bool(np.all(stress[[evaluation.mechanism.young <= 195e9 for evaluation in evaluations]] <= _STRESS)),
+            f"the stress at 1 mm is at most {LARGEST_STRESS / 1e6:g} MPa with the modulus of tempered strip, 195 GPa, "
+            "or less",
+            bool(np.all(stress[[evaluation.mechanism.young <= 195e9 for evaluation in evaluations]] <= LARGEST_STRESS)),
             f"{_range(stress / 1e6)} MPa {over}, at the largest over the width of the clamp",
         ),
     )
@@ -108,10 +113,15 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
     frequencies = np.array([mode.frequency for mode in modes])
     names = sorted({mode.name for mode in modes})
     return Part(
-        f"the first parasitic mode is about {_PARASITIC:g} Hz (within a factor of {words.about:g}), whatever "
+        f"the first parasitic mode is about {PARASITIC_FREQUENCY:g} Hz (within a factor of {words.about:g}), whatever "
         "spacing of "
-        f"{_millimetres(_SPACINGS)} and height of the centre of mass of {_millimetres(_HEIGHTS)} above the leaf ends",
-        bool(np.all((frequencies >= _PARASITIC / words.about) & (frequencies <= _PARASITIC * words.about))),
+        f"{_millimetres(LEAF_SPACINGS)} and height of the centre of mass of {_millimetres(CENTRE_HEIGHTS)} above the "
+        "leaf ends",
+        bool(
+            np.all(
+                (frequencies >= PARASITIC_FREQUENCY / words.about) & (frequencies <= PARASITIC_FREQUENCY * words.about)
+            )
+        ),
         f"{_range(frequencies)} Hz: {' or '.join(names)}; the first that actuator and sensor, underneath the leaves, "
         f"see: {_range(visible)} Hz",
         why="The sideways mode of the stage falls with its height, which the thesis leaves open.",
@@ -120,12 +130,12 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
 
 def _as_beams(young: float) -> float:
     """Return the drive stiffness [N/m] of leaves that may curl across their width: n 12 E I/L^3."""
-    own = mechanism(young, _SPACINGS[0], _HEIGHTS[0])
+    own = mechanism(young, LEAF_SPACINGS[0], CENTRE_HEIGHTS[0])
     return own.leaves * 12 * own.young * own.bending / own.length**3
 
 
 def _met(ratio: np.ndarray) -> bool:
-    return bool(np.any(np.abs(ratio - 1) <= _CLOSE))
+    return bool(np.any(np.abs(ratio - 1) <= CLOSE_ENOUGH))
 
 
 def _range(values: np.ndarray) -> str:
@@ -137,7 +147,7 @@ def _millimetres(lengths: Sequence[float]) -> str:
     return f"{1e3 * min(lengths):g} to {1e3 * max(lengths):g} mm"
 
 
-_STRIP, _APART = 195e9, 0.06
+STRIP_MODULUS, STRIP_SPACING = 195e9, 0.06
 """Young's modulus [Pa] of tempered strip, and spacing of the leaves [m]."""
 
 
@@ -147,8 +157,8 @@ _STIFFNESSES = "drive", "support_x", "support_y"
 @cache
 def evaluated(dimension: str = "", factor: float = 1.0) -> Evaluation:
     """Evaluate the leaf springs of Sec. 3.5, with one of their dimensions larger by a factor."""
-    own = mechanism(_STRIP, _APART, 0.0)
-    return beams(replace(own, **{dimension: factor * getattr(own, dimension)}) if dimension else own, STROKE)
+    own = mechanism(STRIP_MODULUS, STRIP_SPACING, 0.0)
+    return beams(replace(own, **{dimension: factor * getattr(own, dimension)}) if dimension else own, JOINT_STROKE)
 
 
 @judges("S341S", figure="Sec. 3.4.1, shortening")

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from friso.frequency.crossover import WANTED, Range
+from friso.frequency.crossover import COMFORTABLE_MARGIN, Range
 from friso.frequency.margins import Margins
 from friso.frequency.settings import settings as frequency_settings
 from friso.quantities import percent
@@ -17,11 +17,18 @@ from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, 
 from friso_thesis.studies.thesis.experiments import BUILT
 from friso_thesis.studies.thesis.judges.rig_loops import RAIL, measured_free, measured_locked, on_the_rig
 from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, PLANT, Linear
-from friso_thesis.studies.thesis.linear.loops import FURTHER, IDENTIFIED, LITTLE, SAMPLED, Contact, CrossoverLoops
-from friso_thesis.studies.thesis.linear.plants import PARASITIC, LimitCase, Speeds
+from friso_thesis.studies.thesis.linear.loops import (
+    FURTHER_CROSSING,
+    IDENTIFIED,
+    LITTLE,
+    SAMPLED,
+    Contact,
+    CrossoverLoops,
+)
+from friso_thesis.studies.thesis.linear.plants import PARASITIC_FREQUENCY, LimitCase, Speeds
 from friso_thesis.studies.thesis.reading import about, words
 
-_FIRST = 10.0
+FIRST_FREQUENCY = 10.0
 """Eigenfrequency of the free joint [Hz] in the thesis (Sec. 3.4.2)."""
 
 _FREE, _TOUCHED = ("stuck", "sliding"), ("stuck-touched", "sliding-touched")
@@ -58,9 +65,10 @@ def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
     pair = f"antiresonance {low['sliding'][-1]:.3g} Hz, resonance" if low["sliding"] else "no antiresonance below"
     return (
         Part(
-            f"with the limiter free, the first resonance is about {_FIRST:g} Hz (from {_FIRST / words.about:.3g} to "
-            f"{_FIRST * words.about:.3g} Hz), stuck and sliding",
-            all(about(plants[name].first, _FIRST) for name in _FREE),
+            f"with the limiter free, the first resonance is about {FIRST_FREQUENCY:g} Hz (from "
+            f"{FIRST_FREQUENCY / words.about:.3g} to "
+            f"{FIRST_FREQUENCY * words.about:.3g} Hz), stuck and sliding",
+            all(about(plants[name].first, FIRST_FREQUENCY) for name in _FREE),
             ", ".join(f"{name} {plants[name].first:.3g} Hz" for name in _FREE),
         ),
         Part(
@@ -82,9 +90,10 @@ def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
     above = all(pairs.values())
     return (
         Part(
-            f"in all four cases a resonance is about {PARASITIC:g} Hz (from {PARASITIC / words.about:.3g} to "
-            f"{PARASITIC * words.about:.3g} Hz)",
-            all(about(plants[name].parasitic, PARASITIC) for name in names),
+            f"in all four cases a resonance is about {PARASITIC_FREQUENCY:g} Hz (from "
+            f"{PARASITIC_FREQUENCY / words.about:.3g} to "
+            f"{PARASITIC_FREQUENCY * words.about:.3g} Hz)",
+            all(about(plants[name].parasitic, PARASITIC_FREQUENCY) for name in names),
             ", ".join(f"{name} {plants[name].parasitic:.4g} Hz" for name in names),
             why="With the limiter touched the parasitic mass swings against cart and stage, not against the stage.",
         ),
@@ -137,10 +146,10 @@ def _and(case: LimitCase) -> str:
     return " and ".join(f"{f:.4g}" for f in case.resonances) + " Hz"
 
 
-_SIMULATED, _MEASURED = 60.0, 48.0
+SIMULATED_HIGHEST, MEASURED_HIGHEST = 60.0, 48.0
 """Highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
 
-_CROSSES = 20.0
+FREE_CROSSING = 20.0
 """Frequency [Hz] at which the free rig, tuned to 8 Hz, crossed 0 dB (Sec. 4.2.4)."""
 
 
@@ -162,10 +171,10 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
         ),
         Part(
             "by the design method of Sec. 3.4.2 (the loop of the whole mass, sliding, crosses 0 dB once) the "
-            f"crossover may be up to {_SIMULATED:g} Hz (or what is the same, {percent(words.same)} less)",
-            single is None or single >= (1 - words.same) * _SIMULATED,
+            f"crossover may be up to {SIMULATED_HIGHEST:g} Hz (or what is the same, {percent(words.same)} less)",
+            single is None or single >= (1 - words.same) * SIMULATED_HIGHEST,
             f"up to {_hertz(single)}, where {_beyond(analysis.locked)}; all limit cases are stable up to "
-            f"{_hertz(analysis.free.unsampled)} in continuous time; {_edges(analysis, _SIMULATED)}",
+            f"{_hertz(analysis.free.unsampled)} in continuous time; {_edges(analysis, SIMULATED_HIGHEST)}",
             why="Below that the parasitic mode reaches 0 dB too, whose mass and damping the thesis leaves open.",
         ),
     )
@@ -173,8 +182,8 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 
 def _beyond(locked: CrossoverLoops) -> str:
     """Say where the locked loop, tuned to the highest crossover, crosses 0 dB again."""
-    further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
-    return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
+    further = _further(locked.margins[MEASURED_HIGHEST]["sliding"], MEASURED_HIGHEST)
+    return f"a mode reaches it too (locked, tuned to {MEASURED_HIGHEST:g} Hz: {_frequencies(further)})"
 
 
 def _stable_at_speeds(speeds: Speeds) -> Part:
@@ -206,7 +215,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
     tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
     lowest, highest = min(settings), max(settings)
     further = _further(settings[highest], highest)
-    near = min(further, key=lambda f: abs(np.log(f / FURTHER)), default=np.nan)
+    near = min(further, key=lambda f: abs(np.log(f / FURTHER_CROSSING)), default=np.nan)
     return Finding.of(
         Part(
             f"at every setting from {lowest:g} to {highest:g} Hz the sliding rig crosses 0 dB about there (within "
@@ -215,9 +224,9 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
             ", ".join(f"{crossing:.3g} Hz tuned to {f:g}" for f, crossing in tuned.items()),
         ),
         Part(
-            f"at the highest setting another crossing of 0 dB is about {FURTHER:g} Hz (from "
-            f"{FURTHER / words.about:.3g} to {FURTHER * words.about:.3g} Hz)",
-            about(near, FURTHER),
+            f"at the highest setting another crossing of 0 dB is about {FURTHER_CROSSING:g} Hz (from "
+            f"{FURTHER_CROSSING / words.about:.3g} to {FURTHER_CROSSING * words.about:.3g} Hz)",
+            about(near, FURTHER_CROSSING),
             f"tuned to {highest:g} Hz it crosses again at {_frequencies(further)}, to {lowest:g} Hz at "
             f"{_frequencies(_further(settings[lowest], lowest))}",
             beyond=f"Simulation cannot decide this. {_why_elsewhere(evidence.analysis.contact)}",
@@ -229,7 +238,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
 
 def _why_elsewhere(contact: Contact) -> str:
     """Say which change of the model would make the loop cross 0 dB where the thesis measured it."""
-    soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
+    soft, undamped = (_further(loop_margins, MEASURED_HIGHEST) for loop_margins in (contact.margins, contact.undamped))
     return (
         "No mode of the locked model lies there. The contact of cart and stage would with k_l of "
         f"{contact.stiffness:.2g} N/m (Sec. 3.2.3: 2e7 N/m, for limiters, not for fixtures): further crossings then "
@@ -249,8 +258,8 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
     )
     return Part(
         "at the highest setting that crossing threatens stability: about there the loop comes closer to -1 than "
-        f"{WANTED:g} (or it is unstable)",
-        bool(further) and (not margins.stable or (close and margins.modulus_margin < WANTED)),
+        f"{COMFORTABLE_MARGIN:g} (or it is unstable)",
+        bool(further) and (not margins.stable or (close and margins.modulus_margin < COMFORTABLE_MARGIN)),
         where,
         beyond="Simulation cannot decide this: the mode that the thesis saw there is not in the model"
         + (
@@ -269,23 +278,24 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
     """
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]
-    crossing = {name: crossing_nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
+    crossing = {name: crossing_nearest(cases[name], FREE_CROSSING) for name in ("stuck", "sliding")}
     crossed = ", ".join(f"{name} {number_text(f, unit='Hz')}" for name, f in crossing.items())
     highest = analysis.free.unsampled
     return Finding.of(
         Part(
             f"tuned to {min(analysis.free.margins):g} Hz for the whole mass, the free joint's loop crosses 0 dB "
-            f"about {_CROSSES:g} Hz (from {_CROSSES / words.about:.3g} to {_CROSSES * words.about:.3g} Hz), "
+            f"about {FREE_CROSSING:g} Hz (from {FREE_CROSSING / words.about:.3g} to {FREE_CROSSING * words.about:.3g} "
+            "Hz), "
             "stuck and sliding",
-            all(about(f, _CROSSES) for f in crossing.values()),
+            all(about(f, FREE_CROSSING) for f in crossing.values()),
             f"{crossed}; with the masses identified ({', tuned for '.join(IDENTIFIED.values())}) "
-            f"{crossing_nearest(analysis.identified, _CROSSES):.3g} Hz",
+            f"{crossing_nearest(analysis.identified, FREE_CROSSING):.3g} Hz",
         ),
         Part(
-            f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
-            f"{_MEASURED / words.about:.3g} to {_MEASURED * words.about:.3g} Hz)",
-            highest is not None and about(highest, _MEASURED),
-            f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, _MEASURED)}",
+            f"the setting up to which all limit cases are stable is about {MEASURED_HIGHEST:g} Hz (from "
+            f"{MEASURED_HIGHEST / words.about:.3g} to {MEASURED_HIGHEST * words.about:.3g} Hz)",
+            highest is not None and about(highest, MEASURED_HIGHEST),
+            f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, MEASURED_HIGHEST)}",
             beyond="Simulation cannot decide this: the rig's controller samples and delays, but the thesis "
             "gives no delay, and its frame has resonances (Sec. 4.3.1) that the model does not have.",
         ),

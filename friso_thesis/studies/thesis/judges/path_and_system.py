@@ -27,7 +27,7 @@ from friso_thesis.studies.thesis.maps import (
 from friso_thesis.studies.thesis.reading import words
 from friso_thesis.studies.thesis.studies import STUDIES
 
-_GAP = 1.0
+HUNTING_GAP = 1.0
 """Gap between static and Coulomb friction from which hunting was seen [N] (claim F12A)."""
 
 
@@ -53,13 +53,13 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
     )
     return Finding.of(
         Part(
-            f"the smallest gap F_s - F_c at which the stage keeps moving is about {_GAP:g} N (from "
-            f"{_GAP / words.about:.2g} to {_GAP * words.about:.2g} N)",
-            bool(_GAP / words.about <= smallest <= _GAP * words.about),
+            f"the smallest gap F_s - F_c at which the stage keeps moving is about {HUNTING_GAP:g} N (from "
+            f"{HUNTING_GAP / words.about:.2g} to {HUNTING_GAP * words.about:.2g} N)",
+            bool(HUNTING_GAP / words.about <= smallest <= HUNTING_GAP * words.about),
             f"smallest gap {smallest:.2g} N" if moving.any() else "no cell keeps moving",
-            printed=_GAP,
+            printed=HUNTING_GAP,
             read=smallest,
-            undecided=beside(smallest, (_GAP / words.about, _GAP * words.about), error),
+            undecided=beside(smallest, (HUNTING_GAP / words.about, HUNTING_GAP * words.about), error),
         ),
         Part(
             "over the cells that keep moving, the count rises with the gap (rank correlation at least "
@@ -134,10 +134,10 @@ def _mean_rank_correlation(x: np.ndarray, y: np.ndarray, moving: np.ndarray) -> 
     return float(trends[np.isfinite(trends)].mean()) if np.isfinite(trends).any() else np.nan
 
 
-_ENDS = 20.0
+HUNTING_ENDS = 20.0
 """Crossover above which the thesis saw no hunting [Hz] (Sec. 4.1)."""
 
-TRAVEL = 0.16
+ACTUATOR_TRAVEL = 0.16
 """Travel of the rig's actuator [m] (Sec. 3.5). Longer paths of Fig. 11A exist in simulation only."""
 
 
@@ -151,7 +151,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
     moved = (acceleration > 0)[:, None] & (time > 0)[None, :] & valid
     lines = [*moving[acceleration > 0][:, time > 0], *moving[acceleration > 0][:, time > 0].T]
     free_lines = float(np.mean([not line.any() for line in lines]))
-    fits = moved & (acceleration[:, None] * time[None, :] ** 2 * (1 + cruise) <= TRAVEL)
+    fits = moved & (acceleration[:, None] * time[None, :] ** 2 * (1 + cruise) <= ACTUATOR_TRAVEL)
     square, short_square = free_square(moving, moved), free_square(moving, fits)
     speed = acceleration[:, None] * time[None, :]
     resting = moved & ~moving
@@ -166,7 +166,8 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
             f"{percent(free_lines)} of the lines and a square of {percent(square, 3)} come to rest",
         ),
         Part(
-            f"so it is among the paths that fit the {TRAVEL * 1e3:g} mm of the rig (Sec. 3.5): the largest square "
+            f"so it is among the paths that fit the {ACTUATOR_TRAVEL * 1e3:g} mm of the rig (Sec. 3.5): the largest "
+            "square "
             "at rest covers few of them",
             bool(moving[fits].any() and short_square <= words.few),
             f"{percent(overlap(fits, moved))} of the paths fit; {percent(overlap(moving, fits))} of these keep it "
@@ -194,14 +195,15 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
     ended = marker & ~moving[:, -1]
     return Finding.of(
         Part(
-            f"the limit above which no mass keeps moving is about {_ENDS:g} Hz (from {_ENDS / words.about:.3g} to "
-            f"{_ENDS * words.about:.3g} Hz)",
-            bool(_ENDS / words.about <= highest <= _ENDS * words.about),
+            f"the limit above which no mass keeps moving is about {HUNTING_ENDS:g} Hz (from "
+            f"{HUNTING_ENDS / words.about:.3g} to "
+            f"{HUNTING_ENDS * words.about:.3g} Hz)",
+            bool(HUNTING_ENDS / words.about <= highest <= HUNTING_ENDS * words.about),
             f"limit {highest:.3g} Hz{_at_the_limit(moving, peak_counts(runs, CROSSOVER, 'mass'))}; "
             f"median over the masses {np.median(by_mass):.3g} Hz",
-            printed=_ENDS,
+            printed=HUNTING_ENDS,
             read=float(highest),
-            undecided=beside(highest, (_ENDS / words.about, _ENDS * words.about), limit_error(crossover)),
+            undecided=beside(highest, (HUNTING_ENDS / words.about, HUNTING_ENDS * words.about), limit_error(crossover)),
         ),
         Part(
             "at some crossovers the stage keeps moving with the marker's mass and comes to rest with the "

@@ -12,10 +12,10 @@ import numpy as np
 from friso.quantities import percent
 from friso.shares import share_interval
 from friso.studies.rig.moves_on_rails import RailRuns
-from friso_thesis.studies.rig.in_position import BITS, InPosition
+from friso_thesis.studies.rig.in_position import FORCE_BITS, InPosition
 from friso_thesis.studies.rig.measured_cycles import MOTORS
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
-from friso_thesis.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
+from friso_thesis.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, RELEASE_DISTANCES, CyclesOnRails, MovesOnRails
 from friso_thesis.studies.thesis.claims import BESIDE, Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 from friso_thesis.studies.thesis.judges.rig_loops import RAIL
@@ -27,7 +27,7 @@ _ASSUMED = (
     f"{AS_BUILT['rail.correlation_length']} along the rail, {AS_BUILT['drive.delay']} of delay"
 )
 
-_DEVIATIONS = 0.1e-6, 1e-6
+PEAK_DEVIATIONS = 0.1e-6, 1e-6
 """Peak deviations in Fig. 28 with the joint locked and free [m]."""
 
 
@@ -103,7 +103,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
         Part(
             f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
             started > 0,
-            f"{started} of {int(settle.sum())} such rails, released {percent(max(DISPLACEMENTS))} of the move to "
+            f"{started} of {int(settle.sum())} such rails, released {percent(max(RELEASE_DISTANCES))} of the move to "
             "either side",
             why="None of the starts tried on these rails keeps swinging.",
         ),
@@ -228,15 +228,17 @@ def judged_standstill(standstill: InPosition) -> Finding:
     """Judge whether the stage stands less still with its joint free, and what damping recovers."""
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")
-    expected = _DEVIATIONS[1] / _DEVIATIONS[0]
+    expected = PEAK_DEVIATIONS[1] / PEAK_DEVIATIONS[0]
     tenfold = float(np.interp(np.log(10 * standstill.own_damping), np.log(standstill.damping), standstill.recovered))
     assumed = (
-        f"Assumed: {standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {BITS} bits), a "
+        f"Assumed: {standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {FORCE_BITS} "
+        "bits), a "
         "quiet laboratory's floor"
     )
     return Finding.of(
         Part(
-            f"locked the deviation is of the order of {_DEVIATIONS[0] * 1e6:g} um, free of {_DEVIATIONS[1] * 1e6:g} um",
+            f"locked the deviation is of the order of {PEAK_DEVIATIONS[0] * 1e6:g} um, free of "
+            f"{PEAK_DEVIATIONS[1] * 1e6:g} um",
             _sized((peaks[0], peaks[1])),
             f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
             beyond=f"Simulation cannot decide this. {_over_noise(standstill)}",
@@ -260,12 +262,12 @@ def judged_standstill(standstill: InPosition) -> Finding:
 
 
 def _sized(peaks: tuple[float, float]) -> bool:
-    return all(about(peak, size, words.order) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
+    return all(about(peak, size, words.order) for peak, size in zip(peaks, PEAK_DEVIATIONS, strict=True))
 
 
 def _turned_by_noise(standstill: InPosition) -> str:
     """Say that the noise of the force decides whether the ratio of peaks is as measured; "" if it does not."""
-    expected = _DEVIATIONS[1] / _DEVIATIONS[0]
+    expected = PEAK_DEVIATIONS[1] / PEAK_DEVIATIONS[0]
     ratios = [free / locked for locked, free in standstill.louder.values()]
     if len({about(value, expected, words.order) for value in ratios}) < 2:
         return ""

@@ -7,16 +7,16 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.quantities import percent
-from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, crossing_near_target, highest_stable
+from friso.studies.rig.experiments.frf import MOTOR_CONSTANT_RATIOS, MeasuredLoop, crossing_near_target, highest_stable
 from friso.studies.rig.outcome import SLIDING
 from friso_thesis.studies.thesis.as_built import AS_BUILT, RigLoops
 from friso_thesis.studies.thesis.claims import Evidence, Part, number_text
 from friso_thesis.studies.thesis.reading import about, words
 
-_HIGHEST, _OTHER, _FREE = 48.0, 600.0, 20.0
+HIGHEST_SETTING, OTHER_CROSSING, FREE_CROSSING = 48.0, 600.0, 20.0
 """Highest setting, crossing that threatens stability (Fig. 22), and crossing of the free joint (Fig. 23) [Hz]."""
 
-BEYOND = 3.0
+BEYOND_CROSSOVER = 3.0
 """Ratio of a peak's frequency to the crossover from which the peak belongs to a mode."""
 
 ASSUMED = (
@@ -55,10 +55,10 @@ def _further(loops: RigLoops) -> Part:
     """Judge whether the locked loop tuned to the highest crossover crosses 0 dB a second time."""
     last = loops.locked[-1]
     above = [crossing.value for crossing in last.crossings if crossing.value > words.about * last.tuned]
-    near, gain = _peak(last, BEYOND * last.tuned)
+    near, gain = _peak(last, BEYOND_CROSSOVER * last.tuned)
     return Part(
-        f"measured on the rig as built, that tuned to {last.tuned:g} Hz crosses 0 dB again about {_OTHER:g} Hz",
-        any(about(f, _OTHER) for f in above),
+        f"measured on the rig as built, that tuned to {last.tuned:g} Hz crosses 0 dB again about {OTHER_CROSSING:g} Hz",
+        any(about(f, OTHER_CROSSING) for f in above),
         f"above the first crossing: {', '.join(f'{f:.3g} Hz' for f in above) or 'none'}; its peak there is "
         f"{number_text(gain, '.2g')} at {number_text(near, unit='Hz')}",
         beyond="Simulation cannot decide this: the only parasitic mode of the model is that of Fig. 18"
@@ -83,14 +83,15 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
     highest = highest_stable(loops.settings, loops.stable)
     return (
         Part(
-            f"measured on the rig as built, tuned to {loops.free.tuned:g} Hz, it crosses 0 dB about {_FREE:g} Hz",
-            about(crossed, _FREE),
+            f"measured on the rig as built, tuned to {loops.free.tuned:g} Hz, it crosses 0 dB about {FREE_CROSSING:g} "
+            "Hz",
+            about(crossed, FREE_CROSSING),
             f"last crossing: {number_text(crossed, unit='Hz')}. {ASSUMED}",
             why="With the masses weighed it crosses higher than with those identified, which the model does not have.",
         ),
         Part(
-            f"the highest setting at which the rig as built comes to rest is about {_HIGHEST:g} Hz",
-            about(highest, _HIGHEST),
+            f"the highest setting at which the rig as built comes to rest is about {HIGHEST_SETTING:g} Hz",
+            about(highest, HIGHEST_SETTING),
             f"{number_text(highest, unit='Hz')}, of settings 10 % apart, released away from its reference, the "
             "limiters not touched",
             beyond="Simulation cannot decide this: the thesis found “resonances in the compliant joint”, of which "
@@ -106,10 +107,12 @@ def weaker_motor(loops: RigLoops, joint: int, seen: float, weighed: float) -> tu
     """
     plain, weak, strong = loops.apparent[joint]
     part = Part(
-        f"with a motor that gives {RATIOS[1]:g} of the force that the drive assumes, it is nearer {seen:g} than the "
+        f"with a motor that gives {MOTOR_CONSTANT_RATIOS[1]:g} of the force that the drive assumes, it is nearer "
+        f"{seen:g} than the "
         f"{weighed:g} kg weighed (by their ratios)",
         bool(weak > (seen * weighed) ** 0.5),
-        f"{weak:.3g} kg, {plain:.3g} with the assumed force, {strong:.3g} with {RATIOS[2]:g} times it: a motor "
+        f"{weak:.3g} kg, {plain:.3g} with the assumed force, {strong:.3g} with {MOTOR_CONSTANT_RATIOS[2]:g} times it: "
+        "a motor "
         f"stronger than assumed makes masses appear lighter. {ASSUMED}",
         self_test=True,
     )

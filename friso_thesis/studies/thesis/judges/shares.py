@@ -52,7 +52,7 @@ STRIBECK_VELOCITY = 1.6e-3
 """Stribeck velocity of Table 2 [m/s]."""
 
 
-TURNING = 0.05
+LONGEST_REVERSAL = 0.05
 """Longest time [s] below the Stribeck velocity that still counts as a mere reversal."""
 
 
@@ -142,7 +142,7 @@ def slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(slow.astype(int)))
     spells = [(int(a) + 1, int(b)) for a, b in pairwise(edges) if slow[a + 1]]
     time = trace["time"].values
-    return [(i, k) for i, k in spells if time[k] - time[i] > TURNING]
+    return [(i, k) for i, k in spells if time[k] - time[i] > LONGEST_REVERSAL]
 
 
 def seconds(time: float) -> str:

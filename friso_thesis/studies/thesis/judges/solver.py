@@ -20,17 +20,17 @@ from friso_thesis.studies.thesis.studies import thesis_rig
 EVIDENCE = "thesis.solver"
 """Name of the finding on ode23s (`benchmarks/ode23s.py`), which takes 200 000 steps a run."""
 
-CROSSOVERS = (4.0, 8.0, 12.0, 16.0, 20.0)
+RUN_CROSSOVERS = (4.0, 8.0, 12.0, 16.0, 20.0)
 """Crossovers [Hz] of runs with the joint locked and free: evenly spread up to where Fig. 11 sees no hunting."""
 
-STROKES, DAMPINGS = (30, 100, 300), (1, 100, 10_000)
+LIMITER_STROKES, LIMITER_DAMPINGS = (30, 100, 300), (1, 100, 10_000)
 """Strokes [um] and limiter dampings [N s/m] of further runs with the joint free, which hit the limiter: over Fig.
 14B."""
 
 AT_REST = 1e-9
 """Swing [m] below which a run counts as at rest."""
 
-RTOL, TIGHT = 1e-4, 1e-8
+THESIS_RTOL, TIGHT_RTOL = 1e-4, 1e-8
 """The thesis's relative tolerance, and a tight one."""
 
 
@@ -38,15 +38,15 @@ def _cases() -> dict[str, dict[str, Any]]:
     both = {
         f"{'locked' if locked else 'free'}_{crossover:g}_hz": {"joint.locked": locked, CROSSOVER: f"{crossover:g} Hz"}
         for locked in (True, False)
-        for crossover in CROSSOVERS
+        for crossover in RUN_CROSSOVERS
     }
     hit = {
         f"stroke_{stroke}_um_damping_{damping}": {
             "joint.stroke": f"{stroke} um",
             "joint.limiter_damping": f"{damping} N*s/m",
         }
-        for stroke in STROKES
-        for damping in DAMPINGS
+        for stroke in LIMITER_STROKES
+        for damping in LIMITER_DAMPINGS
     }
     return both | hit
 
@@ -59,7 +59,7 @@ CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(_cases())
 def solver_and_largest_step(evidence: Evidence) -> Finding:
     """Judge whether runs by the thesis's solver and by friso hunt alike, as often and as far."""
     kept = findings_on_file()[EVIDENCE].values
-    return judged_runs({name: _kept(kept, name) for name in CASES}, own_runs(TIGHT), own_runs(RTOL))
+    return judged_runs({name: _kept(kept, name) for name in CASES}, own_runs(TIGHT_RTOL), own_runs(THESIS_RTOL))
 
 
 Counted = tuple[int, float, float]
@@ -99,27 +99,29 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
     rows = tuple((_title(name), *(_text(runs[name]) for runs in (theirs, tight, loose))) for name in tight)
     return Finding.of(
         Part(
-            f"ode23s, relative tolerance {RTOL:g}, steps of at most 1e-4 s, counts as many peaks as friso at "
-            f"{TIGHT:g} in each of {len(tight)} runs",
+            f"ode23s, relative tolerance {THESIS_RTOL:g}, steps of at most 1e-4 s, counts as many peaks as friso at "
+            f"{TIGHT_RTOL:g} in each of {len(tight)} runs",
             not counts,
             f"in {len(tight) - len(counts)} of {len(tight)}"
             + (f"; not in {', '.join(map(_title, counts))}" if counts else ""),
             why="The tolerance decides where a run is near an edge of hunting, or bounces on the limiter.",
         ),
         Part(
-            f"the swing at the end is the same (within {percent(words.same)}) in each run that swings at {TIGHT:g}",
+            f"the swing at the end is the same (within {percent(words.same)}) in each run that swings at "
+            f"{TIGHT_RTOL:g}",
             bool(off) and max(off.values()) <= words.same,
             f"off by at most {percent(max(off.values()), 2)} in {len(off)} runs" if off else "no run swings",
             why="The tolerance is too loose for these.",
         ),
         Part(
-            f"friso at {RTOL:g}, without a largest step but the two hundredth of the run, counts as many in each",
+            f"friso at {THESIS_RTOL:g}, without a largest step but the two hundredth of the run, counts as many in "
+            "each",
             not own,
             f"in {len(tight) - len(own)} of {len(tight)}; {min(steps[1])} to {max(steps[1])} steps a run, ode23s "
             f"{min(steps[0])} to {max(steps[0])}",
             self_test=True,
         ),
-        table=FindingTable(("run", "ode23s", f"friso, {TIGHT:g}", f"friso, {RTOL:g}"), rows),
+        table=FindingTable(("run", "ode23s", f"friso, {TIGHT_RTOL:g}", f"friso, {THESIS_RTOL:g}"), rows),
     )
 
 

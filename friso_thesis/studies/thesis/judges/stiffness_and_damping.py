@@ -148,7 +148,7 @@ def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
     )
 
 
-_NEEDED = 1e-4
+NEEDED_STROKE = 1e-4
 """Stroke [m] that the isolator needs with a strongly damped limiter (Sec. 4.1)."""
 
 _SMALL_DAMPING = 1.0
@@ -225,16 +225,16 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
     return Finding.of(
         Part(
             f"with limiter damping of {words.large:g} N s/m and more, the median stroke from which the stage comes to "
-            f"rest is about {_NEEDED * 1e3:g} mm (from {_NEEDED / words.about * 1e3:.2g} to "
-            f"{_NEEDED * words.about * 1e3:.2g} mm)",
-            bool(_NEEDED / words.about <= at_large <= _NEEDED * words.about),
+            f"rest is about {NEEDED_STROKE * 1e3:g} mm (from {NEEDED_STROKE / words.about * 1e3:.2g} to "
+            f"{NEEDED_STROKE * words.about * 1e3:.2g} mm)",
+            bool(NEEDED_STROKE / words.about <= at_large <= NEEDED_STROKE * words.about),
             f"stroke needed {at_large * 1e3:.2g} mm{_stripe(stroke, damping, moving)}; with damping below "
             f"{_SMALL_DAMPING:g} N s/m {np.median(small) * 1e3:.2g} mm",
-            printed=_NEEDED,
+            printed=NEEDED_STROKE,
             read=at_large,
             undecided=beside(
                 np.log(at_large),
-                np.log((_NEEDED / words.about, _NEEDED * words.about)),
+                np.log((NEEDED_STROKE / words.about, NEEDED_STROKE * words.about)),
                 limit_error(np.log(stroke), int((damping >= words.large).sum())),
             ),
         ),

@@ -22,13 +22,13 @@ from friso.frequency.members import Members, in_series, limit_cases
 from friso.frequency.settings import settings as frequency_settings
 from friso.frequency.system import DriveTiming
 from friso.stage import Stage
-from friso.studies.rig.experiments.frf import SETTINGS as MEASURED_SETTINGS
+from friso.studies.rig.experiments.frf import CROSSOVER_SETTINGS as MEASURED_SETTINGS
 from friso_thesis.studies.thesis.studies import LOCKED
 
 IDENTIFIED: Mapping[str, Any] = {"masses.stage": "0.75 kg", TUNED_MASS: "2.5 kg"}
 """The masses that the thesis identified (Sec. 4.2.1)."""
 
-FURTHER = 600.0
+FURTHER_CROSSING = 600.0
 """Further crossing of 0 dB that the thesis measured [Hz] (Sec. 4.2.4)."""
 
 AT_HIGHEST: Mapping[str, Any] = {**LOCKED, CROSSOVER: "48 Hz"}
@@ -64,7 +64,7 @@ def soft_contact(stage: Stage) -> Contact:
     """
     flat = stage.flat()
     reduced = in_series(flat["masses.cart"], flat["masses.stage"] - flat["parasitic.mass"])
-    stiffness = float((2 * np.pi * FURTHER) ** 2 * reduced)
+    stiffness = float((2 * np.pi * FURTHER_CROSSING) ** 2 * reduced)
     soft = stage.replace({**AT_HIGHEST, "joint.limiter_stiffness": f"{stiffness!r} N/m"})
     return Contact(stiffness, _sliding(soft), _sliding(soft.replace({"joint.limiter_damping": LITTLE})))
 
@@ -77,23 +77,23 @@ def _sliding(stage: Stage) -> Margins:
 SETTINGS = tuple(8.0 * factor for factor in MEASURED_SETTINGS)
 """Crossovers [Hz] of Fig. 22, equal for the model and for the measured rig, which are drawn together."""
 
-LIMITS = (48.0, 60.0)
+HIGHEST_CROSSOVERS = (48.0, 60.0)
 """Crossovers [Hz] that the thesis calls the highest, of the rig (Sec. 4.2.4) and of the simulation (Sec. 3.4.2)."""
 
 SAMPLED = "50 us"
 """Sample time of the rig's controller (Sec. 3.5)."""
 
-DELAYS = (0.0, 50e-6, 100e-6, 150e-6, 200e-6, 500e-6, 1e-3)
+LOOP_DELAYS = (0.0, 50e-6, 100e-6, 150e-6, 200e-6, 500e-6, 1e-3)
 """Delays [s] of drive, encoder and computation, besides the hold. The thesis states none, so they range from zero over
 a few samples to the delay of a fieldbus."""
 
-CURVE = (1.0, 3e3)
+CURVE_RANGE = (1.0, 3e3)
 """Frequencies [Hz] over which the loops are drawn."""
 
-POINTS = 600
+CURVE_POINTS = 600
 """Number of frequencies of a curve; more lie around resonances."""
 
-LOWEST, STEPS = 1.0, 61
+LOWEST_CROSSOVER, CROSSOVER_STEPS = 1.0, 61
 """Lowest crossover [Hz] and number of crossovers in the search for the ends of a range."""
 
 
@@ -126,7 +126,7 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> CrossoverLoops:
     flat = stage.flat()
     tuned = {f: _tuned(flat, f) for f in settings}
     resonances = plant_poles(flat, Members.joined(limit_cases(flat).values()))
-    omega = with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [resonances])
+    omega = with_resonances(np.geomspace(*CURVE_RANGE, CURVE_POINTS) * 2 * np.pi, [resonances])
     moving = limit_cases(flat)["sliding"]
     drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
     return CrossoverLoops(
@@ -137,8 +137,8 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> CrossoverLoops:
         curves={f: loops(keys, moving, omega)[0] for f, keys in tuned.items()},
         single=_single(flat),
         unsampled=_highest(flat),
-        sampled={delay: _highest({**drive, "drive.delay": delay}) for delay in DELAYS},
-        delay_at={f: _edge(_tuned(drive, f)) for f in LIMITS},
+        sampled={delay: _highest({**drive, "drive.delay": delay}) for delay in LOOP_DELAYS},
+        delay_at={f: _edge(_tuned(drive, f)) for f in HIGHEST_CROSSOVERS},
     )
 
 
@@ -163,7 +163,7 @@ def _single(flat: Mapping[str, Any]) -> float | None:
         above = np.array([np.abs(bare * controller_response(_tuned(flat, f), omega)) > 1 for f in crossover])
         return (above[:, 1:] != above[:, :-1]).sum(axis=1) - 1.5
 
-    at = np.geomspace(LOWEST, 0.999 * frequency_settings.highest_crossover, STEPS)
+    at = np.geomspace(LOWEST_CROSSOVER, 0.999 * frequency_settings.highest_crossover, CROSSOVER_STEPS)
     end = next((high for _, high in ranges_below(at, more)), 0.0)
     return None if end >= at[-1] else end
 

@@ -14,7 +14,7 @@ from scipy.signal import find_peaks
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.bode import PRESCRIBED
+from friso.frequency.bode import PRESCRIBED_SPEEDS
 from friso.frequency.crossover import Range, ranges_below
 from friso.frequency.family import loops, plant_poles, plants, spectral_abscissa
 from friso.frequency.loops import closed_loop
@@ -25,10 +25,10 @@ from friso.frequency.settings import settings
 from friso.frequency.system import DriveTiming
 from friso.stage.tables import friction_law
 
-SPEEDS = 257
+SPEED_COUNT = 257
 """Number of speeds at which stability is checked before the ends of ranges are located."""
 
-CROSSOVERS = 25
+CROSSOVER_COUNT = 25
 """Number of faster controllers that are tried if the cart is unstable."""
 
 
@@ -57,12 +57,12 @@ def loop_over_speed(flat: Mapping[str, Any]) -> Speeds:
     """Compute how stability of the loop depends on the speed of the cart."""
     unstable = {touched: _unstable(flat, touched) for touched in (False, True)}
     tenth = 2 * np.pi * flat[CROSSOVER] * np.array([0.1, 10.0])
-    size = np.abs(np.array([loops(flat, member(speed), tenth)[0] for speed in PRESCRIBED]))
+    size = np.abs(np.array([loops(flat, member(speed), tenth)[0] for speed in PRESCRIBED_SPEEDS]))
     slow, fast = (size.max(axis=0) / size.min(axis=0)).tolist()
     return Speeds(
         unstable=unstable[False],
         unstable_touched=unstable[True],
-        undeflected=ranges_below(speeds(flat, SPEEDS), lambda v: -abscissa_with_bristles(flat, v, 0.0)),
+        undeflected=ranges_below(speeds(flat, SPEED_COUNT), lambda v: -abscissa_with_bristles(flat, v, 0.0)),
         incurable=_incurable(flat, unstable[False]),
         slow=slow,
         fast=fast,
@@ -70,7 +70,7 @@ def loop_over_speed(flat: Mapping[str, Any]) -> Speeds:
 
 
 def _unstable(flat: Mapping[str, Any], touched: bool) -> tuple[Range, ...]:
-    return ranges_below(speeds(flat, SPEEDS), lambda v: -spectral_abscissa(flat, _sliding(v, touched)))
+    return ranges_below(speeds(flat, SPEED_COUNT), lambda v: -spectral_abscissa(flat, _sliding(v, touched)))
 
 
 def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
@@ -81,9 +81,9 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
     """Tell whether no faster controller is stable in the middle of at least one unstable range."""
-    crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVERS)
+    crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVER_COUNT)
     many = faster(flat, crossover / flat[CROSSOVER])
-    middles = [np.full(CROSSOVERS, np.sqrt(low * high)) for low, high in unstable]
+    middles = [np.full(CROSSOVER_COUNT, np.sqrt(low * high)) for low, high in unstable]
     return any(bool((spectral_abscissa(many, _sliding(speed)) > 0).all()) for speed in middles)
 
 
@@ -107,13 +107,13 @@ def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: fl
     return np.linalg.eigvals(np.concatenate([above, below], axis=1)).real.max(axis=1)
 
 
-PARASITIC = 300.0
+PARASITIC_FREQUENCY = 300.0
 """Frequency [Hz] at which the thesis finds the parasitic mode (Sec. 3.4.2)."""
 
-VISIBLE = np.log(10) / 20
+VISIBLE_PEAK = np.log(10) / 20
 """Least height of a resonance peak, in the logarithm of the magnitude: 1 dB."""
 
-FINER = 201
+FINER_POINTS = 201
 """Number of frequencies between the neighbours of an extreme, for locating it."""
 
 
@@ -133,7 +133,7 @@ class LimitCase:
     @property
     def parasitic(self) -> float:
         """Return the resonance closest to the thesis's parasitic mode [Hz]; NaN without any."""
-        return min(self.resonances, key=lambda f: abs(np.log(f / PARASITIC)), default=np.nan)
+        return min(self.resonances, key=lambda f: abs(np.log(f / PARASITIC_FREQUENCY)), default=np.nan)
 
     @property
     def first(self) -> float:
@@ -197,10 +197,10 @@ def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: in
     def height(at: np.ndarray) -> np.ndarray:
         return sign * np.log(np.abs(plants(flat, member, at)[0]))
 
-    places, _ = find_peaks(height(omega), prominence=VISIBLE)
+    places, _ = find_peaks(height(omega), prominence=VISIBLE_PEAK)
     if not len(places):
         return ()
-    finer = np.geomspace(omega[places - 1], omega[places + 1], FINER, axis=1)
+    finer = np.geomspace(omega[places - 1], omega[places + 1], FINER_POINTS, axis=1)
     best = height(finer.ravel()).reshape(finer.shape).argmax(axis=1)
     return tuple((finer[np.arange(len(places)), best] / (2 * np.pi)).tolist())
 
