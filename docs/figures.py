@@ -18,8 +18,8 @@ import friso
 from friso.interface.answer import Answer
 from friso.questions.flexure.svg import arrow, box, circle, leader, path, sheet, words
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
 from friso.shown.drawing.matplotlib_renderer import image
+from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
 from friso.stage import Stage
 
 DOCS = Path(__file__).parent
