@@ -35,7 +35,6 @@ from friso.hunting.cycle.return_map import ReturnMap
 from friso.hunting.cycle.shooting import Orbits
 from friso.hunting.derivatives import CycleDerivatives, cycle_derivatives, edge_derivatives, flow_derivatives
 from friso.hunting.feeding import Decline, Feeding
-from friso.hunting.limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
 from friso.hunting.loop import LoopState, LowerGains, unstable
 from friso.hunting.many_stages import (
     StageAttractors,
@@ -52,6 +51,7 @@ from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.hunting.parameter_margin import MarginEnd, ParameterMargin
+from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
 from friso.hunting.stage_margins import joint_margins
 from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement

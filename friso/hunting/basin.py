@@ -18,11 +18,11 @@ from friso.hunting.attractors.rounds import SURVEY_RTOL, TIGHT_SURVEY_RTOL, typi
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import pushed
-from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of
 from friso.hunting.return_map.fates import motions_go_on
 from friso.hunting.return_map.landing_map import LandingMap
+from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import basin_settings
 from friso.shares import share_interval
 from friso.stage import Stage

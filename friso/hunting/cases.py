@@ -22,7 +22,6 @@ from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.feeding import Feeding, feeding
-from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.many_stages import kernels_to_judge
 from friso.hunting.margin import unstable_bandwidths
@@ -30,6 +29,7 @@ from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.outward import BandwidthWindow
 from friso.hunting.parameter_margin import ParameterMargin
+from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import ToleranceSettings, check_settings
 from friso.hunting.stage_margins import friction_margin, keeps_friction_margin
 from friso.hunting.tracking import Dwell, Tracking, dwells, tracking

@@ -13,9 +13,9 @@ from friso.equations.bandwidth import bandwidth, faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.loop import unstable_among
 from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, EdgeSearch
+from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import check_settings, edge_settings
 from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage

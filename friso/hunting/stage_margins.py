@@ -9,8 +9,8 @@ from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
-from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.parameter_margin import ParameterMargin, Scaled, parameter_margin
+from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import edge_settings
 from friso.hunting.verdict import Judgement
 from friso.hunting.what_attracts import what_attracts

@@ -1,6 +1,6 @@
 """Find the landings of stages.
 
-A landing is the distance from the reference at which a stage turns, swing after swing.
+A landing is where a stage sticks after a swing, as a signed distance from its reference.
 """
 
 from __future__ import annotations
