@@ -1,10 +1,7 @@
-"""Choose from the front the softest leaf springs that meet all requirements.
+"""Find the Pareto front of leaf springs, and choose its softest that meet all requirements.
 
-Sizes are rounded so that the leaves can be made, and the beam model confirms the choice.
-
-Find the Pareto front of leaf springs: soft ones whose modes interfere at high frequency.
-
-All leaf springs on it meet the requirements. The frequency is that of the first mode that interferes with control.
+The front has soft leaf springs whose modes interfere with control at high frequency. Sizes are rounded so that the
+leaves can be made, and the beam model confirms the choice.
 """
 
 from __future__ import annotations

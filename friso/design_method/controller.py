@@ -1,8 +1,7 @@
 """Choose a design's controller, and whether more joint damping would help.
 
-Analyse the loop with all modes of the leaf springs that actuator and sensor both see.
-
-The equations of motion contain only one of these modes.
+The loop has all modes of the leaf springs that actuator and sensor both see; the equations of motion contain only one
+of them.
 """
 
 from __future__ import annotations

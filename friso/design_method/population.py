@@ -1,9 +1,8 @@
-"""Build the machines that a specification allows: its corners, and machines drawn at random.
+"""Build the machines that a specification allows, and find the edge of hunting over them.
 
-Find the edge of hunting over the corners of a specification, the ends of all its ranges.
-
-The edge is the highest crossover at which a stage hunts. In the corner where it is highest it is located to 1 or 2 %;
-only this one decides, and a design simulates all its moves afterwards.
+The machines are the corners of its ranges, and machines drawn at random. The edge is the highest crossover at which a
+stage hunts. In the corner where it is highest it is located to 1 or 2 %; only this one decides, and a design simulates
+all its moves afterwards.
 """
 
 from __future__ import annotations

@@ -1,12 +1,7 @@
-"""Prepare the stage that a design starts from, and give it leaf springs.
+"""Prepare the stage that a design starts from: an isolator, leaf springs, a specification.
 
-Put a rigid stage on an isolator.
-
-Its mass is split, a joint is added between the parts, and the friction stays on the cart.
-
-Write a first specification from a stage file.
-
-Ranges lie around the stage's own numbers, and leaves have sizes that are sold.
+A rigid stage is split into cart and stage with a joint between them; the friction stays on the cart. A first
+specification has ranges around the stage's own numbers, and leaves of sizes that are sold.
 """
 
 from __future__ import annotations

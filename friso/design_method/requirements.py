@@ -1,10 +1,7 @@
-"""Define the requirements of a specification on leaf springs, each as a ratio.
+"""Define the requirements on leaf springs as ratios, and find which single one to relax.
 
-Closed forms evaluate many geometries at once.
-
-Find which single requirement to relax if no leaf springs meet all of them.
-
-For each requirement the least sufficient change is computed.
+Closed forms evaluate many geometries at once. If no leaf springs meet all requirements, the least sufficient change is
+computed for each.
 """
 
 from __future__ import annotations

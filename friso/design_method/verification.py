@@ -1,8 +1,7 @@
-"""Try the design in simulated moves of machines drawn from the specification.
+"""Try a design in simulated moves of machines drawn from the specification.
 
-The joint is free, and locked for comparison.
-
-Map, over crossover and stroke, how many corners of a specification do not come to rest.
+The joint is free, and locked for comparison. A map over crossover and stroke shows how many corners of the
+specification do not come to rest.
 """
 
 from __future__ import annotations

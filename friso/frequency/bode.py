@@ -1,11 +1,10 @@
-"""Analyse a stage linearly: limit cases, states between them, and highest bandwidth.
+"""Analyse a stage linearly: limit cases, states between them, highest bandwidth, cascades.
 
-Compute the loops of a cascade separately, each opened where a drive's Bode plot opens it.
-
-The plant leads from the commanded force to the velocity at the encoder. The velocity loop is cut where the velocity is
-fed back, with the position loop open. The position loop is cut where the position is fed back, with the velocity loop
-closed (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives, chapters 3 and 4). With loops at several rates both are
-characteristic loci (`friso.frequency.loops`), which do not depend on the place of the cut.
+The loops of a cascade are each opened where a drive's Bode plot opens them. The plant leads from the commanded force to
+the velocity at the encoder. The velocity loop is cut where the velocity is fed back, with the position loop open. The
+position loop is cut where the position is fed back, with the velocity loop closed (Gross, Hamann, Wiegaertner 2001,
+Electrical Feed Drives, chapters 3 and 4). With loops at several rates both are characteristic loci
+(`friso.frequency.loops`), which do not depend on the place of the cut.
 """
 
 from __future__ import annotations

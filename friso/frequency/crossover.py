@@ -1,8 +1,7 @@
-"""Find the crossovers at which a stage is stable, and has the required modulus margin.
+"""Find a loop's bandwidth, and the crossovers with stability and the required margin.
 
-Find the ranges along one axis in which a condition holds, with their ends located.
-
-Compute the bandwidth of a loop: the highest frequency at which its gain is 1.
+The bandwidth is the highest frequency at which the loop's gain is 1. Ranges in which a condition holds have their ends
+located.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """Build the loop of plant, controller and drive: closed, and cut at the actuator force.
 
-Analyse sampled loops, at one rate or several, lifted to their common period.
-
-After that period all loops are due again. The controller is that of `friso.equations.sampled`, as a drive computes it.
-Over a period of N samples the loop is a time-invariant system with N inputs and outputs (lifting: Chen, Francis 1995,
-Optimal Sampled-Data Control Systems, chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles decide
-on stability.
+Sampled loops, at one rate or several, are lifted to their common period. After that period all loops are due again. The
+controller is that of `friso.equations.sampled`, as a drive computes it. Over a period of N samples the loop is a
+time-invariant system with N inputs and outputs (lifting: Chen, Francis 1995, Optimal Sampled-Data Control Systems,
+chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles decide on stability.
 
 Cut at the actuator, it has N characteristic loci. A gain or a phase common to all samples brings it to the edge of
 stability where one locus passes -1 (MacFarlane, Postlethwaite 1977, doi:10.1080/00207177708922217). So margins are

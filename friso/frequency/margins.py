@@ -1,8 +1,7 @@
 """Compute margins of one loop: the gain, phase or delay that makes it unstable.
 
-Astrom, Murray 2008, Feedback Systems, chapter 9 (stability margins).
-
-Apply van Dijk's tuning rules (thesis, Eq. 7 and 8) to the mass they are meant for.
+Astrom, Murray 2008, Feedback Systems, chapter 9 (stability margins). Van Dijk's tuning rules (thesis, Eq. 7 and 8) are
+applied to the mass that they are meant for.
 """
 
 from __future__ import annotations

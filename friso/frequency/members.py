@@ -1,10 +1,7 @@
-"""Linearise the friction law of a stage, and compute its steady force and range of speeds.
+"""Define the states of a stage: the thesis's limit cases (Table 1), and those between.
 
-Define the states of a stage: the thesis's limit cases (Table 1), and those between.
-
-Compute springs in series: joint and bearing (Eq. 1), and the touched limiter (Table 1).
-
-The numbers are those of the thesis. The bearing acts as a spring before it slides.
+The friction law is linearised in each: a spring before it slides, a steady force and a range of speeds afterwards.
+Springs in series, joint and bearing (Eq. 1) and the touched limiter (Table 1), are those of the thesis.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Represent plant and controller of a stage as linear systems, for many states at once.
 
-Find the friction law's steady state: stuck under a bias force, or sliding at a speed.
+The friction law has a steady state: stuck under a bias force, or sliding at a speed.
 """
 
 from __future__ import annotations

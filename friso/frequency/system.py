@@ -1,8 +1,7 @@
 """Represent many linear systems with equal states at once: arrays with one system per row.
 
-Linearise equations: derive the Jacobian in symbols, and evaluate it for many states.
-
-Model the drive between controller and plant: hold, delay and current loop.
+Equations are linearised by their Jacobian, derived in symbols and evaluated for many states. The drive between
+controller and plant is modelled by its hold, delay and current loop.
 """
 
 from __future__ import annotations

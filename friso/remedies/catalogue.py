@@ -1,8 +1,7 @@
 """List the remedies with the keys that they change, the smallest change first.
 
-Define the variables of an optimiser, on logarithmic scales: gains, bandwidth, and joint.
-
-Suggest an isolator for a rigid stage that hunts, from a survey of a few joints.
+Gains, bandwidth and joint are variables of an optimiser on logarithmic scales. The isolator suggested to a rigid stage
+that hunts comes from a survey of a few joints.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Find a controller's smallest change that meets the goal, from settings that do.
 
-Measure the size of a change: parts bought, keys changed, and the factor of change.
+The size of a change counts parts bought, keys changed, and the factor of change.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Draw machines around a stage, each with its own move, and apply changes to all.
+"""Define the goal of tuning, and draw the machines, each with its move, that must meet it.
 
-Define the goal of tuning, and which parts may change to reach it.
+The goal says which parts may change; changes apply to all machines.
 """
 
 from __future__ import annotations

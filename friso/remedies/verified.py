@@ -1,6 +1,6 @@
 """Verify remedies by limit cycles, and on machines that the optimiser did not see.
 
-Confirm that a tuned stage does not hunt at its own bandwidth, nor at nearby ones.
+A tuned stage must not hunt at its own bandwidth, nor at nearby ones.
 """
 
 from __future__ import annotations

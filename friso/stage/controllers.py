@@ -1,6 +1,6 @@
 """The table [controller]: what every controller declares, and the registry of controllers.
 
-Declare the keys of [controller] against friction, which any controller may have.
+Any controller may have the keys against friction.
 """
 
 from __future__ import annotations

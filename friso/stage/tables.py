@@ -1,8 +1,7 @@
-"""The tables of a stage file: masses, friction, joint, parasitic mode, motion.
+"""The tables of a stage file, apart from the controller, the drive and uncertainty.
 
-The table [conditions]: how the guide runs, against when its [friction] was measured.
-
-The tables [transmission], [motor_friction] and [encoder] between motor and load.
+They are masses, friction and the conditions under which it was measured, joint, parasitic mode and motion; the tables
+[transmission], [motor_friction] and [encoder] stand between motor and load.
 """
 
 from __future__ import annotations

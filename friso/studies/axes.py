@@ -1,14 +1,8 @@
-"""Read the axes of a study (texts, ranges, arrays with a unit) into SI values.
+"""Read the axes of a study into SI values: texts, ranges, arrays with unit, samples, links.
 
-Define map axes that multiply several keys: controller speed and friction level.
-
-Draw samples of several keys at once as Sobol points or Latin hypercubes.
-
-They come from `scipy.stats.qmc`.
-
-Evaluate links: expressions such as "0.7 * mass" for keys that follow a study's axes.
-
-Numbers without a unit are in SI.
+Some axes multiply several keys: controller speed, friction level. Several keys at once are drawn as Sobol points or
+Latin hypercubes (`scipy.stats.qmc`). Links are expressions such as "0.7 * mass" for keys that follow the axes; their
+numbers without a unit are in SI.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Convert boundaries of hunting to numbers for tables, files and figures.
+"""Compute the boundary of hunting over ranges given by a user, as numbers for all outputs.
 
 The numbers are the points of branches and curves, and the verdicts at stages between them.
-
-Compute the boundary of hunting over ranges given by a user.
 """
 
 from __future__ import annotations

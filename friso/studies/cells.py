@@ -1,8 +1,7 @@
-"""Run cells: stages that differ in some keys.
+"""Run cells, stages that differ in some keys, on the ideal machine or with the real drive.
 
-Values of keys go in as columns, and metrics come out as columns, with one entry per cell.
-
-Run cells with the real drive, on the shaking floor of their stage file.
+Values of keys go in as columns, and metrics come out as columns, with one entry per cell. With the real drive cells run
+on the shaking floor of their stage file.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""Compute the blocks of a study in the threads of this process, or in an executor.
+"""Compute the blocks of a study: in threads, in processes, or on a Dask cluster.
 
-Compute a study on a Dask cluster, one task for each block.
-
-Compute studies in separate processes on this machine.
-
-They talk over private pipes, so no port is opened.
+On a cluster each block is a task. Processes on this machine talk over private pipes, so no port is opened.
 """
 
 from __future__ import annotations

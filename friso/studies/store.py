@@ -2,11 +2,8 @@
 
 The store is made complete, without results, elsewhere and then moved into place. A block is done once its digests are
 recorded (`Ledger`), after its chunks were written, each moved into place by Zarr. A block whose chunks differ from the
-record is run again.
-
-Store results of cells until a refined study is done, so that none is run twice.
-
-Write studies for other programs, as NetCDF and CSV.
+record is run again. Results of a refined study are kept until it is done, so that no cell is run twice. Other programs
+get studies as NetCDF and CSV.
 """
 
 from __future__ import annotations

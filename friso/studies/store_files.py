@@ -1,17 +1,15 @@
-"""Read and write files of a store safely.
+"""Read and write files of a store safely, with the digests of its chunks and its folder.
 
 A store may come from others, so only regular files of the store itself are read, and none larger than friso writes
 them.
 
-Record the digests of the chunks of each block of a store, in a file per block.
+The digests of the chunks of each block stand in a file per block. They include the study, the block and the variable,
+so they detect exchanged chunks, unlike checksums inside the chunks. The file of a block is written last: a block with a
+file is complete.
 
-The digests include the study, the block and the variable. So they detect exchanged chunks, unlike checksums inside the
-chunks. The file of a block is written last: a block with a file is complete.
-
-Manage the folder of a store: make it elsewhere, move it into place, exchange it, lock it.
-
-The next process repairs what a killed process left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store being
-made, in a folder with its lock. With the suffix `.old` it is a store being replaced.
+The folder is made elsewhere, moved into place, exchanged and locked. The next process repairs what a killed process
+left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store being made, in a folder with its lock. With the suffix
+`.old` it is a store being replaced.
 """
 
 from __future__ import annotations

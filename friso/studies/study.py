@@ -1,6 +1,6 @@
-"""Define a study as data: its stage, variations, tolerance, cells, and blocks of cells.
+"""Define a study as data, and make it from a user's variations.
 
-Make a study from a user's variations, estimate its size, and run a trial.
+A study has its stage, variations, tolerance, cells, and blocks of cells. Its size is estimated, and a trial is run.
 """
 
 from __future__ import annotations

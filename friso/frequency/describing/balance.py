@@ -8,9 +8,7 @@ side turns around zero along the edges. "No cycle" is then the result of a compu
 Hunting is a jump out of a long rest. Its motion is so far from a sine that this balance finds no cycle even if there is
 one: see docs/describing.md.
 
-Compute the closed loop as friction sees it: positions per friction force on the cart.
-
-The positions are those of cart and stage.
+Friction sees the closed loop as positions, of cart and stage, per friction force on the cart.
 """
 
 from __future__ import annotations

@@ -8,12 +8,10 @@ Convention: position x(t) = Re(A exp(i omega t)) with real A > 0. Friction force
 positive against positive velocity. The dynamic stiffness N = F_1/A then has a spring as positive real part and a damper
 as positive imaginary part. It takes pi A^2 Im(N) out of the motion in every period.
 
-Find the periodic steady state of friction under an imposed sinusoidal motion.
-
-An internal state forgets its start as the motion wears it off. At amplitudes far below the deflection at break-away
-that takes thousands of periods. So secants solve for the fixed point of the map of the internal states over a period.
-LuGre's and Dahl's states obey linear equations under an imposed motion, so their map is affine and the first secant is
-exact. Many motions are computed at once.
+The periodic steady state under an imposed motion is found first. An internal state forgets its start as the motion
+wears it off. At amplitudes far below the deflection at break-away that takes thousands of periods. So secants solve for
+the fixed point of the map of the internal states over a period. LuGre's and Dahl's states obey linear equations under
+an imposed motion, so their map is affine and the first secant is exact. Many motions are computed at once.
 """
 
 from __future__ import annotations

@@ -6,13 +6,11 @@ that force must move the loop by the series. Mechanics and controller may be any
 cycle by itself, and single-harmonic balance, the usual start, may have none (`balance`). So it starts from a known
 motion, such as a simulated one.
 
-Compute the friction force on any periodic motion, and its derivative by the motion.
-
-Multi-harmonic balance uses both. The period is divided into M equal intervals, at whose middles the velocity is given.
-The friction law has one state of its own, which obeys a differential equation. The implicit midpoint rule makes this a
-chain of M steps, which must end where it began. Over half a period of a symmetric motion it ends at the mirror image.
-The force at the middles follows. The rule is of second order, and a fast state settles on its steady value however long
-the intervals are.
+It needs the friction force on any periodic motion, and its derivative by the motion. The period is divided into M equal
+intervals, at whose middles the velocity is given. The friction law has one state of its own, which obeys a differential
+equation. The implicit midpoint rule makes this a chain of M steps, which must end where it began. Over half a period of
+a symmetric motion it ends at the mirror image. The force at the middles follows. The rule is of second order, and a
+fast state settles on its steady value however long the intervals are.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Measure machines: swinging, settling, standstill, force, and the loop's margin.
+"""Measure machines (swing, settling, force, the loop's margin), and compare them in pairs.
 
-Compute medians and paired differences of machines, with 95 % intervals.
+Medians and paired differences have 95 % intervals.
 """
 
 from __future__ import annotations

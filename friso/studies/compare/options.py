@@ -1,6 +1,6 @@
 """Define the options for bringing a machine to rest: controller settings, a joint, or both.
 
-Replace a machine's controller by active disturbance rejection.
+One of them replaces the machine's controller by active disturbance rejection.
 """
 
 from __future__ import annotations

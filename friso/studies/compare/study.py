@@ -1,6 +1,6 @@
 """Compare options: run every option on every machine, all machines of an option at once.
 
-Find the bandwidth from which a controller alone brings random machines to rest.
+The bandwidth is found from which a controller alone brings random machines to rest.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Convert a friction law to another that keeps what was measured, and report the losses.
 
-Compute hysteresis loops of friction laws over a slow motion to and fro, before sliding.
+Hysteresis loops over a slow motion to and fro, before sliding, are among what is compared.
 """
 
 from __future__ import annotations

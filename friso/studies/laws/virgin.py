@@ -1,11 +1,8 @@
-"""Read a measured virgin curve: points of friction force over displacement from rest.
+"""Read a measured virgin curve, which replaces that of the stage's friction law.
 
-It replaces the virgin curve of the stage's friction law.
-
-Fit a concave, rising curve from 0 to measured points, by least squares.
-
-Parallel springs that slip one after the other make such a curve. Knots near rest that the points do not support only
-follow noise, and are left out.
+It is given by points of friction force over displacement from rest. A concave, rising curve from 0 is fitted by least
+squares: parallel springs that slip one after the other make such a curve. Knots near rest that the points do not
+support only follow noise, and are left out.
 """
 
 from __future__ import annotations

@@ -5,10 +5,8 @@ damps more, so a few crossovers are tried, and the fastest one at which most pas
 cover one stretch of the rail, so that they differ in speed and not in place. Fast passes begin before the stretch and
 end behind it, if necessary beyond the stage's own travel, because the rig's rail has no ends.
 
-Run slow sliding with a locked joint, so slow that no controller holds a constant speed.
-
-At such speeds friction falls steeply. Short, finely logged passes follow the passes at many speeds, at speeds at the
-limit of steady motion: the motion swings through the whole falling branch of the friction curve.
+Slow sliding follows where no controller holds a constant speed, and friction falls steeply. Short, finely logged passes
+at speeds at the limit of steady motion swing through the whole falling branch of the friction curve.
 """
 
 from __future__ import annotations

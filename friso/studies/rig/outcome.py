@@ -1,11 +1,9 @@
 """Outcome of an experiment of the rig: logs, the true motion behind each, and the analysis.
 
-Choose sizes, durations and places of the rig's experiments from the stage.
-
-Times are in periods of the controller's crossover, distances in lengths of the stage's own motion, deflections in
-strokes, and forces in friction forces. On the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) the values are those of the thesis.
-
-Inject a multisine into the closed loop at standstill, and estimate plant and open loop.
+Sizes, durations and places of experiments are chosen from the stage. Times are in periods of the controller's
+crossover, distances in lengths of the stage's own motion, deflections in strokes, and forces in friction forces. On the
+thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) the values are those of the thesis. A multisine injected into the closed loop at
+standstill shows plant and open loop.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Draw the figures of the thesis in its own arrangement, from a reproduction.
-
-Draw the thesis's figures of plants and open loops over frequency, from a reproduction.
-"""
+"""Draw the figures of the thesis in its own arrangement, from a reproduction."""
 
 from __future__ import annotations
 

@@ -1,13 +1,7 @@
-"""Write the words of `friso reproduce` on a claim: the finding, and how far it agrees.
+"""Write the words of `friso reproduce`: findings in short and in full, and the first screen.
 
-Each comes in short and in full.
-
-Show the thesis's conclusions under other friction laws, as text, table and JSON.
-
-Write the first screen of the page of `friso reproduce`.
-
-It lists which claims of the thesis are right, which are right for another reason, and where the thesis has small
-mistakes.
+The first screen of its page lists which claims are right, which are right for another reason, and where the thesis has
+small mistakes. Conclusions under other friction laws are shown as text, table and JSON.
 """
 
 from __future__ import annotations

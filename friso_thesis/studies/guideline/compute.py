@@ -1,10 +1,7 @@
 """Compute the guideline: sweeps, laws, their errors, and the worked steps.
 
-The laws are fitted to some samples, and their errors are taken from other samples.
-
-Simulate samples for long below and above their edge of hunting.
-
-The question is whether runs still swing below the edge, and come to rest above it, however they begin.
+The laws are fitted to some samples, and their errors are taken from other samples. Samples are also simulated for long
+below and above their edge of hunting: do runs still swing below it, and come to rest above it, however they begin?
 """
 
 from __future__ import annotations

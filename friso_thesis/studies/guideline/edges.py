@@ -4,9 +4,7 @@ An edge is the lowest crossover from which on the cycle is not known to attract.
 asymmetric cycle, are looked for only after a jump and where no orbit could be closed. `friso.hunting.margin` and
 `friso.design_method.population`, by contrast, survey all attractors.
 
-Simulate stages for long from many starts, to see whether they still swing at the end.
-
-A swing at the end is evidence of an attractor if no orbit could be closed.
+Where no orbit could be closed, long simulations from many starts give evidence: a swing that lasts to the end.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
 """Work through the steps from friction range and crossover limit to an isolator.
 
-The machine is the thesis rig.
-
-Find how far above the crossover a joint's parasitic mode has to be, by linear analysis.
-
-Compute the edge of hunting of the thesis rig by the laws and by simulation, side by side.
+The machine is the thesis rig, whose edge of hunting is computed by the laws and by simulation, side by side. How far
+above the crossover a joint's parasitic mode has to be follows from linear analysis.
 """
 
 from __future__ import annotations

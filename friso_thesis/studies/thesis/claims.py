@@ -1,10 +1,7 @@
 """Define the claims of the thesis and their judgement.
 
-A claim consists of parts that hold or not, each by a criterion in words.
-
-Apply the two criteria by which a stage is said to hunt.
-
-The thesis's count of peaks judges its claims. Whether a cycle attracts the stage is stated beside the judgement.
+A claim consists of parts that hold or not, each by a criterion in words. A stage hunts by two criteria: the thesis's
+count of peaks judges its claims, and whether a cycle attracts the stage is stated beside the judgement.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """Keep finished parts of a long reproduction in a folder until all is done.
 
-An interrupted run continues from them.
-
-Convert results to arrays and one text, and back, to save experiments.
+An interrupted run continues from them. Results are kept as arrays and one text.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
-"""Judge the arguments that the thesis gives in words.
+"""Judge the arguments that the thesis gives in words, and its steps (Sec. 4.1).
 
-They concern forces at full stroke, the mass to tune for, what mass and crossover do to the overshoot, and what counted
-peaks mean.
-
-Judge the steps by which the thesis explains mass, friction gap and alpha (Sec. 4.1).
+The arguments concern forces at full stroke, the mass to tune for, what mass and crossover do to the overshoot, and what
+counted peaks mean. The steps explain mass, friction gap and alpha.
 """
 
 from __future__ import annotations

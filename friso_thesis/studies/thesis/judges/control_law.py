@@ -1,11 +1,8 @@
-"""Judge what the thesis says about its controller (Sec. 3.2.4, 3.4.2, 4.2.1).
+"""Judge what the thesis says about its controller (Sec. 3.2.4, 3.4.2, 4.2.1), and Eq. 1, 2.
 
-It concerns two forms of the controller, where its crossover may lie, and the motor constant.
-
-Judge Eq. 1 and 2: joint and pre-sliding friction as springs in series.
-
-The stiffness of such springs is derived and differentiated. Both formulas are compared with the results, and Eq. 1 with
-the plant.
+It concerns two forms of the controller, where its crossover may lie, and the motor constant. Eq. 1 and 2 are joint and
+pre-sliding friction as springs in series: their stiffness is derived and differentiated, and Eq. 1 is compared with the
+plant.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""Judge stiffness and friction as the thesis identifies them in time (Fig. 19 to 21).
+"""Judge what the thesis identifies: in time (Fig. 19 to 21), in responses (Fig. 17, 18).
 
-The same experiments are simulated.
-
-Judge the responses by which the thesis identifies its rig (Fig. 17 and 18).
-
-The same experiments are simulated. What the simulation assumes (masses, stiffness, friction of Table 2) must come out
+The experiments are simulated again. What the simulation assumes (masses, stiffness, friction of Table 2) must come out
 as entered. So the judges ask whether the experiments show it, and what else they would have to show.
 """
 

@@ -1,8 +1,6 @@
-"""Judge the leaf springs of the rig (Sec. 3.5).
+"""Judge the leaf springs of the rig (Sec. 3.5), and of parallel leaf springs (Sec. 3.4.1).
 
-Judge what the thesis says about parallel leaf springs (Sec. 3.4.1).
-
-It concerns shortening, width, length, and where to push.
+The thesis speaks of shortening, width, length, and where to push.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Judge the open loops, and how fast the controller may be (Fig. 8, 22, 23).
-
-Judge Fig. 7: the plant in the four limit cases of Table 1.
-"""
+"""Judge the plant (Fig. 7), the open loops, and how fast the controller may be (8, 22, 23)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Judge Fig. 11 of the locked rig: path, and crossover and mass.
-
-Judge Fig. 12: friction forces, and alpha and beta, of the locked rig.
-"""
+"""Judge the locked rig: path, crossover and mass (Fig. 11), friction, alpha, beta (Fig. 12)."""
 
 from __future__ import annotations
 

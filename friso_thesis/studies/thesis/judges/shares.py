@@ -1,8 +1,6 @@
-"""Judge Fig. 13: the terms of the force while the stage sticks, at two friction gaps.
+"""Judge the locked rig: the terms of the force while it sticks (Fig. 13), its response (5).
 
-The gap is static minus Coulomb friction.
-
-Judge Fig. 5: the response of the locked rig.
+The terms are compared at two friction gaps, static minus Coulomb friction.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Judge Fig. 14: stiffness of the joint, damping of its limiter, and stroke.
+"""Judge the isolated rig: joint, limiter and stroke (Fig. 14, 16), masses and friction (15).
 
-Judge Fig. 15: masses and friction forces of the isolated rig.
-
-Judge Fig. 16: crossover and stroke of the isolated rig, at both stiffnesses of the joint.
+Fig. 16, crossover and stroke, is judged at both stiffnesses of the joint.
 """
 
 from __future__ import annotations

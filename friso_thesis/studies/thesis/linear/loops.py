@@ -1,8 +1,7 @@
 """Compute the rig's loops at the thesis's crossovers, and how fast it may be controlled.
 
-This is done with and without its drive.
-
-Try changes that would make the model match measurements: masses, a softer contact.
+This is done with and without its drive. Changes are tried that would make the model match measurements: masses, a
+softer contact.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Describe the plant in each limit case by the numbers that one reads off Fig. 7.
+"""Describe plant and loop by the numbers that one reads off Fig. 7 and 8.
 
-Compute the 8 Hz loop over the speed of the cart, as Fig. 8 prescribes it.
+Fig. 7 has the plant in each limit case, Fig. 8 the 8 Hz loop over the speed of the cart, as it prescribes it.
 """
 
 from __future__ import annotations
