@@ -109,6 +109,8 @@ class _Live:
     settings_class: type[Settings]
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or name == "settings_class":  # copying and pickling ask before the field is set
+            raise AttributeError(name)
         return getattr(self.settings_class.current(), name)
 
 

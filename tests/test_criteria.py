@@ -224,7 +224,7 @@ def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float
 
 
 def prominent_peaks(values: np.ndarray) -> int:
-    """Counted peaks of samples by scipy, of maxima alone that stand out by `DISTINCT`."""
+    """Counted peaks of samples by scipy, of maxima alone that stand out by `LEAST_VALLEY_DEPTH`."""
     maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=LEAST_VALLEY_DEPTH)
     spikes = np.zeros(len(values))
     late = maxima[TIME[maxima] >= COUNTED_AFTER]

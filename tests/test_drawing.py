@@ -410,7 +410,7 @@ def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
     narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
     (note,) = (text["text"].split("<br>") for text in narrow["annotations"])
     assert all(len(narrow[name]["title"]["text"].split("<br>")) > 1 for name in ("legend", "legend2"))
-    assert max(map(len, note)) < plotly_renderer.NARROW_HEIGHT / 6
+    assert max(map(len, note)) < plotly_renderer.NARROW_PAGE_WIDTH / 6
     assert narrow["height"] > wide["height"]
     assert (
         narrow["height"] - 2 * (plotly_renderer.PLOT_HEIGHT + plotly_renderer.FOOTER_HEIGHT) >= 8 * plotly_maps.KEY_ROW

@@ -42,6 +42,14 @@ def of_function(after: np.ndarray, before: np.ndarray = DISTANCES) -> LandingMap
     return LandingMap(before[order], after[order], numbers, np.ones(len(before), bool), True, 0)
 
 
+def test_equal_nearest_landings_reach_as_far_in_as_one() -> None:
+    once = of_function(np.array([0.12, 0.22, 0.3]), np.array([0.1, 0.2, 0.3]))
+    twice = of_function(np.array([0.12, 0.12, 0.22, 0.3]), np.array([0.1, 0.1, 0.2, 0.3]))
+    nearer = np.array([0.0999])
+    assert twice.foretold(nearer) == pytest.approx(once.foretold(nearer), rel=1e-12)
+    assert twice.foretold(nearer) > 0.11
+
+
 @settings(deadline=None)
 @given(st.floats(0.2, 0.95), st.floats(0.1, 1.0))
 def test_a_map_with_a_slope_below_1_is_drawn_to_its_fixed_point(slope: float, fixed: float) -> None:

@@ -1,6 +1,8 @@
 """Settings: every tuning number is a field with its unit and reason, other values can be given for a block of code."""
 
 import ast
+import copy
+import pickle
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -58,6 +60,14 @@ def test_other_values_hold_for_the_block_alone() -> None:
     with RunSettings(longest_run=1.0).in_use(), RunSettings(longest_run=3.0).in_use():
         assert RunSettings.current().longest_run == 3.0
     assert RunSettings.current().longest_run == 2.0
+
+
+def test_an_object_of_settings_reads_the_values_in_use_and_can_be_copied() -> None:
+    live = RunSettings.live()
+    for one in (live, copy.deepcopy(live), pickle.loads(pickle.dumps(live))):
+        assert one.longest_run == 2.0
+        with RunSettings(longest_run=1.0).in_use():
+            assert one.longest_run == 1.0
 
 
 @pytest.mark.parametrize("settings", settings_classes(), ids=lambda settings: settings.__name__)

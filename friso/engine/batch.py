@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from friso.engine.arrays import STATISTICS, Batch, BatchOptions, Results, Status
 from friso.engine.kernel import Kernel, columns, empty_results
 from friso.engine.layout import LANES
 from friso.engine.overtaken import current_flag, go_on
-from friso.engine.settings import RoomSettings, room_settings, step_settings
+from friso.engine.settings import room_settings, step_settings
 from friso.engine.side_by_side import cores_to_use, results_of
 from friso.equations import motion
 from friso.equations.reference import moved_on
@@ -43,7 +43,7 @@ class RunOptions:
     window: float = 0.75
     record_from: float = 0.0
     least_swing: float | np.ndarray = 0.0
-    room: int = RoomSettings().first_turning_points
+    room: int = field(default_factory=lambda: room_settings.first_turning_points)
     interval: float | None = None
     budget: int = 2_000_000
     threads: int | None = None

@@ -9,7 +9,11 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class StepSettings(Settings):
-    """Settings of the steps of a run. Those of kinks, where derivatives jump, are compiled into the machine code."""
+    """Settings of the steps of a run.
+
+    Apart from the first and the longest step they are written into the machine code by the process that builds it, and
+    kept with the code. Other values given for a block change nothing there.
+    """
 
     first_step: float = setting(1e-3, "1/natural frequencies")
     """First step, also after a corner of the reference. A longer one may be rejected many times; a shorter one costs

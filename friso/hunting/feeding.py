@@ -65,7 +65,7 @@ def _without_friction(stage: Stage) -> Decline:
     All motions scale with the backlash, so nothing changes until it is zero, when the loop is linear.
     """
     rests = not unstable(stage.replace({BACKLASH: None}))
-    return Decline(lasts=float(np.array(check_settings.feeding_shares)[-1]), gone=0.0 if rests else None, certain=True)
+    return Decline(lasts=float(check_settings.feeding_shares[-1]), gone=0.0 if rests else None, certain=True)
 
 
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
@@ -85,11 +85,11 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
     """Survey a stage with `keys` scaled down in steps, and return how hunting declines."""
     scaled = {**flat, **{key: flat[key] * np.array(check_settings.feeding_shares) for key in keys}}
-    attracted = find_attractors(scaled, len(np.array(check_settings.feeding_shares)))
+    attracted = find_attractors(scaled, len(check_settings.feeding_shares))
     gone = np.flatnonzero(~attracted.attracts)
-    first = int(gone[0]) if gone.size else len(np.array(check_settings.feeding_shares))
+    first = int(gone[0]) if gone.size else len(check_settings.feeding_shares)
     return Decline(
-        lasts=float(np.array(check_settings.feeding_shares)[first - 1]) if first else 1.0,
-        gone=float(np.array(check_settings.feeding_shares)[first]) if gone.size else None,
+        lasts=float(check_settings.feeding_shares[first - 1]) if first else 1.0,
+        gone=float(check_settings.feeding_shares[first]) if gone.size else None,
         certain=bool(attracted.certain[: first + 1].all()),
     )

@@ -111,7 +111,8 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
 def _ends(scaled: Scaled, searches: dict[int, _Search]) -> tuple[dict[int, MarginEnd | None], tuple[int, ...]]:
     """Run searches side by side, and return the ends they find, by side, and the sides that stay open.
 
-    Surveys of one kind that several searches wait for are made together; rough ones come first.
+    Surveys of one kind that several searches wait for are made together; rough ones come first. If the allowance of
+    work runs out, all searches that are not done stay open.
     """
     ends: dict[int, MarginEnd | None] = {}
     wanted = dict.fromkeys(searches, _Wanted(np.empty(0), False))

@@ -106,7 +106,7 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Return the covariance of the sum of scores, (n, p), that are correlated within groups.
 
     `group`, shape (n,), has the number of each row's group. Scores are the columns of the fit times the residual. The
-    covariance is scaled so that normal intervals of `COVERAGE` deviations hold. The degrees of freedom are the
+    covariance is scaled so that normal intervals of `NORMAL_COVERAGE` deviations hold. The degrees of freedom are the
     effective number of equal groups less 1.
     """
     names, members = np.unique(group, return_inverse=True)

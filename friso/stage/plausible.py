@@ -14,7 +14,7 @@ from friso.stage.lists import element_keys
 from friso.stage.stage import Stage
 from friso.stage.tables import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, TRANSMISSION, moving_mass
 
-STANDARD_GRAVITY = 9.81
+ROUND_GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
 
 STRONGEST_FRICTION = 30.0
@@ -163,7 +163,7 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
     carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
     usual = dict(_USUAL)
     for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():
-        most = STRONGEST_FRICTION * STANDARD_GRAVITY * mass
+        most = STRONGEST_FRICTION * ROUND_GRAVITY * mass
         usual |= dict.fromkeys(
             (f"{table}.static", f"{table}.coulomb"), _Usual(1e-6, most, "N", ("N", "mN", "uN", "kN"))
         )

@@ -7,9 +7,8 @@ with the amplitude are unstable; which of the others appears depends on the hist
 The motions under a sinusoidal force are solved for first. Masses, joint and parasitic mode are linear; friction acts on
 the cart through its describing function N(A, omega). A force of amplitude Phi on the stage moves the cart by x_c = H_cs
 Phi - H_cc N x_c. So its amplitude A is a root of A abs(1 + H_cc N(A)) / abs(H_cs) = Phi, where H are the compliances of
-the masses without friction. A force may have several roots.
-
-Compute the mass line of a plant with friction at several places (thesis, Fig. 17).
+the masses without friction. A force may have several roots. The mass line of a plant with friction is computed at
+several places (thesis, Fig. 17).
 """
 
 from __future__ import annotations

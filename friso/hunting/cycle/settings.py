@@ -163,9 +163,6 @@ class OrbitSettings(Settings):
     """Smallest and largest relative change of an orbit along its branch for a numerical derivative of the multiplier. A
     smaller one is rounding; a larger one includes curvature."""
 
-    swing_step_limit: int = setting(20_000, "steps")
-    """Most steps of a run per swing. A swing takes a thousand; a stage that chatters would take millions."""
-
     swing_leg_share: float = setting(0.5, "of the distance")
     """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing of a stage that sticks."""
 

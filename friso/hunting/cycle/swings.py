@@ -30,8 +30,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
     """
     position = starts[:, stages.kernel.position]
     legs = settings.swing_leg_share * np.abs(position)
-    budget = most * settings.swing_step_limit
-    results = stages.run(starts, durations, rtol, least_swing=0.1 * legs, budget=budget)
+    results = stages.run(starts, durations, rtol, least_swing=0.1 * legs)
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
     values = np.hstack([position[:, None], np.where(held, results.turn_values, np.nan)])

@@ -125,10 +125,9 @@ class LandingMap:
             middle = (low + high)[broken] / 2
             pieces = np.hstack([pieces, [middle, *_beside(high[broken], two[broken])]])
             pieces = pieces[:, np.argsort(pieces[0], kind="stable")]
-            if k.size and k[0] == 0:
-                pieces[0, 0] -= (
-                    return_map_settings.scatter_range_log
-                )  # the first line continues a little nearer to home
+            if k.size and places[k[0]] == places[0]:
+                # the first line continues a little nearer to home
+                pieces[0, 0] -= return_map_settings.scatter_range_log
             if len(points):
                 ends = after[-1:] if abs(after[-1]) < abs(self.before[points[-1]]) else np.zeros(1)
                 pieces = np.hstack([pieces, [places[-1:], *_beside(places[-1:], ends)]])

@@ -81,7 +81,7 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         ) + return_map_settings.flight_time / some.number("rate")
         legs = np.maximum(return_map_settings.ringing_share * sticks, small)
         results = some.run(
-            begun, durations, rtol, with_modes=True, least_swing=legs, budget=orbit_settings.swing_step_limit
+            begun, durations, rtol, with_modes=True, least_swing=legs, budget=return_map_settings.round_step_limit
         )
         fine, room = done(results), results.turn_values.shape[1]
         held = (np.arange(room) < results.turn_counts[:, None]) & fine[:, None]

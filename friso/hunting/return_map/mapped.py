@@ -132,8 +132,8 @@ def map_stages(
     """Sample the return maps of stages by runs stuck near their reference, and farther off.
 
     `near` has ranges of distances (first, last, number), in deflections of the loop by the break-away force (None: as
-    the settings say). Up to `rounds` times, runs are added where a map
-    is too coarse. A `sparse` map has every third of the farther starts only.
+    the settings say). Up to `rounds` times, runs are added where a map is too coarse. A `sparse` map has every third of
+    the farther starts only.
     """
     far = spread_over(
         return_map_settings.far_starts, *([return_map_settings.limited_starts] if FORCE_LIMIT in stages.flat else [])

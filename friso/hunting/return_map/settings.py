@@ -121,6 +121,9 @@ class ReturnMapSettings(Settings):
     resting_move_share: float = setting(0.01, "of the distance")
     """Largest move of a stage that rests or creeps home while it could have broken away."""
 
+    round_step_limit: int = setting(20_000, "steps")
+    """Most steps of a round. A swing takes a thousand; a limiter that chatters would take millions."""
+
     flight_time: float = setting(30.0, "1/natural frequencies")
     """Longest crossing in a round. A slower one continues in the next round."""
 

@@ -51,9 +51,6 @@ class ResponseSettings(Settings):
     share_of_surprise: float = setting(0.05, "")
     """Least fraction of the input's unpredicted part that the output must explain."""
 
-    bands_of_a_bias: int = setting(5, "")
-    """Number of bands in which the mean difference of two estimates is tested, because a bias is smooth."""
-
     difference_of_played_periods: float = setting(1e-6, "")
     """Relative difference between periods of an input below which it was played from a table."""
 

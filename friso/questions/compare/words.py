@@ -27,7 +27,7 @@ from friso.stage.section import numeric_fields
 from friso.studies.compare.measures import EstimatedValue
 from friso.studies.compare.options import MODEL_ERROR, Option, rejection
 from friso.studies.compare.study import (
-    ENOUGH_MACHINES,
+    ENOUGH_SHARE,
     FOLLOWED_MACHINES,
     LONGER_FACTOR,
     Comparison,
@@ -210,16 +210,16 @@ def _turning(comparison: Comparison) -> list[str]:
     needed, base = comparison.needed, comparison.results[0]
     if needed is None or base.rests:
         return []
-    enough, last = f"{percent(ENOUGH_MACHINES)} of the machines", len(needed.shares) - 1
+    enough, last = f"{percent(ENOUGH_SHARE)} of the machines", len(needed.shares) - 1
     least, hertz = comparison.turning, [with_unit(float(value), "Hz") for value in needed.bandwidths]
     if least is None:
         share = _share_at(needed, last)
         return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
     turn = with_unit(least, "Hz")
-    fewer = np.flatnonzero((needed.bandwidths < least) & (needed.shares < ENOUGH_MACHINES))
+    fewer = np.flatnonzero((needed.bandwidths < least) & (needed.shares < ENOUGH_SHARE))
     if not fewer.size:
         return []
-    at, below = needed.turning(ENOUGH_MACHINES), int(fewer[-1])
+    at, below = needed.turning(ENOUGH_SHARE), int(fewer[-1])
     only_there = at is None or needed.bandwidths[at] > least
     where = f"at a bandwidth of {turn}" if only_there else f"from a bandwidth of {turn} on"
     others = [result for result in _resting(comparison) if result.option.factor == 1.0]
@@ -261,7 +261,7 @@ def conclusion(comparison: Comparison) -> str:
         best = max(comparison.results, key=lambda result: result.in_position_count)
         none = "None of these options" if comparison.not_run else "No option"
         return (
-            f"{none} brings {percent(ENOUGH_MACHINES)} of the {count} machines to rest within {within}. The best is "
+            f"{none} brings {percent(ENOUGH_SHARE)} of the {count} machines to rest within {within}. The best is "
             f"{in_prose(best)}, with {best.in_position_count} in position at the end. {_as_is(comparison)}"
         )
     first, *further = resting
@@ -281,9 +281,7 @@ def _too_late(resting: Sequence[OptionResult]) -> str:
     The text is empty if there is no such option.
     """
     there = [(result, float(np.isfinite(result.measures.settling).mean())) for result in resting]
-    late = [
-        f"{percent(fraction, 3)} with {in_prose(result)}" for result, fraction in there if fraction < ENOUGH_MACHINES
-    ]
+    late = [f"{percent(fraction, 3)} with {in_prose(result)}" for result, fraction in there if fraction < ENOUGH_SHARE]
     return f"At the far end, before the reference returns, {listed(late, 'and')} are in position." if late else ""
 
 
@@ -348,7 +346,7 @@ def _performance(comparison: Comparison) -> list[str]:
         for result in resting
     ]
     longer = (
-        f"Of {followed} machines followed {LONGER_FACTOR} times as long, {percent(ENOUGH_MACHINES)} or more stay at "
+        f"Of {followed} machines followed {LONGER_FACTOR} times as long, {percent(ENOUGH_SHARE)} or more stay at "
         "rest with "
     )
     return [*lines, f"{longer}{listed([result.letter for result in resting], 'and')}."] if lines else []

@@ -145,14 +145,15 @@ def _loaded(evaluation: Evaluation) -> Iterator[str]:
     Nothing is yielded without a load.
     """
     load = float(evaluation.mechanism.load)
+    if not load:
+        return
     first = evaluation.modes[0].frequency * math.sqrt(max(evaluation.loaded_drive / evaluation.drive[0], 0.0))
     close = f" That is {evaluation.buckling_margin:.2g} times below buckling, so the stiffness depends on it strongly."
-    if load:
-        yield (
-            f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
-            f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all other "
-            f"results are without it.{close if load > 0 else ''}"
-        )
+    yield (
+        f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
+        f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all other "
+        f"results are without it.{close if load > 0 else ''}"
+    )
 
 
 def _breaks_away(flexure: BothModels) -> Iterator[str]:

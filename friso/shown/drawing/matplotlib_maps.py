@@ -22,9 +22,7 @@ from friso.shown.drawing.palette import GREY, INK
 
 LINE_HEIGHT = 0.17  # [inch] one line of the legend or the note
 LETTERS_PER_INCH = 15.5  # to the inch, at their size
-MOST_VECTORS = (
-    1000  # more cells than these become a picture inside an SVG or PDF, which else is slow to draw and to open
-)
+MOST_VECTORS = 1000  # more cells become a picture inside an SVG or PDF, which else is slow to draw and to open
 
 
 def draw_coloured(axes: Axes, panel: Panel) -> None:

@@ -37,10 +37,7 @@ LEGEND_ROWS, LEGEND_ROW = 3, 13  # rows of a legend that this has room for, and 
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
-DOTS_PER_INCH, FINER_FACTOR = (
-    150,
-    2,
-)  # dots to the inch, and how many times as many where a file of lines holds a picture
+DOTS_PER_INCH, FINER_FACTOR = 150, 2  # and how many times as many dots where a file of lines holds a picture
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
 _METADATA = {

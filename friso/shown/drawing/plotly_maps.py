@@ -15,7 +15,7 @@ from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
 from friso.shown.drawing.figure import Array, Axis, Coloured, Figure, Map, Panel
 from friso.shown.drawing.palette import GREY, INK
 
-BAR_HEIGHT = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
+BAR_WIDTH_SHARE = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
 LINE_HEIGHT = 17  # [px] one line of the note
 KEY_ROW, KEY_SPACE = 19, 11  # [px] a row of a legend, and what lies about the one beneath a figure
 KEY_LETTER, KEY_MARK = 6.6, 45  # [px] one letter of a legend, and the sign of an entry

@@ -25,7 +25,10 @@ from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Serie
 from friso.shown.drawing.packing import packed, packed_json
 from friso.shown.drawing.palette import GREY, INK
 
-WIDE_HEIGHT, NARROW_HEIGHT = 540, 290  # [px] for all columns of axes: the least of a wide page, and of a telephone
+WIDE_PAGE_WIDTH, NARROW_PAGE_WIDTH = (
+    540,
+    290,
+)  # [px] for all columns of axes: the least of a wide page, and of a telephone
 TITLE_HEIGHT, ROW_SPACE = 17, 18  # [px] a line of the title, and what lies about it and the legend
 TITLE_LETTER = 7.6  # [px] one letter of it
 PLOT_HEIGHT = 230  # [px] height of the axes
@@ -69,7 +72,7 @@ def fragment(figure: Figure) -> str:
 def parts_of_both(figure: Figure) -> dict[str, Any]:
     """Return `parts`, with the layout and colour bars that differ on a narrow screen."""
     prepared = drawable(figure)
-    return _on_both(_laid_out(prepared, WIDE_HEIGHT), _laid_out(replace(prepared, columns=1), NARROW_HEIGHT))
+    return _on_both(_laid_out(prepared, WIDE_PAGE_WIDTH), _laid_out(replace(prepared, columns=1), NARROW_PAGE_WIDTH))
 
 
 def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
@@ -113,10 +116,10 @@ def _checked(traces: list[Any], layout: dict[str, Any]) -> go.Figure:
 
 def narrow_parts(figure: Figure) -> dict[str, Any]:
     """Return traces and layout for a narrow screen, with panels one below the other."""
-    return parts(replace(figure, columns=1), NARROW_HEIGHT)
+    return parts(replace(figure, columns=1), NARROW_PAGE_WIDTH)
 
 
-def parts(figure: Figure, width: int = WIDE_HEIGHT) -> dict[str, Any]:
+def parts(figure: Figure, width: int = WIDE_PAGE_WIDTH) -> dict[str, Any]:
     """Return traces and layout as plain dictionaries that hold NumPy arrays.
 
     Plotly does not validate them, because that would take ten times as long as making them. `width` is the least width
@@ -157,7 +160,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
                 "len": 1 - (FOOTER_HEIGHT + header) / height,
             }
         elif number in with_bar:
-            x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR_HEIGHT)
+            x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR_WIDTH_SHARE)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, links)
         if heads[number].rows:

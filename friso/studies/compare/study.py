@@ -103,10 +103,10 @@ slowly."""
 NOT_FOLLOWED = Later(np.zeros(0, bool), np.zeros(0, bool))
 """Result for an option whose machines are not run again for longer."""
 
-ENOUGH_MACHINES = 0.99
+ENOUGH_SHARE = 0.99
 """Fraction of the machines that an option must bring into position to count as bringing them to rest."""
 
-LATEST_STAND = 0.5
+LATEST_STAND_SHARE = 0.5
 """Latest time, over the duration, at which the reference may come to stand, because lasting swings are sought
 afterwards."""
 
@@ -188,11 +188,11 @@ class OptionResult:
     def rests(self) -> bool:
         """Tell whether enough machines come into position with the option, and stay there.
 
-        `ENOUGH_MACHINES` is the fraction required of all machines in position, and of those run for longer that stay.
+        `ENOUGH_SHARE` is the fraction required of all machines in position, and of those run for longer that stay.
         Without longer runs the result is false.
         """
-        in_position = self.in_position_count >= ENOUGH_MACHINES * len(self.measures.settling)
-        return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH_MACHINES)
+        in_position = self.in_position_count >= ENOUGH_SHARE * len(self.measures.settling)
+        return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH_SHARE)
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ class Comparison:
         needed = self.needed
         if needed is None:
             return None
-        at = needed.turning(ENOUGH_MACHINES)
+        at = needed.turning(ENOUGH_SHARE)
         built = (
             result.option.factor
             for result in self.results
@@ -338,9 +338,11 @@ def _places(stage: Stage) -> list[Stand]:
     if not rests(flat):
         example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
         raise InputError("motion.kind", f'"{flat["motion.kind"]}"', "a reference that stands in the end", example)
-    if corner > LATEST_STAND * duration:
-        expected = f"at least {corner / LATEST_STAND:g} s: the reference stands by half of it"
-        raise InputError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST_STAND:g} s"')
+    if corner > LATEST_STAND_SHARE * duration:
+        expected = f"at least {corner / LATEST_STAND_SHARE:g} s: the reference stands by half of it"
+        raise InputError(
+            "motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST_STAND_SHARE:g} s"'
+        )
     return [*stands(flat)]
 
 

@@ -43,7 +43,7 @@ CURVE_POINTS = 200
 SHORTEST_WAY = 20.0
 """Periods of the crossover for the longest way at the highest speed."""
 
-STEADY_PASSES = 0.5
+STEADY_PASS_SHARE = 0.5
 """Least fraction of steady passes at an accepted crossover."""
 
 SHARED_STRETCH, SHARED_PLACES = 1 / 8, 3
@@ -113,7 +113,7 @@ def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
         quick = stage.with_numbers(quicker(stage, factor))
         logs = tuple(_log(quick, pace(stage), n, low, seed + n) for n, low in enumerate(_begins(stage)))
         steady = sum(stretch.steady for log in logs if not log.failure for stretch in passes(log.log))
-        if steady > STEADY_PASSES * len(logs) * 2 * SPEED_COUNT:
+        if steady > STEADY_PASS_SHARE * len(logs) * 2 * SPEED_COUNT:
             return logs
         tried.append((steady, logs))
     return max(tried, key=lambda candidate: candidate[0])[1]
@@ -165,8 +165,8 @@ UNSTEADY_SPEEDS is the number of the fastest speeds that were not steady, and ST
 were. SLOW_PLACES is the number of places along the travel, because each log shows the friction of a few millimetres.
 """
 
-SKIPPED_SPEEDS = 4
-"""Number of speeds skipped at a time, from the lowest on, if motion was steady at all speeds."""
+SPEED_STRIDE = 4
+"""Every fourth speed is run, from the lowest on, if motion was steady at all speeds."""
 
 WAY_POINTS = 500
 """Number of points along a way at which its mean friction is computed."""
@@ -234,7 +234,7 @@ def _edge(passed: Sequence[RigLog]) -> np.ndarray:
         if not stretch.steady
     }
     if not unsteady:
-        return speeds[::SKIPPED_SPEEDS][: UNSTEADY_SPEEDS + STEADY_SPEEDS]
+        return speeds[::SPEED_STRIDE][: UNSTEADY_SPEEDS + STEADY_SPEEDS]
     fastest = max(unsteady)
     return speeds[max(fastest + 1 - UNSTEADY_SPEEDS, 0) : fastest + 1 + STEADY_SPEEDS]
 

@@ -31,7 +31,7 @@ LEAST_DURATION = 20.0
 LONGEST_INTERVAL = 1e-3
 """Longest sample time of a log [s]; the thesis states none."""
 
-BAND = COUNTED_ABOVE
+PEAK_BAND = COUNTED_ABOVE
 """Band about the reference [m] within which a run rests: the height above which the thesis counts peaks."""
 
 ROUND_MANTISSAS = (1.0, 2.0, 5.0, 10.0)
@@ -144,7 +144,7 @@ class RailRuns(ArrayColumns):
     """Results of runs on rails, each of shape (runs,).
 
     - `peaks`: distinct peaks (see `friso.hunting.criteria.peak_count`).
-    - `outcome`: words of `friso.hunting.criteria.run_outcome`, with `BAND` as band.
+    - `outcome`: words of `friso.hunting.criteria.run_outcome`, with `PEAK_BAND` as band.
     - `swing` [m], peak to peak, and `period` [s] of the last quarter (NaN: none).
     - `above`, `below` [m]: mean heights of swings on both sides of the reference, after half of the run.
     - `rising`: fraction of the period in which the deviation rises.
@@ -229,12 +229,12 @@ def rail_runs(recorded: RecordedRuns) -> RailRuns:
     swing, earlier = (np.ptp(deviation[:, time >= part * time[-1]], axis=1) for part in (LAST_QUARTER, LAST_HALF))
     ended = np.full(len(turns), time[-1])
     ending = scan_turning_points(times, values, counts, swing, ended)
-    end = End(~failed, swing, earlier, ending.period, ending.turned, last_outside(time, deviation, BAND), ended)
+    end = End(~failed, swing, earlier, ending.period, ending.turned, last_outside(time, deviation, PEAK_BAND), ended)
     shapes = [cycle_shape(*turn, size, time[-1]) for turn, size in zip(turns, swing, strict=True)]
     valid = np.where(failed, np.nan, 1.0)
     above, below, rising, periods, heights = np.array(shapes).T * valid
     counted = np.where(failed, 0, peaks_in_traces(time, deviation))
-    words = outcomes(end, BAND)
+    words = outcomes(end, PEAK_BAND)
     return RailRuns(counted, words, swing * valid, ending.period * valid, above, below, rising, periods, heights)
 
 
@@ -257,7 +257,7 @@ def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: floa
     if the run does not swing, or has fewer than three swings to either side.
     """
     nothing = (np.nan,) * 5
-    if not lasts(np.asarray(swing), 0.0, BAND):
+    if not lasts(np.asarray(swing), 0.0, PEAK_BAND):
         return nothing
     late = times >= ended / 2
     at, value = times[late], values[late]

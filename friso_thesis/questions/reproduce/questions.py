@@ -123,7 +123,7 @@ def question_rows() -> list[Sequence[str]]:
 
 
 STATIC_FRICTION, JOINT_STROKE = 3.0, 1e-3
-PARASITIC_FREQUENCY, LARGEST_FRICTION = 360.0, 2.5
+PARASITIC_FREQUENCY, IDENTIFIED_MASS = 360.0, 2.5
 
 
 def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
@@ -170,7 +170,7 @@ def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
         (
             "4. Gains for the largest mass",
             "Eq. 7, 8 with the mass identified",
-            "; ".join(f"{mass:g} kg: {_gain_text(*rig_gains(mass))}" for mass in (1.7, LARGEST_FRICTION)),
+            "; ".join(f"{mass:g} kg: {_gain_text(*rig_gains(mass))}" for mass in (1.7, IDENTIFIED_MASS)),
             f"{built('crossover_hz'):g} Hz: {_gain_text(*map(built, _GAINS))}; least modulus margin "
             f"{built('margin'):.2g}",
         ),

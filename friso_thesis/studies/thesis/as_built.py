@@ -228,7 +228,7 @@ class RigLoops:
     `stable`, shape (n,), is true where the loop was stable.
 
     `apparent`, shape (2, ratios), are masses [kg] that the rig seems to have, locked and free. Its motor then gives
-    `RATIOS` of the force that is assumed.
+    `MOTOR_CONSTANT_RATIOS` of the force that is assumed.
     """
 
     locked: tuple[MeasuredLoop, ...]

@@ -20,7 +20,7 @@ from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
-from friso.studies.rig.moves_on_rails import BAND, RailRuns
+from friso.studies.rig.moves_on_rails import PEAK_BAND, RailRuns
 from friso.studies.rig.outcome import Outcome
 
 TIME = Axis("Time", "s")
@@ -230,7 +230,7 @@ def _startable(moves: HuntingResult) -> Figure:
     )
 
 
-CRITERIA = {"outcome": OUTCOME, "band_m": BAND, "distinct_peaks": DISTINCT_CRITERION}
+CRITERIA = {"outcome": OUTCOME, "band_m": PEAK_BAND, "distinct_peaks": DISTINCT_CRITERION}
 
 
 def runs_document(runs: RailRuns) -> dict[str, Any]:

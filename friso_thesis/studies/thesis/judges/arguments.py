@@ -42,7 +42,7 @@ LIGHT, HEAVY = "1.7 kg", "2.5 kg"
 MEASURED_FRICTION = 1.0, 2.5
 """Range of static friction [N] in Fig. 20."""
 
-_PEAK_FORCE, PRESCRIBED_ACCELERATION, STANDARD_GRAVITY, TENFOLD_GRAVITY = 200.0, 100.0, 9.81, 10.0
+_PEAK_FORCE, PRESCRIBED_ACCELERATION, ROUND_GRAVITY, TENFOLD_GRAVITY = 200.0, 100.0, 9.81, 10.0
 """Peak force of the actuator [N] and accelerations [m/s^2, g] (Sec. 3.5, 4.3.2)."""
 
 BOTH_MASSES = 1.7, 2.5
@@ -123,7 +123,7 @@ def the_mass_to_tune_for(evidence: Evidence) -> Finding:
 @judges("S352", figure="Sec. 3.5, acceleration")
 def close_to_ten_g(evidence: Evidence) -> Finding:
     """Judge whether the peak force accelerates the masses weighed and identified by about 10 g."""
-    reached = [_PEAK_FORCE / mass / STANDARD_GRAVITY for mass in BOTH_MASSES]
+    reached = [_PEAK_FORCE / mass / ROUND_GRAVITY for mass in BOTH_MASSES]
     rows = tuple(
         (f"{mass:g} kg", f"{PRESCRIBED_ACCELERATION * mass:g} N", f"{_PEAK_FORCE:g} N") for mass in BOTH_MASSES
     )
