@@ -376,9 +376,9 @@ def test_bode_with_sampling_and_delay(whole: Stage) -> None:
 
 def test_rig_hunting(whole: Stage) -> None:
     sizes = {
-        "CROSSOVERS": np.array([1.0, 3.0]),
-        "SHOWN": (0, 1),
-        "DISPLACEMENTS": (0.02,),
+        "RELATIVE_CROSSOVERS": np.array([1.0, 3.0]),
+        "SHOWN_CROSSOVERS": (0, 1),
+        "RELEASE_DISTANCES": (0.02,),
         "rails": lambda machine: rails(machine)[:2],
     }
     with patched({rig_hunting: sizes}):

@@ -241,7 +241,8 @@ def hold(
         The force that it has to bear, "2 N" or a number [N].
     '''
     chosen = read_stage(stage, set)
-    return HoldAnswer(quantity_of(force_limit, "force_limit", Quantity("N", positive, "2 N")), stage=chosen)
+    force = Quantity("N", positive, "2 N").on(chosen.axis_kind)
+    return HoldAnswer(quantity_of(force_limit, "force_limit", force), stage=chosen)
 """,
     "words": """
 def sentences(answer):

@@ -128,7 +128,12 @@ def small(stage: Stage) -> np.ndarray:
 
 def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
     save(whole, tmp_path / "stage.toml")
-    sizes = {"CROSSOVERS": np.array([0.3, 0.5]), "SHOWN": (0, 1), "DISPLACEMENTS": (0.02,), "rails": small}
+    sizes = {
+        "RELATIVE_CROSSOVERS": np.array([0.3, 0.5]),
+        "SHOWN_CROSSOVERS": (0, 1),
+        "RELEASE_DISTANCES": (0.02,),
+        "rails": small,
+    }
     with patched({hunting: sizes}):
         run = friso_inside(tmp_path, "rig", "hunting", "stage.toml", "--json")
     assert run.returncode == 0, run.stderr

@@ -126,9 +126,9 @@ def test_hunting_can_be_started() -> None:
 
 
 SMALL = {
-    "CROSSOVERS": np.array([8.0, 9.5, 14.3]) / 8,
-    "SHOWN": (0, 1, 2),
-    "DISPLACEMENTS": (0.02,),
+    "RELATIVE_CROSSOVERS": np.array([8.0, 9.5, 14.3]) / 8,
+    "SHOWN_CROSSOVERS": (0, 1, 2),
+    "RELEASE_DISTANCES": (0.02,),
     "rails": lambda stage: rails(stage)[:2],
 }
 

@@ -36,10 +36,10 @@ import numpy as np
 from filelock import FileLock
 from platformdirs import user_cache_dir
 
-from friso.engine.private import make_private
 from friso.engine.processor import processor
 from friso.engine.seal import read_sealed, write_sealed
 from friso.platform.leftovers import locked_folder, temporary_folder
+from friso.platform.private import make_private
 from friso.platform.system import cause_of, path_of, remove_folder
 from friso.version import VERSION
 

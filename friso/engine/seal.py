@@ -13,7 +13,7 @@ from pathlib import Path
 
 from filelock import FileLock
 
-from friso.engine.private import read_private, write_private
+from friso.platform.private import read_private, write_private
 from friso.platform.system import is_open_to_others
 
 SECRET_FILE, SECRET_BYTES = "secret", 32

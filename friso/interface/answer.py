@@ -163,12 +163,16 @@ class Answer:
         """Show the answer by a `function` in a `module` of the question's folder, or in its `words`.
 
         Returns what that function returns for the answer's subject and `more` arguments, or `otherwise` if there is no
-        such function.
+        such function. Raises AttributeError if the folder has the `module`, but without the function.
         """
-        places = [f"{self.package}.{part}" for part in (module, "words")]
-        modules = (import_module(place) for place in places if self.package and find_spec(place))
-        shown = next((getattr(one, function) for one in modules if hasattr(one, function)), None)
-        return otherwise if shown is None else shown(self.subject, *more)
+        places = [f"{self.package}.{part}" for part in (module, "words") if self.package]
+        modules = [import_module(place) for place in places if find_spec(place)]
+        for one in modules:
+            if hasattr(one, function):
+                return getattr(one, function)(self.subject, *more)
+        if module != "words" and modules and modules[0].__name__ == places[0]:
+            raise AttributeError(f"{places[0]} has no function {function}, which a module of this name declares")
+        return otherwise
 
     def sentences(self) -> Sequence[str]:
         """Return the answer in words, the conclusion first."""

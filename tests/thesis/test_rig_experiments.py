@@ -25,7 +25,7 @@ def test_what_has_no_joint(refused: Refused) -> None:
 
 def test_the_stroke_of_a_free_joint_matters() -> None:
     """The result agrees with Fig. 26, and the page says so."""
-    sizes = {"CROSSOVERS": np.array([0.5, 1.0]), "STROKES": np.array([0.02, 1.0])}
+    sizes = {"RELATIVE_CROSSOVERS": np.array([0.5, 1.0]), "RELATIVE_STROKES": np.array([0.02, 1.0])}
     with patched({stroke_crossover: {**sizes, "rails": lambda stage: rails(stage)[:2]}}):
         outcome = stroke_crossover.run_experiment(RIG, 1, silent)
     assert outcome.result.share[1, 1] == 0
