@@ -17,10 +17,11 @@ import pytest
 from filelock import FileLock
 from systems import posix
 
-from friso.engine import building, cache, private, prune
+from friso.engine import building, cache, prune
 from friso.engine.cache import SECONDS_OF_A_DAY
 from friso.engine.seal import SECRET_BYTES, SECRET_FILE, read_sealed, write_sealed
 from friso.engine.settings import BuildSettings
+from friso.platform import private
 from friso.platform.helper_process import HelperProcess
 from friso.platform.whole_file import PARTIAL
 
