@@ -229,6 +229,7 @@ def test_results_do_not_depend_on_threads(rig: Stage) -> None:
         {"sample": ["8 kg"]},
         {"name": ["a", "b"]},
         {"controller.crossover": "1 Hz..2 Hz:10000000000000"},
+        {"crossover": "1 Hz..4 Hz:3"},
     ],
 )
 def test_wrong_axes_are_refused(rig: Stage, axes: dict, refused: Refused) -> None:

@@ -332,7 +332,13 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
     match = _RANGE.fullmatch(text)
     if match is None:
         raise InputError("", quoted(text), "FIRST..LAST:POINTS, optionally followed by :log", RANGE_EXAMPLE)
-    first, last = reader.text(match["first"]), reader.text(match["last"])
+    try:
+        first, last = reader.text(match["first"]), reader.text(match["last"])
+    except InputError as error:
+        ends = [f"{match[end].strip()} {reader.unit}" for end in ("first", "last") if _number(match[end]) is not None]
+        if len(ends) < 2:
+            raise
+        raise InputError("", error.actual, error.expected, f'"{"..".join(ends)}"') from None
     if not first < last:
         order = "empty" if first == last else "reversed"
         raise InputError("", quoted(text, f"{order} range"), "an increasing range", RANGE_EXAMPLE)
@@ -399,7 +405,10 @@ def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
         raise InputError(key, problem, "a key of the stage, or a stage with that table")
     if not rest or table not in type(stage).model_fields:
         expected = "a key of the stage file, or a name that a link uses"
-        raise InputError(key, "a name that nothing depends on", expected, 'with the link masses.cart = "0.7 * mass"')
+        near = [name for name in stage.numeric_keys() if key in name.split(".", 1)[-1] or name.startswith(key)]
+        hint = f"; did you mean {' or '.join(near)}?" if 0 < len(near) < 4 else ""
+        actual = f"a name that nothing depends on{hint}"
+        raise InputError(key, actual, expected, 'with the link masses.cart = "0.7 * mass"')
     for value in options:
         stage.replace({key: value})
     if not options:
