@@ -140,8 +140,8 @@ class EdgeSettings(Settings):
     may be narrow."""
 
     past_end_steps: int = setting(4, "")
-    """Steps in which an orbit is followed from its end to that factor, in case it is stable again there. In fewer steps
-    Newton's method finds another orbit."""
+    """Steps in which an orbit is followed from its end to that factor, in case it is stable again there. Each begins
+    where the last two orbits point; in fewer steps Newton's method finds another orbit."""
 
     most_orbits_followed: int = setting(8, "")
     """Most orbits followed one after the other. More than eight in a row were not met."""
@@ -205,7 +205,8 @@ class CheckSettings(Settings):
     """Largest difference between a force and its limit that is only rounding."""
 
     mass_changes: tuple[float, ...] = setting((0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5), "of the mass")
-    """Changes of the masses with which a stage's own motion is run, because no mass is known that exactly."""
+    """Changes of the masses with which a stage's own motion is run, because no mass is known that exactly. The
+    first is 0, the motion itself."""
 
     free_work_share: float = setting(0.58, "")
     """Fraction of the work for the case with a free joint, whose limiter chatters."""
