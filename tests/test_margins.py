@@ -10,6 +10,7 @@ from made_up import FakeCase, fake_stage, hunts, settles
 from patched import patched
 from variants import VARIANTS
 
+from friso.engine.allowance import Exhausted
 from friso.equations.scaled_friction import (
     least_static_factor,
     static_frictions,
@@ -159,7 +160,8 @@ def test_a_side_that_was_given_up_is_no_margin() -> None:
 
 
 @pytest.mark.inner
-def test_a_window_that_was_searched_is_not_forgotten() -> None:
+@pytest.mark.parametrize("maps", [True, False])
+def test_a_window_that_was_searched_is_not_forgotten(maps: bool) -> None:
     """A limit cycle exists only from 0.8 to 0.9 times a parameter: the nearest end below is in that window.
 
     A rough survey that is wrong next to the stage's own value only moves the end farther away.
@@ -178,6 +180,7 @@ def test_a_window_that_was_searched_is_not_forgotten() -> None:
         "what_attracts": answers,
         "surely_surveyed": lambda stages, survey: survey.decided,
         "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
+        "_maps_decide": lambda scaled: maps,
     }
     with patched({module: changed}):
         margin = parameter_margin(lambda factors: factors, False, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
@@ -186,6 +189,33 @@ def test_a_window_that_was_searched_is_not_forgotten() -> None:
     assert margin.below.certain
     assert margin.above is None
     assert not margin.open_sides
+
+
+@pytest.mark.inner
+@pytest.mark.parametrize("maps", [True, False])
+def test_without_a_map_scarce_work_leaves_one_side_open(maps: bool) -> None:
+    """Runs from many starts fill the registers, so that both sides together take twice as long as one."""
+    work = 3 * 8
+
+    def answers(stages: Any, **_: Any) -> Any:
+        nonlocal work
+        work -= len(stages)
+        if work < 0:
+            raise Exhausted
+        attracts = (stages < 0.8) | (stages > 1.25)
+        motions = [SimpleNamespace(stage=int(k), cycles=1) for k in np.flatnonzero(attracts)]
+        return SimpleNamespace(attracts=attracts, decided=np.ones(len(stages), bool), motions=motions)
+
+    changed = {
+        "surveyed_roughly": answers,
+        "what_attracts": answers,
+        "surely_surveyed": lambda stages, survey: survey.decided,
+        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
+        "_maps_decide": lambda scaled: maps,
+    }
+    with patched({module: changed}):
+        margin = parameter_margin(lambda factors: factors, False, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
+    assert margin.open_sides == ((-1, 1) if maps else (1,))
 
 
 def test_a_doubt_of_an_end_is_told_beside_a_side_that_is_open() -> None:

@@ -15,7 +15,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import surveyed_roughly, what_attracts
+from friso.hunting.what_attracts import has_a_map, surveyed_roughly, what_attracts
 
 
 class Undecided(Exception):
@@ -111,12 +111,14 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
 def _ends(scaled: Scaled, searches: dict[int, _Search]) -> tuple[dict[int, MarginEnd | None], tuple[int, ...]]:
     """Run searches side by side, and return the ends they find, by side, and the sides that stay open.
 
-    Surveys of one kind that several searches wait for are made together; rough ones come first. If the allowance of
-    work runs out, all searches that are not done stay open.
+    Where return maps decide, surveys of one kind that several searches wait for are made together; rough ones come
+    first. Elsewhere runs from many starts fill the registers anyway, and one search follows the other: if the allowance
+    of work runs out, fewer stay open.
     """
     ends: dict[int, MarginEnd | None] = {}
     wanted = dict.fromkeys(searches, _Wanted(np.empty(0), False))
     answers: dict[int, Any] = dict.fromkeys(searches)
+    together = _maps_decide(scaled)
     with suppress(Exhausted):
         while wanted:
             for side, answer in answers.items():
@@ -127,13 +129,20 @@ def _ends(scaled: Scaled, searches: dict[int, _Search]) -> tuple[dict[int, Margi
                     del wanted[side]
                 except Undecided:
                     del wanted[side]
-            thorough = all(one.thorough for one in wanted.values())
-            now = [side for side, one in wanted.items() if one.thorough == thorough]
+            turn = [*wanted] if together else [*wanted][:1]
+            thorough = all(wanted[side].thorough for side in turn)
+            now = [side for side in turn if wanted[side].thorough == thorough]
             if now:
                 survey = _surveyed(scaled, np.concatenate([wanted[side].factors for side in now]), thorough)
                 places = np.cumsum([0, *(len(wanted[side].factors) for side in now)])
                 answers = {side: survey.take(slice(*part)) for side, part in zip(now, pairwise(places), strict=True)}
     return ends, tuple(side for side in searches if side not in ends)
+
+
+def _maps_decide(scaled: Scaled) -> bool:
+    """Tell whether return maps may decide what attracts the stages that `scaled` makes."""
+    stage = Ensemble.held(scaled(np.ones(1)), 1)
+    return has_a_map(stage) and not stage.remember
 
 
 def _surveyed(scaled: Scaled, factors: np.ndarray, thorough: bool) -> _Found:
