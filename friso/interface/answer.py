@@ -260,7 +260,7 @@ class Answer:
         drawn = self.figures()
         if not 0 <= figure < len(drawn):
             expected = f"0 to {len(drawn) - 1}" if drawn else "no figure: this answer has none"
-            raise InputError("figure", str(figure), expected, "plot(figure=0)")
+            raise InputError("figure", str(figure), expected, "plot(figure=0)" if drawn else "print(answer)")
         with speaking_of(self.axis_kind):
             return draw_on(drawn[figure], axes)
 

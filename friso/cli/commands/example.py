@@ -29,8 +29,10 @@ def example(
     from friso.interface.starting import example as example_path
 
     if name is None:
-        for listed, title in listed_examples():
-            print(f"{listed:<33}{title}")
+        examples = listed_examples()
+        width = max(len(listed) for listed, _ in examples) + 2
+        for listed, title in examples:
+            print(f"{listed:<{width}}{title}")
         return
     source = example_path(name)
     target = path or Path(source.name)
