@@ -63,9 +63,14 @@ class Reduced:
             parts.append(shapes)
             squares.append(values[:number])
         inner, moved = np.hstack(parts), mass @ static
-        shapes = (matrix.reshape(-1, NODE_COORDINATES, matrix.shape[1]) for matrix in (static, inner))
-        at_end = static.T @ stiffness @ static, static.T @ moved, inner.T @ moved
-        return cls(*shapes, np.concatenate(squares), *at_end)
+        return cls(
+            static.reshape(-1, NODE_COORDINATES, static.shape[1]),
+            inner.reshape(-1, NODE_COORDINATES, inner.shape[1]),
+            np.concatenate(squares),
+            static.T @ stiffness @ static,
+            static.T @ moved,
+            inner.T @ moved,
+        )
 
 
 def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:

@@ -333,7 +333,8 @@ def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Ma
     """
     if not all(map(axis.is_set, LIMITS_OF_MOVES)):
         return {}
-    return {"motion": there_and_back(*map(axis.number, LIMITS_OF_MOVES), travel, kind)}
+    fastest, acceleration = map(axis.number, LIMITS_OF_MOVES)
+    return {"motion": there_and_back(fastest, acceleration, travel, kind)}
 
 
 def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:

@@ -80,9 +80,19 @@ def swings_of(log: Log) -> HuntingLog:
     cycles, above, below, sizes = cycles[first:], above[first:], below[first:], sizes[first:]
     periods = np.diff(time[ups[first:]])
     peaks = np.array([one.start + int(np.argmax(deviation[one])) for one in cycles])
-    spread = (float(number) for values in (periods, sizes) for number in (values.mean(), values.std(ddof=1)))
-    sides = float(above.mean()), float(-below.mean())
-    return HuntingLog(len(cycles), *spread, *sides, None, time, deviation, peaks)
+    return HuntingLog(
+        count=len(cycles),
+        period=float(periods.mean()),
+        period_deviation=float(periods.std(ddof=1)),
+        amplitude=float(sizes.mean()),
+        amplitude_deviation=float(sizes.std(ddof=1)),
+        above=float(above.mean()),
+        below=float(-below.mean()),
+        predicted=None,
+        time=time,
+        deviation=deviation,
+        peaks=peaks,
+    )
 
 
 def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:

@@ -243,7 +243,7 @@ def _answer(
     `pull` [N] and `velocity` [m/s] are the cart's over time. `why` says why a direction may have no slips. Static
     friction has only a lower bound if, before most slips, the pull had stopped rising or the joint was at its stroke.
     """
-    _, _, directions, _, forces, rates, _, held, late = table
+    times, places, directions, deflections, forces, rates, speeds, held, late = table
 
     def static(chosen: np.ndarray, words: str) -> Estimate:
         if not chosen.any():
@@ -261,9 +261,26 @@ def _answer(
     every = _both(forward, backward) if shown else static(np.ones(len(forces), dtype=bool), "")
     low, high = np.percentile(forces, [5, 95]) if len(forces) else (np.nan, np.nan)
     offset = _offset(means["forward"], means["backward"])
-    spread, curves = (float(low), float(high)), (pull, velocity)
-    notes = _notes(len(forces), offset)
-    return StickSlip(every, forward, backward, *means.values(), spread, offset, stiffness, *table[:7], *curves, notes)
+    return StickSlip(
+        every,
+        forward,
+        backward,
+        means["forward"],
+        means["backward"],
+        (float(low), float(high)),
+        offset,
+        stiffness,
+        times,
+        places,
+        directions,
+        deflections,
+        forces,
+        rates,
+        speeds,
+        pull,
+        velocity,
+        _notes(len(forces), offset),
+    )
 
 
 def _notes(count: int, offset: Estimate) -> tuple[str, ...]:

@@ -234,7 +234,9 @@ def _parsed(place: Path) -> Mapping:
             raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time, axis", "", str(place))
     texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
     try:
-        options = from_options(dt=document.get("sample_time"), **{name: document.get(name) for name in SINGLE[1:]})
+        options = from_options(
+            dt=document.get("sample_time"), experiment=document.get("experiment"), axis=document.get("axis")
+        )
         for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):
             for key in texts[group]:
                 if key not in allowed:

@@ -129,9 +129,8 @@ def _best_steps(
     best = np.arange(len(inner)), costs.argmin(axis=1)
     step = trials[best] - inner
     linear = rest + (slopes @ step[:, :, None])[:, :, 0]
-    weights = _weights(step, squares)
-    reached = (array[best] for array in (trials, rests, costs, dampings))
-    return _Steps(*reached, mean_square(linear), rests[best] - linear, weights)
+    missed, weights = rests[best] - linear, _weights(step, squares)
+    return _Steps(trials[best], rests[best], costs[best], dampings[best], mean_square(linear), missed, weights)
 
 
 def _weights(steps: np.ndarray, squares: np.ndarray) -> np.ndarray:

@@ -203,8 +203,10 @@ def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
 def _nothing(reason: str) -> Direction:
     """Return undetermined friction for a direction; each estimate states the `reason`."""
     units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
-    unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
-    return Direction(*unknown, np.empty((0, 0)))
+    coulomb, viscous, static, velocity, exponent = (
+        Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items()
+    )
+    return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
 
 
 def _direction(

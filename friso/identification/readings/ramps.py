@@ -89,7 +89,8 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
         notes.append(f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:
         notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
-    return Ramps(*table, threshold, tuple(notes))
+    times, places, directions, forces, rates, unsure, late, speeds = table
+    return Ramps(times, places, directions, forces, rates, unsure, late, speeds, threshold, tuple(notes))
 
 
 def _lowest(push: np.ndarray) -> float:

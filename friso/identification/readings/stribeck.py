@@ -76,7 +76,8 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
     low = speeds.min() / reading_settings.ratio_below_the_slowest
     high = speeds.max() * reading_settings.ratio_above_the_fastest
     velocities = np.geomspace(low, high, reading_settings.grid_of_velocities)
-    shapes = np.linspace(*output_error_settings.stribeck_exponents, reading_settings.grid_of_exponents)
+    least, most = output_error_settings.stribeck_exponents
+    shapes = np.linspace(least, most, reading_settings.grid_of_exponents)
     left = len(speeds) - 5 - forces.both
     apart = left < 1
     left += apart

@@ -63,7 +63,8 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
         return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
     last = int(off[-1]) + settings.lines_of_a_window - 1
     places = last - settings.lines_of_a_window // 2, last - settings.lines_of_a_window + 1, last
-    onset = Estimate(name, "Hz", *(float(frequency[place]) for place in places), method)
+    value, low, high = (float(frequency[place]) for place in places)
+    onset = Estimate(name, "Hz", value, low, high, method)
     return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
 
 
