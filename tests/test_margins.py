@@ -218,6 +218,29 @@ def test_without_a_map_scarce_work_leaves_one_side_open(maps: bool) -> None:
     assert margin.open_sides == ((-1, 1) if maps else (1,))
 
 
+@pytest.mark.inner
+def test_a_rough_survey_alone_does_not_tell_that_hunting_has_no_end() -> None:
+    """On a drawn axis with a leaking integral rough surveys saw hunting up to 3 times the friction; it ends at 2.2."""
+
+    def answers(stages: Any, last: float) -> Any:
+        attracts = stages < last
+        motions = [SimpleNamespace(stage=int(k), cycles=1) for k in np.flatnonzero(attracts)]
+        return SimpleNamespace(attracts=attracts, decided=np.ones(len(stages), bool), motions=motions)
+
+    changed = {
+        "surveyed_roughly": lambda stages, close: answers(stages, np.inf),
+        "what_attracts": lambda stages: answers(stages, 2.2),
+        "surely_surveyed": lambda stages, survey: survey.decided,
+        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
+        "_maps_decide": lambda scaled: True,
+    }
+    with patched({module: changed}):
+        margin = parameter_margin(lambda factors: factors, True, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
+    assert margin.below is None
+    end = margin.above
+    assert end.same <= 2.2 <= end.other if end else margin.open_sides == (1,)
+
+
 def test_a_doubt_of_an_end_is_told_beside_a_side_that_is_open() -> None:
     margin = ParameterMargin(False, MarginEnd(0.8, 0.7, False), None, (1 / 3, 3.0), open_sides=(1,))
     sentence = margin_sentence("static friction", margin)

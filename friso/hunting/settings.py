@@ -167,9 +167,9 @@ class EdgeSettings(Settings):
     """Values tried first on either side of the stage's own. They lie closest together near it, and are as many as most
     processors run at once."""
 
-    thorough_margin_steps: tuple[int, int] = setting((2, 4), "steps")
-    """Values, counted outward, that are searched thoroughly if a rough survey finds no change: 9 and 23 % off for a
-    farthest factor of three."""
+    thorough_margin_steps: tuple[int, ...] = setting((2, 4, -1), "")
+    """Numbers of the values, counted outward, that are searched thoroughly if a rough survey finds no change: 9 and
+    23 % off for a farthest factor of three, and the farthest, at which a rough survey once saw hunting that was not."""
 
     proved_distances: tuple[float, float] = setting((0.02, 0.06), "log of factor")
     """Distances from the change at which thorough searches are made, on the hunting side and on the other. Nearer,
