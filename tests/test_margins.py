@@ -1,6 +1,8 @@
 """Margins in static friction, and in a joint's stroke and stiffness."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -159,6 +161,27 @@ def test_a_side_that_was_given_up_is_no_margin() -> None:
     assert hunts().verdict == "hunts"
 
 
+def margin_of(
+    attracts: bool, roughly: Callable[..., Any], thoroughly: Callable[..., Any], maps: bool = True
+) -> ParameterMargin:
+    """The margin of a made-up stage, from 1/3 to 3 times a parameter, by functions that say where it hunts."""
+
+    def answers(hunts: Callable[..., Any], factors: np.ndarray) -> Any:
+        attracting = hunts(factors)
+        motions = [SimpleNamespace(stage=int(k), cycles=1) for k in np.flatnonzero(attracting)]
+        return SimpleNamespace(attracts=attracting, decided=np.ones(len(factors), bool), motions=motions)
+
+    changed = {
+        "surveyed_roughly": lambda stages, close: answers(roughly, stages),
+        "what_attracts": partial(answers, thoroughly),
+        "surely_surveyed": lambda stages, survey: survey.decided,
+        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
+        "map_may_decide": lambda stages: maps,
+    }
+    with patched({module: changed}):
+        return parameter_margin(lambda factors: factors, attracts, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
+
+
 @pytest.mark.inner
 @pytest.mark.parametrize("maps", [True, False])
 def test_a_window_that_was_searched_is_not_forgotten(maps: bool) -> None:
@@ -166,24 +189,11 @@ def test_a_window_that_was_searched_is_not_forgotten(maps: bool) -> None:
 
     A rough survey that is wrong next to the stage's own value only moves the end farther away.
     """
-    calls: list[np.ndarray] = []
 
-    def answers(stages: Any) -> Any:
-        factors = np.asarray(stages)
-        calls.append(factors)
-        attracts = (factors > 0.8) & (factors < 0.9)
-        motions = [SimpleNamespace(stage=int(k), cycles=1) for k in np.flatnonzero(attracts)]
-        return SimpleNamespace(attracts=attracts, decided=np.ones(len(factors), bool), motions=motions)
+    def hunts(factors: np.ndarray) -> np.ndarray:
+        return (factors > 0.8) & (factors < 0.9)
 
-    changed = {
-        "surveyed_roughly": lambda stages, close: answers(stages),
-        "what_attracts": answers,
-        "surely_surveyed": lambda stages, survey: survey.decided,
-        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
-        "_maps_decide": lambda scaled: maps,
-    }
-    with patched({module: changed}):
-        margin = parameter_margin(lambda factors: factors, False, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
+    margin = margin_of(False, hunts, hunts, maps)
     assert margin.below is not None
     assert 0.8 < margin.below.other < 0.9 < margin.below.same
     assert margin.below.certain
@@ -197,45 +207,20 @@ def test_without_a_map_scarce_work_leaves_one_side_open(maps: bool) -> None:
     """Runs from many starts fill the registers, so that both sides together take twice as long as one."""
     work = 3 * 8
 
-    def answers(stages: Any, **_: Any) -> Any:
+    def hunts(factors: np.ndarray) -> np.ndarray:
         nonlocal work
-        work -= len(stages)
+        work -= len(factors)
         if work < 0:
             raise Exhausted
-        attracts = (stages < 0.8) | (stages > 1.25)
-        motions = [SimpleNamespace(stage=int(k), cycles=1) for k in np.flatnonzero(attracts)]
-        return SimpleNamespace(attracts=attracts, decided=np.ones(len(stages), bool), motions=motions)
+        return (factors < 0.8) | (factors > 1.25)
 
-    changed = {
-        "surveyed_roughly": answers,
-        "what_attracts": answers,
-        "surely_surveyed": lambda stages, survey: survey.decided,
-        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
-        "_maps_decide": lambda scaled: maps,
-    }
-    with patched({module: changed}):
-        margin = parameter_margin(lambda factors: factors, False, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
-    assert margin.open_sides == ((-1, 1) if maps else (1,))
+    assert margin_of(False, hunts, hunts, maps).open_sides == ((-1, 1) if maps else (1,))
 
 
 @pytest.mark.inner
 def test_a_rough_survey_alone_does_not_tell_that_hunting_has_no_end() -> None:
     """On a drawn axis with a leaking integral rough surveys saw hunting up to 3 times the friction; it ends at 2.2."""
-
-    def answers(stages: Any, last: float) -> Any:
-        attracts = stages < last
-        motions = [SimpleNamespace(stage=int(k), cycles=1) for k in np.flatnonzero(attracts)]
-        return SimpleNamespace(attracts=attracts, decided=np.ones(len(stages), bool), motions=motions)
-
-    changed = {
-        "surveyed_roughly": lambda stages, close: answers(stages, np.inf),
-        "what_attracts": lambda stages: answers(stages, 2.2),
-        "surely_surveyed": lambda stages, survey: survey.decided,
-        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
-        "_maps_decide": lambda scaled: True,
-    }
-    with patched({module: changed}):
-        margin = parameter_margin(lambda factors: factors, True, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
+    margin = margin_of(True, lambda factors: factors > 0, lambda factors: factors < 2.2)
     assert margin.below is None
     end = margin.above
     assert end.same <= 2.2 <= end.other if end else margin.open_sides == (1,)

@@ -15,7 +15,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import has_a_map, surveyed_roughly, what_attracts
+from friso.hunting.what_attracts import map_may_decide, surveyed_roughly, what_attracts
 
 
 class Undecided(Exception):
@@ -118,7 +118,7 @@ def _ends(scaled: Scaled, searches: dict[int, _Search]) -> tuple[dict[int, Margi
     ends: dict[int, MarginEnd | None] = {}
     wanted = dict.fromkeys(searches, _Wanted(np.empty(0), False))
     answers: dict[int, Any] = dict.fromkeys(searches)
-    together = _maps_decide(scaled)
+    together = map_may_decide(Ensemble.held(scaled(np.ones(1)), 1))
     with suppress(Exhausted):
         while wanted:
             for side, answer in answers.items():
@@ -137,12 +137,6 @@ def _ends(scaled: Scaled, searches: dict[int, _Search]) -> tuple[dict[int, Margi
                 places = np.cumsum([0, *(len(wanted[side].factors) for side in now)])
                 answers = {side: survey.take(slice(*part)) for side, part in zip(now, pairwise(places), strict=True)}
     return ends, tuple(side for side in searches if side not in ends)
-
-
-def _maps_decide(scaled: Scaled) -> bool:
-    """Tell whether return maps may decide what attracts the stages that `scaled` makes."""
-    stage = Ensemble.held(scaled(np.ones(1)), 1)
-    return has_a_map(stage) and not stage.remember
 
 
 def _surveyed(scaled: Scaled, factors: np.ndarray, thorough: bool) -> _Found:

@@ -134,7 +134,7 @@ def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | 
 
     Returns None if they are not, or if the stage has no map that decides.
     """
-    if not has_a_map(stages) or stages.remember:
+    if not map_may_decide(stages):
         return None
     survey = survey_maps(stages)
     (landing_map,), length = survey.mapped.maps, float(stages.length[0])
@@ -251,6 +251,11 @@ def search_alone() -> Iterator[None]:
         yield
     finally:
         _SEARCHES_ALONE.reset(token)
+
+
+def map_may_decide(stages: Ensemble) -> bool:
+    """Tell whether maps may decide what attracts stages: they have one, and remember no past."""
+    return has_a_map(stages) and not stages.remember
 
 
 def has_a_map(stages: Ensemble) -> bool:
