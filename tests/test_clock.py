@@ -29,7 +29,7 @@ from friso.stage import Stage
 KD, LIMIT = 60.0, 9.0
 DIGIT, NOISE, LAG, RATIO = 1e-5, 3e-6, 150.0, 0.9
 MOTION = {"kind": "there_and_back", "acceleration": "4 m/s^2", "return_at": "0.2 s", "duration": "0.4 s"}
-DELAYS = (0.0, 0.4, 2.0, 2.6)
+DELAYS = (0.0, 0.1, 0.4, 0.9, 2.0, 2.3, 2.6, 2.95)
 Flat = dict[str, Any]
 
 
@@ -74,7 +74,7 @@ def run(
     chosen = RunOptions(**{"rtol": 1e-11, "interval": every * TIME, **options})
     batch = prepare(shape, flat, runs, chosen)._replace(tables=tables)
     assert chosen.interval is not None
-    results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, len(shape.full_state))
+    results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, shape.sample_size)
     run_batch(shape, batch, options_of(chosen), results, threads)
     return shape, results
 
@@ -153,7 +153,7 @@ class Twin:
         return stroke(t) - stroke(t - back)
 
     def run(self, tables: Tables, samples: int) -> tuple[np.ndarray, np.ndarray]:
-        """Position, velocity and the motor's force as each command is carried out, and that command."""
+        """Position, velocity and the motor's force at each sample, and the command computed from it."""
         late = (self.delay - int(self.delay)) * TIME
         parts = self._moving(late), self._moving(TIME - late)
         x, commands, past, integral = np.zeros(3), [0.0] * int(self.delay), [0.0, 0.0], 0.0
@@ -169,8 +169,8 @@ class Twin:
             integral = integral if winding else integral + TIME * error
             commands.append(float(np.clip(demand + KI * integral, -LIMIT, LIMIT)))
             past = [reading, past[0]]
-            x = self._move(parts[0], x, constant * acting, floor)
             moved.append(x)
+            x = self._move(parts[0], x, constant * acting, floor)
             floor, constant = self._located(tables, n, x[0])
             acting = commands[n]
             x = self._move(parts[1], x, constant * acting, floor)
@@ -205,7 +205,9 @@ def test_drive_is_that_of_plain_python(delay: float, ramp: str) -> None:
     simulated = results.samples[0, :400, [shape.full_state.index(n) for n in ("position", "velocity", "motor_force")]].T
     assert np.abs(commands).max() == LIMIT  # the limit is met, and left again
     assert np.mean(np.abs(commands) == LIMIT) < 0.4
-    assert results.samples[0, :400, shape.full_state.index("commanded")] == pytest.approx(commands[:400], abs=1e-6)
+    assert results.samples[0, :400, len(shape.full_state) + shape.held.index("commanded")] == pytest.approx(
+        commands[:400], abs=1e-6
+    )
     assert simulated == pytest.approx(states, abs=1e-7, rel=1e-7)
 
 
@@ -252,7 +254,7 @@ def test_tables_between_their_points() -> None:
         tables = FLAT_TABLES._replace(times=line, per_second=np.array([(count - 1) / 0.4]))
         still = {"controller.kp": 1e-9, "controller.ki": 1e-9, "controller.kd": 1e-9}
         shape, results = run(keys(axis()) | still, tables=tables)
-        commanded.append(results.samples[0, :400, shape.full_state.index("commanded")])
+        commanded.append(results.samples[0, :400, len(shape.full_state) + shape.held.index("commanded")])
     expected = -4.0 + 10.0 * np.arange(400) * TIME / 0.4
     for force in commanded:
         assert force == pytest.approx(expected, abs=1e-9)

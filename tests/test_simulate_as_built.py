@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import friso
 import friso.equations.motion
@@ -94,8 +96,69 @@ def test_a_cell_of_a_map_is_the_run_of_its_stage(stage: Stage) -> None:
     assert float(runs["largest_force"][1, 1, 1]) == pytest.approx(alone.largest_force[0], rel=1e-9)
 
 
+def test_a_cell_of_a_map_over_the_duration_is_the_run_of_its_stage(stage: Stage) -> None:
+    """Cells that last shorter are not measured at the end of the longest one."""
+    built = stage.replace({"drive": {"sample_time": "250 us", "delay": "350 us"}})
+    durations = ["1.7 s", "1.8001 s", "2.00013 s"]
+    cells = friso.sweep(built, {"motion.duration": durations}, metric="peak_to_peak").data["peak_to_peak"].values
+    alone = [friso.simulate(built.replace({"motion.duration": one})).measures.peak_to_peak[0] for one in durations]
+    assert cells == pytest.approx(alone, rel=1e-6)
+    assert np.ptp(alone) > 1e-6
+
+
 def test_a_sample_time_between_the_samples_of_the_drive_is_refused(stage: Stage) -> None:
     with pytest.raises(friso.InputError) as caught:
         friso.simulate(stage.replace(DRIVE), sample_time="300 us")
     assert caught.value.key == "sample_time"
     assert "whole number of samples of the drive" in caught.value.expected
+
+
+def largest_error(stage: Stage, sample_time: str, delay: str, duration: str = "2 s") -> float:
+    """Largest error on the way [m]. No row may lack a number, and an ideal encoder reads the position."""
+    built = stage.replace({"drive": {"sample_time": sample_time, "delay": delay}, "motion.duration": duration})
+    data = friso.simulate(built).data
+    assert not any(np.isnan(data[name]).any() for name in data)
+    assert np.abs(data["measured_position"] - data["position"]).max() < 1e-12
+    return float(np.abs(data["position"] - data["reference"]).max())
+
+
+@given(
+    sample_time=st.floats(100.0, 400.0),
+    samples=st.floats(0.01, 2.99),
+    longer=st.sampled_from([0.0, 1e-4, 0.1, 0.5, 0.99]),
+)
+@settings(max_examples=12)
+def test_results_are_continuous_in_delay_sample_time_and_duration(
+    sample_time: float, samples: float, longer: float
+) -> None:
+    """A ten-thousandth more of one of them changes the largest error of an S-curve by hardly more than that."""
+    stage = friso.load(friso.example("motions/profile"))
+    duration = 2.0 + 1e-6 * sample_time * longer
+    delay = samples * sample_time
+    own = largest_error(stage, f"{sample_time} us", f"{delay} us", f"{duration} s")
+    for times in ((1.0001, 1.0, 1.0), (1.0, 1.0001, 1.0), (1.0, 1.0, 1.0001)):
+        more = [value * factor for value, factor in zip((sample_time, delay, duration), times, strict=True)]
+        other = largest_error(stage, f"{more[0]} us", f"{more[1]} us", f"{more[2]} s")
+        assert other == pytest.approx(own, rel=3e-3)
+
+
+def test_more_delay_is_no_better_tracking(stage: Stage) -> None:
+    """Across whole samples and between them: the largest error of an S-curve grows with the delay."""
+    delays = [0, 50, 125, 200, 249.999, 250, 250.001, 350, 450, 500]
+    errors = [largest_error(stage, "250 us", f"{delay} us") for delay in delays]
+    assert np.all(np.diff(errors) > -1e-4 * errors[0])
+    assert errors[-1] > 1.01 * errors[0]
+
+
+@pytest.mark.parametrize("duration", ["2 s", "2.00005 s"])
+@pytest.mark.parametrize("delay", ["100 us", "350 us", "249.9999 us", "249.99999999 us", "250 us"])
+def test_a_move_that_rests_is_told_at_rest_whatever_the_delay_and_duration(
+    stage: Stage, delay: str, duration: str
+) -> None:
+    """The last sample lies 50 us before the end, or a whole sample, and its command acts after it."""
+    built = stage.replace({"drive": {"sample_time": "250 us", "delay": delay}, "motion.duration": duration})
+    assert not np.isnan(friso.simulate(built, sample_time="250 us").data["position"]).any()
+    assert friso.simulate(built).measures.outcome[0] == "rests"
+    runs = friso.sweep(built, {"drive.delay": [delay, "400 us"]}, metric="settling_time_10um").data
+    assert np.isfinite(runs["settling_time_10um"]).all()
+    assert list(runs["outcome"].values) == ["rests", "rests"]

@@ -98,7 +98,8 @@ class Results(NamedTuple):
 
     - `statistics` (n, len(STATISTICS)) and `statuses` (n,).
     - `turn_times` [s] and `turn_values` [m] (n, capacity): turning points, of which `turn_counts` (n,) are valid.
-    - `samples` (n, samples, states + held): states, and numbers held between samples.
+    - `samples` (n, samples, states + held): states, and numbers held between samples; with a sampled drive, the
+      numbers that it computed from each sample follow (`friso.engine.kernel.Kernel.sample_size`).
     - `ends` (n, states + held): states and held numbers at the end of the run.
     """
 

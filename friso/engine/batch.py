@@ -114,11 +114,8 @@ def prepare(
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return the initial states of stages at rest, (runs, states), displaced as the motion says.
-
-    Filters have settled, and the actuator carries the constant forces.
-    """
-    return kernel.balanced({**flat, "motion.size": motion.size(flat)}, motion.initial_displacement(flat), runs)
+    """Return the initial states of stages from rest, (runs, states), displaced as the motion says."""
+    return kernel.at_rest({**flat, "motion.size": motion.size(flat)}, motion.initial_displacement(flat), runs)
 
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:
@@ -169,7 +166,7 @@ def _run_with_room(
     samples = 0
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
-    results = empty_results(len(numbers), room, samples, len(kernel.full_state))
+    results = empty_results(len(numbers), room, samples, kernel.sample_size)
     _run_within_allowance(kernel, batch, options, results)
     crowded = results.turn_counts > room
     if room >= room_settings.most_turning_points:

@@ -177,7 +177,8 @@ class _Job:
         asker = ASKER.get()
         if self.builds and asker not in self._announced:
             self._announced.add(asker)
-            logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
+            words = (self._place, self.request.title)
+            logger.warning("compiling, once on this machine, %s: %s", *words, extra={"passing": True})
 
     def meet(self) -> None:
         """Fulfil the request, unless another process has done so meanwhile."""

@@ -297,29 +297,54 @@ def looked_up(layout, j, i, point, tables):
     return tables.times[min(j, tables.times.shape[0] - 1), i - layout.places, point]
 
 
-def note_tick(B, layout, lane, settings, results):
-    """Write a run's states and newly held numbers at a sample of its drive's clock."""
+def note_instant(B, layout, lane, settings, results):
+    """Write a run as it was at the instant of its drive's sample.
+
+    The numbers held at that instant follow from earlier samples; the results of this one act later.
+    """
+    k = int(B[ROW.next_sample * layout.lanes + lane] / settings.interval + 0.5)
+    row = results.samples[int(B[ROW.run * layout.lanes + lane])][k]
+    write_held(B, layout, lane, row)
+    for i in range(layout.states):
+        row[i] = B[(layout.seen + i) * layout.lanes + lane]
+    for i in range(layout.modes):
+        mode = layout.states + layout.held - layout.modes + i
+        row[mode] = B[(layout.seen + layout.states + i) * layout.lanes + lane]
+
+
+def note_results(B, layout, lane, batch, settings, results):
+    """Write the numbers that a run's drive has computed from its sample, behind the run at that instant.
+
+    If they act at once, they belong to the run at that instant, too.
+    """
     next_sample, samples = ROW.next_sample * layout.lanes + lane, results.samples
-    k = int(B[next_sample] / settings.interval + 0.5)
-    write_states(B, layout, lane, samples[int(B[ROW.run * layout.lanes + lane])][k])
+    j, k = int(B[ROW.run * layout.lanes + lane]), int(B[next_sample] / settings.interval + 0.5)
+    row, first = samples[j][k], layout.states + layout.held
+    if batch.clocks[j, 1] == 0.0:
+        write_states(B, layout, lane, row)
+    for i in range(layout.held):
+        row[first + i] = B[(layout.reference + layout.inputs + i) * layout.lanes + lane]
     B[next_sample] = (k + 1) * settings.interval if k + 1 < samples.shape[1] else np.inf
 
 
 def take_samples(B, layout, batch, settings, results):
     """Let the drives of all runs in the buffer take a sample, where one is due.
 
-    Tables are looked up before, and what is to be recorded is written after it.
+    Tables are looked up before. What is to be recorded is written before it and after it: the run at the instant of
+    the sample, and what the drive computed from that.
     """
     wanting = call_at(layout.locate, B) if layout.clocked else 0
     if wanting:
         for lane in range(layout.lanes):
             if B[ROW.left * layout.lanes + lane] > 0.0:
                 look_up(B, layout, lane, int(B[ROW.run * layout.lanes + lane]), batch.tables)
+            if B[ROW.noted * layout.lanes + lane] > 0.0:
+                note_instant(B, layout, lane, settings, results)
     call_at(layout.update, B)
     if wanting:
         for lane in range(layout.lanes):
             if B[ROW.noted * layout.lanes + lane] > 0.0:
-                note_tick(B, layout, lane, settings, results)
+                note_results(B, layout, lane, batch, settings, results)
 
 
 def load_run(B, layout, lane, j, batch, settings):
@@ -352,8 +377,11 @@ def start_clock(B, layout, lane, j, batch):
     B[ROW.period * layout.lanes + lane] = batch.clocks[j, 0]
     B[ROW.due * layout.lanes + lane] = late
     B[ROW.ticked * layout.lanes + lane] = 1.0 if late == 0.0 else 0.0
-    for i in range(layout.seen_states.size):
-        B[(layout.seen + i) * layout.lanes + lane] = batch.starts[j, layout.seen_states[i]]
+    for i in range(layout.states):
+        B[(layout.seen + i) * layout.lanes + lane] = batch.starts[j, i]
+    for i in range(layout.modes):
+        mode = batch.starts[j, layout.states + layout.held - layout.modes + i]
+        B[(layout.seen + layout.states + i) * layout.lanes + lane] = mode
     grid = tables.grid[min(j, tables.grid.shape[0] - 1)]
     last_place, last_time, row = tables.places.shape[2] - 1, tables.times.shape[2] - 1, layout.axis
     for number in (grid[0], grid[1], last_place, 0.0, tables.per_second[0], last_time):

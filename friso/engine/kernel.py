@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from threading import Lock
@@ -130,6 +130,15 @@ class Kernel:
         return self.states + self.held
 
     @property
+    def sample_size(self) -> int:
+        """Return how many numbers a sample of a run consists of: those of `full_state`.
+
+        With a sampled drive, the held numbers follow that the drive computed from the sample. They differ from those in
+        `full_state` where they act later than at the instant of the sample.
+        """
+        return len(self.full_state) + self.layout.clocked * len(self.held)
+
+    @property
     def switches(self) -> tuple[int, ...]:
         """Return the numbers of the kinks, where derivatives jump, that are modes with memory."""
         return self.module.SWITCHES
@@ -164,14 +173,18 @@ class Kernel:
         """
         return self.settled_at(self.values(flat, runs), steady, runs)
 
-    def balanced(self, flat: dict[str, Any], displacement: Any, runs: int) -> np.ndarray:
-        """Return the states of stages held at a displacement [m], at rest, (runs, initial_size).
+    def at_rest(self, flat: Mapping[str, Any], place: Any, runs: int) -> np.ndarray:
+        """Return the states in which stages at rest at a place [m] begin, shape (runs, initial_size).
 
-        The actuator carries the constant forces, by the integral of its controller, or by an error without one. `flat`
-        has the stages' keys in SI.
+        The controller has held them there, with its reference there, and friction bears nothing. The actuator carries
+        the constant forces of [bias], and of a cable with the drive as built, by the integral of its controller or,
+        without one, by an error; joint and transmission are deflected by what they carry of [bias]. `flat` has the
+        stages' keys in SI.
         """
-        values = self.values(flat, runs)
-        steady = Steady(0.0, displacement, force=carrying_force(flat))
+        values, force = self.values(flat, runs), carrying_force(flat)
+        if self.layout.clocked:
+            force = (force + flat["cable.stiffness"] * place) / flat["drive.motor_constant_ratio"]
+        steady = Steady(0.0, place, force=force, deflected=1.0)
         return self.settled_at(values, self._with_error(values, steady), runs)
 
     def _with_error(self, values: list[np.ndarray], steady: Steady) -> Steady:
@@ -234,7 +247,7 @@ class Kernel:
         modes = self.modes(starts.T, 0.0, reference, values)[list(self.switches)]
         return np.hstack([starts, modes.T])
 
-    def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
+    def values(self, flat: Mapping[str, Any], runs: int) -> list[np.ndarray]:
         """Return the parameters of each run [SI], each of shape (runs,), from the stages' keys."""
         rows = np.empty((len(self.parameters), runs))
         for row, name in zip(rows, self.parameters, strict=True):

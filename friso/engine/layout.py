@@ -66,6 +66,7 @@ SIZES = (
     "kinks",
     "inputs",
     "held",
+    "modes",
     "tabled",
     "places",
     "clocked",
@@ -75,12 +76,13 @@ SIZES = (
     "tones",
 )
 """Names of the sizes of a model: lanes, states, terms of the dense output of each, constants, kinks, reference inputs,
-held numbers; the first held number from tables, and the number of tables over position; 1 for a drive with a clock;
-the indices of position and velocity of the stage; degree and tones of the reference."""
+held numbers, and how many of these are modes with memory; the first held number from tables, and the number of tables
+over position; 1 for a drive with a clock; the indices of position and velocity of the stage; degree and tones of the
+reference."""
 
-LOOKED_UP = ("seen_states", "place_states", "walked")
-"""Names of arrays of a model with a clock: measured states, states over which tables are looked up, and for each table
-the index of that state (or of time, after them)."""
+LOOKED_UP = ("place_states", "walked")
+"""Names of arrays of a model with a clock: states over which tables are looked up, and for each table the index of that
+state (or of time, after them)."""
 
 FUNCTIONS = ("step", "locate", "update")
 """Names of the functions written for each model, which the driver calls."""
@@ -113,8 +115,9 @@ class Layout:
     """Layout of the buffer with the runs that are computed at once.
 
     `walks` are the quantities over which tables are looked up: states, and time. For each, a `cell` is the interval
-    between two points of its tables, with a `base` and a `slope` for every table. `piece_before` has the length and the
-    inputs of the previous piece of the reference. A sample may lie there whose command acts only after the corner.
+    between two points of its tables, with a `base` and a `slope` for every table. `seen` has the states and modes at
+    the drive's sample. `piece_before` has the length and the inputs of the previous piece of the reference. A sample
+    may lie there whose command acts only after the corner.
     """
 
     states: int

@@ -81,6 +81,7 @@ def _sizes(model: Model, writer: StepWriter) -> dict[str, int]:
         "kinks": layout.kinks,
         "inputs": len(model.inputs),
         "held": len(model.discrete),
+        "modes": len(model.switches),
         "tabled": model.fixed.index(clock.tabled[0]) if clock else 0,
         "places": len(clock.places) if clock else 0,
         "clocked": int(clock is not None),
@@ -94,14 +95,13 @@ def _places(model: Model, body: Body) -> tuple[int, int]:
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Return indices of states: those that a sampled drive measures, and those in its tables.
+    """Return the indices of the states in a drive's tables.
 
     Also returns, for each table, the index of the quantity over which it is looked up.
     """
     clock, states = model.clock, list(model.symbols)
-    seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
     over = tuple(dict.fromkeys(states.index(x) for x in clock.places.values())) if clock else ()
-    return dict(zip(LOOKED_UP, (seen, over, tuple(writer.walked)), strict=True))
+    return dict(zip(LOOKED_UP, (over, tuple(writer.walked)), strict=True))
 
 
 def _numpy_functions(model: Model, writer: StepWriter) -> str:

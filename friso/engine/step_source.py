@@ -100,7 +100,7 @@ class StepWriter:
         self._clock = Block(clock, self.constants)
         self._walks = [*dict.fromkeys(model.clock.places.values()), TICK] if model.clock else []
         sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._fixed_names))
-        looked_up = (len(model.clock.seen), len(model.clock.tabled)) if model.clock else (0, 0)
+        looked_up = (self.size + len(model.switches), len(model.clock.tabled)) if model.clock else (0, 0)
         self.layout = Layout(*sizes_of, *looked_up, len(self._walks), len(model.inputs))
         self._rows = ROW._asdict() | self.layout.first_rows
 
@@ -252,7 +252,7 @@ class StepWriter:
         names |= {x: self._row("reference", i) for i, x in enumerate(self.model.fixed)}
         names |= {x: f"input{i}" for i, x in enumerate(self.model.inputs if clock else ())}
         names |= {c: self._row("constant", i) for c, i in self.constants.index.items()}
-        names |= {x: self._row("seen", i) for i, x in enumerate(clock.seen if clock else ())}
+        names |= {x: self._row("seen", self._index[state]) for x, state in (clock.seen if clock else {}).items()}
         names |= {x: f"table{i}" for i, x in enumerate(clock.tabled if clock else ())}
         names |= {TICK: self._row("tick"), TIME: "instant"}
         return names.__getitem__
@@ -518,7 +518,7 @@ class StepWriter:
         ]
 
     def _seen(self) -> list[str]:
-        """Write the code that stores what the drive measures at its sample, maybe inside the step."""
+        """Write the code that stores the states and modes at the drive's sample, maybe inside the step."""
         clock = self.model.clock
         if not clock:
             return []
@@ -527,8 +527,9 @@ class StepWriter:
             "part = ((due - late_) - t) * per_h",
             "inside = good & (part >= -1e-9) & ((part <= fraction + 1e-9) | (ticked > 0.0))",
         ]
-        for i, x in enumerate(clock.seen.values()):
-            lines.append(f"seen{i} = {self._between(self._index[x], 'part')} if inside else seen{i}")
+        at_sample = [self._between(i, "part") for i in range(self.size)]
+        at_sample += [self._row("mode", k) for k in self.switches]  # still those of the step's beginning
+        lines += [f"seen{i} = {value} if inside else seen{i}" for i, value in enumerate(at_sample)]
         stored = [f"{self._row('seen', i)} = seen{i}" for i in range(self.layout.seen)]
         return [*lines, *stored, f"{self._row('ticked')} = ticked"]
 

@@ -147,7 +147,7 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
     Each loop that is made is added to `loops`.
     """
-    from sympy import S, pi
+    from sympy import pi
 
     from friso.equations.blocks import Controller
     from friso.equations.component import STEADY, Component, Held, Output, Role, State, key, state
@@ -157,17 +157,16 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
         loops.append(loop)
         reading, command, sampled = _command(form, loop)
         commanded, waiting = state(COMMANDED), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
-        carrying = -sum((key(f"bias.{name}") for name in form.structure.biased), start=S.Zero)
-        demand = carrying / key("drive.motor_constant_ratio")
-        held = [Held(state(READING), reading, STEADY.position), *sampled, Held(commanded, command, demand)]
-        held += [Held(new, old, demand) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
+        held = [Held(state(READING), reading, STEADY.position), *sampled, Held(commanded, command, STEADY.force)]
+        held += [Held(new, old, STEADY.force) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
         acting = waiting[-1] if waiting else commanded
         force = key("drive.motor_constant_ratio") * state(MOTOR_FACTOR) * acting
         states: tuple[State, ...] = ()
         if form.current_loop:
             lagging, omega = state("motor_force"), 2 * pi * key("drive.current_bandwidth")
             scale = loop_stiffness(form.structure.controller) * length
-            states = (State(lagging, omega * (force - lagging), "N", scale, Role.LAG, carrying),)
+            settled = key("drive.motor_constant_ratio") * STEADY.force
+            states = (State(lagging, omega * (force - lagging), "N", scale, Role.LAG, settled),)
             force = lagging
         return Controller(force, Component(states, (), {"force": Output(force, "N", "motor force")}), tuple(held))
 

@@ -28,7 +28,7 @@ class Loop:
 
     They are the error [m], the position [m] and its rate, and the rate [m/s], acceleration [m/s^2] and jerk [m/s^3] of
     the reference. The direction of the reference is 1 ahead, -1 back, 0 at rest. `rated` is the position [m] at the
-    encoder of the velocity, if that is another encoder.
+    encoder of the velocity, if that is another encoder; in a steady motion it is `rated_ahead` [m] of the position.
     """
 
     error: sp.Expr
@@ -39,6 +39,7 @@ class Loop:
     reference_direction: sp.Expr = sp.S.Zero
     rated: sp.Expr | None = None
     reference_jerk: sp.Expr = sp.S.Zero
+    rated_ahead: sp.Expr = sp.S.Zero
 
 
 def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
@@ -131,10 +132,13 @@ def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
     """Make signals of a controller's inputs, `loop`, scaled by a length [m] and a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
     position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
+    rated = position
+    if loop.rated is not None:
+        rated = replace(position, value=loop.rated, settled=STEADY.position + loop.rated_ahead)
     return Measured(
         Signal(loop.error, length, STEADY.error, drift, rate=loop.reference_velocity - loop.velocity),
         position,
-        position if loop.rated is None else replace(position, value=loop.rated),
+        rated,
         Signal(
             loop.reference_velocity,
             length * rate,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sympy as sp
 
 from friso.equations.component import Component, Kink, Output, key
-from friso.equations.masses import beyond_stops, stops
+from friso.equations.masses import beyond_stops, deflection_under, stops
 from friso.equations.structure import JointForm
 
 
@@ -43,6 +43,18 @@ def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pul
         "joint_force": Output(force, "N", "joint force"),
     }
     return force, Component(kinks=kinks, outputs=outputs)
+
+
+def joint_deflection(form: JointForm, force: sp.Expr) -> sp.Expr:
+    """Return the deflection of the joint [m] under a constant force [N], as in `joint_force`."""
+    if form == "rigid":
+        return sp.S.Zero
+    limiter = key("joint.limiter_stiffness")
+    if form == "locked":
+        return force / limiter
+    if form == "touching":
+        return force / (key("joint.stiffness") + limiter)
+    return deflection_under(force, key("joint.stiffness"), limiter, key("joint.stroke"))
 
 
 def touching(deflection: sp.Expr) -> tuple[Kink, Kink]:

@@ -9,21 +9,30 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, Component, Kink, Output, Role, State, key, state
 
 
 @dataclass(frozen=True)
 class Body:
-    """A moving mass: its mass [kg], position [m] and velocity [m/s]."""
+    """A moving mass: its mass [kg], position [m] and velocity [m/s].
+
+    In a steady motion it is `ahead` [m] of the measured position, because of the forces that joint and transmission
+    carry.
+    """
 
     mass: sp.Expr
     position: sp.Symbol
     velocity: sp.Symbol
+    ahead: sp.Expr = sp.S.Zero
 
     @classmethod
-    def named(cls, prefix: str, mass: sp.Expr) -> Body:
-        """Make a body of this mass [kg]; a prefix names the symbols of its position and velocity."""
-        return cls(mass, state(f"{prefix}position"), state(f"{prefix}velocity"))
+    def named(cls, prefix: str, mass: sp.Expr, ahead: sp.Expr = sp.S.Zero) -> Body:
+        """Make a body of this mass [kg]; a prefix names the symbols of its position and velocity.
+
+        `ahead` [m] is how far it is from the measured position in a steady motion.
+        """
+        return cls(mass, state(f"{prefix}position"), state(f"{prefix}velocity"), ahead)
 
     def under(self, force: sp.Expr, length: sp.Expr, rate: sp.Expr) -> tuple[State, State]:
         """Return the body's position and velocity as states under a force [N], by Newton's law.
@@ -31,7 +40,7 @@ class Body:
         `length` [m] and `rate` [1/s] scale them.
         """
         return (
-            State(self.position, self.velocity, "m", length, Role.POSITION, STEADY.position),
+            State(self.position, self.velocity, "m", length, Role.POSITION, STEADY.position + self.ahead),
             State(self.velocity, force / self.mass, "m/s", length * rate, Role.VELOCITY, STEADY.velocity),
         )
 
@@ -64,6 +73,19 @@ def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
     The bodies have a clearance `reach` [m] to either side; `name` names the kinks.
     """
     return Kink(f"{name}_ahead", deflection - reach), Kink(f"{name}_behind", -deflection - reach)
+
+
+def deflection_under(force: sp.Expr, stiffness: sp.Expr, contact_stiffness: sp.Expr, reach: sp.Expr) -> sp.Expr:
+    """Return the deflection [m] of a spring with stops under a constant `force` [N].
+
+    The spring alone has a `stiffness` [N/m]. From the deflection `reach` [m] on, the stops add `contact_stiffness`
+    [N/m]. A spring of no stiffness lies at a stop; without a force there is no deflection.
+    """
+    beyond = (sp.Abs(force) + contact_stiffness * reach) / (stiffness + contact_stiffness)
+    side = Piecewise((1, force > 0), (-1, force < 0), (0, True))
+    if stiffness == 0:
+        return side * beyond
+    return Piecewise((force / stiffness, sp.Abs(force) <= stiffness * reach), (side * beyond, True))
 
 
 def beyond_stops(ahead: sp.Expr, behind: sp.Expr, contact: sp.Expr, reached: sp.Expr) -> sp.Expr:

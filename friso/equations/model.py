@@ -18,11 +18,11 @@ from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held
 from friso.equations.conditions import under_acceleration
 from friso.equations.continuous import Continuous, continuous_controller
 from friso.equations.friction.common import Friction
-from friso.equations.joint import joint_force
+from friso.equations.joint import joint_deflection, joint_force
 from friso.equations.masses import Body, parasitic_force, position_outputs
 from friso.equations.reference import declared
 from friso.equations.structure import ControllerForm, Structure
-from friso.equations.transmission import BACKLASH, at_motor, transmission
+from friso.equations.transmission import BACKLASH, at_motor, transmission, transmission_deflection
 from friso.stage.motion import QUADRATIC, ReferenceForm
 from friso.stage.tables import MOTOR_MASS, friction_law
 
@@ -160,6 +160,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         course.direction,
         None if rated is stage else rated.position,
         course.jerk,
+        rated.ahead,
     )
     form = structure.controller
     if control is None and form is not None:
@@ -238,15 +239,25 @@ def _bodies(structure: Structure) -> Bodies:
 
     They are cart and stage, and a parasitic mass or a motor if there is one.
     """
-    motor = Body.named("motor_", key(MOTOR_MASS)) if structure.transmission else None
+    bias = {name: key(f"bias.{name}") for name in structure.biased}
+    motor, load_ahead = None, sp.S.Zero
+    if structure.transmission:
+        carrying = -sum(bias.values(), start=sp.S.Zero)
+        motor_ahead = STEADY.deflected * transmission_deflection(structure.plays, carrying) if bias else sp.S.Zero
+        if structure.transmission.position == "motor":
+            motor_ahead, load_ahead = sp.S.Zero, -motor_ahead
+        motor = Body.named("motor_", key(MOTOR_MASS), motor_ahead)
     if structure.joint == "rigid":
-        rigid = Body.named("", sum((key(f"masses.{name}") for name in structure.masses), start=sp.S.Zero))
+        rigid = Body.named("", sum((key(f"masses.{name}") for name in structure.masses), start=sp.S.Zero), load_ahead)
         return Bodies(rigid, rigid, motor=motor)
-    cart = Body.named("cart_", key("masses.cart"))
-    if not structure.parasitic:
-        return Bodies(cart, Body.named("", key("masses.stage")), motor=motor)
-    part = key("parasitic.mass")
-    return Bodies(cart, Body.named("", key("masses.stage") - part), Body.named("parasitic_", part), motor)
+    cart_ahead = load_ahead
+    if "cart" in bias:
+        cart_ahead += STEADY.deflected * joint_deflection(structure.joint, bias["cart"])
+    cart, parasitic, stage_mass = Body.named("cart_", key("masses.cart"), cart_ahead), None, key("masses.stage")
+    if structure.parasitic:
+        parasitic = Body.named("parasitic_", key("parasitic.mass"), load_ahead)
+        stage_mass -= parasitic.mass
+    return Bodies(cart, Body.named("", stage_mass, load_ahead), parasitic, motor)
 
 
 def _positions(structure: Structure, chain: Bodies) -> list[Component]:

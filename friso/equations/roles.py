@@ -30,8 +30,8 @@ class Role(StrEnum):
 class Steady(NamedTuple):
     """A steady motion of all masses: error [m], position [m] and velocity [m/s].
 
-    It also has the velocity of the reference [m/s] and the controller's force [N]. Values are numbers, arrays or
-    symbols.
+    It also has the velocity of the reference [m/s] and the controller's force [N]. `deflected` is 1 if joint and
+    transmission carry the constant forces of [bias], and 0 if they are relaxed. Values are numbers, arrays or symbols.
     """
 
     error: Any
@@ -39,3 +39,4 @@ class Steady(NamedTuple):
     velocity: Any = 0.0
     reference_velocity: Any = 0.0
     force: Any = 0.0
+    deflected: Any = 0.0

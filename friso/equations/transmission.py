@@ -13,7 +13,7 @@ import sympy as sp
 
 from friso.equations.component import Component, Kink, Output, State, key
 from friso.equations.friction.common import Friction
-from friso.equations.masses import Body, beyond_stops, stops
+from friso.equations.masses import Body, beyond_stops, deflection_under, stops
 from friso.stage.tables import MOTOR_FRICTION, STATE_PREFIX
 
 BACKLASH = key("transmission.backlash")
@@ -38,6 +38,14 @@ def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Comp
         "transmission_force": Output(force, "N", "transmission force"),
     }
     return force, Component(kinks=kinks, outputs=outputs)
+
+
+def transmission_deflection(backlash: bool, force: sp.Expr) -> sp.Expr:
+    """Return how far the motor is ahead of the load [m] under a constant force on the load [N].
+
+    With a backlash the transmission lies on a flank.
+    """
+    return deflection_under(force, sp.S.Zero, key("transmission.stiffness"), BACKLASH / 2 if backlash else sp.S.Zero)
 
 
 def flanks(deflection: sp.Expr) -> tuple[Kink, Kink]:

@@ -36,11 +36,15 @@ from friso.studies.metric import (
     worded,
 )
 
-TIMING = tuple(
-    f"drive.{name}"
-    for name in ("sample_time", "delay", "velocity_samples", "velocity_sample_time", "position_sample_time")
+TIMING = (
+    "motion.duration",
+    *(
+        f"drive.{name}"
+        for name in ("sample_time", "delay", "velocity_samples", "velocity_sample_time", "position_sample_time")
+    ),
 )
-"""Keys that change a drive's equations through whole numbers of samples."""
+"""Keys that are equal for all runs of the drive as built that are run together: how long they last, and keys that
+change the drive's equations through whole numbers of samples."""
 
 
 def runs_as_built(stage: Stage, names: Sequence[str]) -> bool:

@@ -14,8 +14,7 @@ from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
 from friso.equations.conditions import LEVELS, anywhere
 from friso.equations.reference import value
-from friso.equations.roles import Role, Steady
-from friso.equations.structure import carrying_force
+from friso.equations.roles import Role
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.rig import Floor
@@ -39,8 +38,9 @@ class RecordedRuns:
     names of the roles of a log: SI, shape (runs, n), NaN after a failure. `statuses` tell of failures, shape (runs,);
     `statistics` are those of the solver; `outputs` are all signals of the equations, if asked for.
 
-    If the delay is no whole number of samples, `true` is taken at the instant of the force, that fraction of a sample
-    later. The logged "relative_position" of stage and cart is taken then, too.
+    All signals are those at the sample's instant, but "force" is the one that the drive commands from it, however late
+    it acts. Where it acts at the next sample's instant, the motor's force among the outputs is the one just after the
+    step of the command.
     """
 
     numbers: np.ndarray
@@ -168,18 +168,18 @@ def _recorded(
         budget=int(settings.steps_per_sample * task.duration / np.min(flat["drive.sample_time"])),
     )  # fmt: skip
     pieces = task.pieces.reshape(-1, *task.pieces.shape[-2:])
-    demand = carrying_force(flat) / flat["drive.motor_constant_ratio"]
-    at_rest = Steady(-task.displacement, pieces[:, 0, 1] + task.displacement, force=demand)
     values = shape.values(flat | motion, len(seeds))
-    batch = prepare(shape, flat | motion, len(seeds), options, shape.unwound_at(values, at_rest, len(seeds)))
+    starts = shape.at_rest(flat | motion, pieces[:, 0, 1] + task.displacement, len(seeds))
+    batch = prepare(shape, flat | motion, len(seeds), options, starts)
     end = np.zeros((len(pieces), 1, pieces.shape[2]))
-    end[:, 0, 0] = task.duration
+    last = (count - 1) * interval + 2 * np.max(flat["drive.sample_time"])  # the last sample has acted by then
+    end[:, 0, 0] = max(task.duration, last)
     batch = batch._replace(
         segments=np.concatenate([pieces, end], axis=1),
         windows=np.full(len(seeds), -1),
         tables=tables(flat, floor, task, [int(seed) for seed in seeds]),
     )
-    results = empty_results(len(seeds), 1, count, len(shape.full_state))
+    results = empty_results(len(seeds), 1, count, shape.sample_size)
     run_batch(shape, batch, options_of(options), results, threads)
     logged, true = _signals(shape, results.samples, flat, task, seeds, interval)
     recorded = RecordedRuns(numbers, interval, logged, true, results.statuses, results.statistics)
@@ -196,7 +196,7 @@ def _outputs(
 
     `number` is the index of the run in the batch, and `interval` [s] the time between samples.
     """
-    time, states = np.arange(len(samples)) * interval, samples.T
+    time, states = np.arange(len(samples)) * interval, samples[:, : len(shape.full_state)].T
     rows = batch.segments[min(number, len(batch.segments) - 1)]
     active = rows[np.searchsorted(rows[:, 0], time * (1 + 1e-12), side="right") - 1]
     over, at = batch.tables, [shape.cart_position, shape.cart_position, shape.position]
@@ -229,9 +229,8 @@ def _signals(
     `samples`, shape (runs, n, states), are taken every `interval` [s]. `seeds` are those of the runs' noise.
     """
     time = np.arange(samples.shape[1]) * interval
-    position, reading, commanded = (
-        samples[:, :, i] for i in (shape.position, shape.full_state.index(READING), shape.full_state.index(COMMANDED))
-    )
+    position, computed = samples[:, :, shape.position], samples[:, :, len(shape.full_state) :]
+    reading, commanded = (computed[:, :, shape.held.index(name)] for name in (READING, COMMANDED))
     logged = {
         "reference": np.broadcast_to(reference(task, time), position.shape),
         "position": reading,

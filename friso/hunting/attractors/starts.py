@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 
-from friso.equations.roles import Steady
 from friso.hunting.attractors.rounds import SURVEY_RTOL, Pending, loose_from, typical_period
 from friso.hunting.attractors.settings import settings
 from friso.hunting.cycle.ensemble import Ensemble
@@ -94,7 +93,7 @@ class Starts:
                 distances = side * np.tile(units, which.size) * stages.length
                 to_and_fro = np.tile([way, -way * shares[0], way * shares.prod(axis=0)], which.size) * stages.length
                 self._add(owners, stages.displaced(distances))
-                self._add(owners, stages.settled(Steady(0.0, distances)))
+                self._add(owners, stages.at_rest(distances))
                 self._add(owners, pushed(stages, distances * stages.number("rate")))
                 for travels in ([distances], [np.inf * distances], [-np.inf * distances], to_and_fro):
                     self._add(owners, bent(stages, distances, *travels))

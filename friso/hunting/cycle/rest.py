@@ -41,9 +41,9 @@ def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
     """Return states of stages at their reference that move at a velocity [m/s], (count, states).
 
-    All masses move alike, and everything else is zero.
+    All masses move alike; everything else is as from rest.
     """
-    states = np.zeros((stages.count, len(stages.kernel.states)))
+    states = stages.at_rest(0.0)
     states[:, stages.kernel.having(Role.VELOCITY)] = velocity[:, None]
     return states
 
