@@ -126,6 +126,8 @@ def fake_stage(
         name=name,
         source="made up",
         note="",
+        unknown_keys=(),
+        doubt="",
         conditions=None,
         **dict.fromkeys(("drive", "rail", "cable", "floor")),
         joint=joint,

@@ -260,7 +260,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
             (
                 "Motion",
                 "an unknown key; did you mean motion?",
-                "one of name, source, note, axis, masses",
+                "one of name, source, note, unknown, axis, masses",
                 '[motion] kind = "step"',
             ),
         ),

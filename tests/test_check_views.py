@@ -546,6 +546,10 @@ def test_windows_are_told_beside_the_edge() -> None:
         says = sentence(hunts(margin=Margin(1.2187, 9.7496, True, 1.2248), windows=(narrow,)))
         assert f"to {to}" in says
         assert ("within a range" in says) == (high == 1.302)
+    one = BandwidthWindow(AttractionEnd(0.39685, 0.393, False), AttractionEnd(0.39685, 0.4, False))  # seen at one value
+    says = sentence(hunts(windows=(one,)))
+    assert "0 %" not in says.replace("10 %", "")
+    assert "within a range of at most 1.8 % about" in says
     unsure = sentence(hunts(windows=(BandwidthWindow(replace(window, certain=False), None),)))
     assert "39.68 Hz" in unsure
     assert "40.04 Hz" in unsure

@@ -485,7 +485,7 @@ def test_no_single_relaxation(wording: Wording) -> None:
     wording(refusal(NoDesign("too tight")))
     many = refusal(NoDesign("too tight", RELAXED * 3))
     assert len(many.splitlines()) == 7
-    assert refused_document("rig", "spec", NoDesign("too tight"))["relax"] == []
+    assert refused_document(friso.load(RIG), "spec", NoDesign("too tight"))["relax"] == []
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ The multipliers of references.md belong to the half-cycle return map; those of t
 1e-12.
 """
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -32,6 +33,7 @@ from friso.hunting import (
 )
 from friso.hunting.attractors.closing import close_orbits
 from friso.hunting.attractors.rounds import Pending
+from friso.hunting.cycle import hunting as module
 from friso.hunting.cycle.find import NO_PAIR, NO_RETURN, asymmetric_cycles, symmetric_cycles
 from friso.hunting.cycle.return_map import return_map
 from friso.hunting.cycle.shooting import close
@@ -701,3 +703,24 @@ def test_nothing_is_certain_of_bristles_that_runs_do_not_resolve(rig: Stage) -> 
 def test_a_stage_without_integral_action_has_no_swings(rig: Stage) -> None:
     still = {"kind": "pid", "kp": "3e3 N/m", "ki": "0 N/(m*s)", "kd": "200 N*s/m", "tau": "1 ms"}
     assert find_swings(rig.replace({"controller": still, "joint.locked": True}).flat()) == ()
+
+
+@pytest.mark.inner
+def test_a_stage_that_something_attracts_has_no_reason_against_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The return map may suggest no cycle while simulations see a swing that lasts."""
+    whole = module.attractors
+
+    def without_orbits(stages: Ensemble, **options: Any) -> Any:
+        survey = whole(stages, **options)
+        nothing = [
+            replace(family, closed=np.zeros(1, bool), reasons=np.array([NO_RETURN])) for family in survey.families
+        ]
+        motions = tuple(replace(motion, cycles=None) for motion in survey.motions)
+        return replace(survey, motions=motions, families=tuple(nothing))
+
+    monkeypatch.setattr(module, "attractors", without_orbits)
+    result = module.hunting(VARIANTS["rigid"])
+    assert result.observed
+    assert not result.cycles
+    assert result.certain
+    assert result.reason == ""

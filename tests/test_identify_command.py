@@ -25,9 +25,12 @@ import friso
 from friso.cli.app import main
 from friso.errors import InputError
 from friso.identification import method
+from friso.identification.estimate import Estimate
 from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.stage_file import identified_stage, origins, with_unknown
+from friso.identification.stage_keys import fitting
 from friso.stage.correlations import correlations_file, read_correlations
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
@@ -346,6 +349,38 @@ def test_a_placeholder_for_the_controller_is_noted_in_the_file(inputs: tuple[Pat
     assert "[controller]" in answer.stage.note
     assert friso.loads(answer.stage.to_toml()).note in answer.sentences()
     assert not friso.load(inputs[1]).note
+
+
+def shown_or_unknown(stage: friso.Stage) -> bool:
+    """Whether each number of masses and friction has an interval, or is listed as what nobody knows."""
+    keys = {
+        key for key in stage.numeric_keys() if key.startswith(("masses.", "friction.", "bias.")) and key in stage.flat()
+    }
+    return keys <= {*stage.uncertain(), *stage.unknown_keys}
+
+
+def test_values_that_the_log_does_not_show_are_listed_as_unknown(inputs: tuple[Path, Path]) -> None:
+    """No plain number stands in the file for what nobody knows: our choices, or estimates without ends."""
+    answer = friso.identify(inputs[0], map={"force": "Force"})
+    assert shown_or_unknown(answer.stage)
+    assert "controller" in answer.stage.unknown_keys
+    assert not {one.name for one in answer.estimates if one.determined} & {*answer.stage.unknown_keys}
+    assert friso.bode(answer.stage).sentences()[0].startswith("If ")
+    tables = {"controller": friso.load(inputs[1]).as_written()["controller"]}
+    own = friso.identify(inputs[0], stage=tables, map={"force": "Force"}).stage
+    assert shown_or_unknown(own)
+    assert not any(key.startswith("controller") for key in own.unknown_keys)
+
+
+def test_static_friction_that_only_followed_another_is_unknown() -> None:
+    """A log of one way shows neither static friction nor its distance from Coulomb friction."""
+    stage = friso.load(friso.example("thesis_rig")).replace({"joint.locked": True, "friction.static": "1 N"})
+    coulomb = Estimate("friction.coulomb", "N", 1.4, 1.3, 1.5, "output error")
+    fits = fitting(stage, [coulomb, Estimate.unknown("friction.bristle_stiffness", "N/m", "output error", "open")])
+    fitted = identified_stage(stage, fits.estimates, ["one_way"])
+    fitted = with_unknown(fitted, origins(fitted, fits.estimates, fits.follows, ()), fits.left)
+    assert fitted.unknown_keys == ("friction.static", "friction.bristle_stiffness")
+    assert fitted.flat()["friction.static"] == pytest.approx(fitted.flat()["friction.coulomb"])
 
 
 def test_a_wrong_controller_is_told(inputs: tuple[Path, Path]) -> None:

@@ -231,3 +231,28 @@ def test_a_doubt_of_an_end_is_told_beside_a_side_that_is_open() -> None:
     sentence = margin_sentence("static friction", margin)
     assert "not certain" in sentence
     assert "not determined" in sentence
+
+
+def test_static_friction_is_never_told_below_coulomb_friction() -> None:
+    """Its least multiple, rounded down, would be 2 mN below; the numbers that stand beside each other agree."""
+    stage = VARIANTS["rigid"].replace({"friction.static": "26.3 N", "friction.coulomb": "11.31 N"})
+    lowest = least_static_factor(stage.flat())
+    margin = ParameterMargin(True, MarginEnd(lowest * 1.1, lowest, False), None, (lowest, 3.0))
+    (says,) = friction_sentences(FakeCase(stage, None, static_friction=margin))
+    assert "11.308" not in says
+    assert "11.3" in says
+    assert "0 to 1.1" in says
+
+
+@pytest.mark.parametrize(
+    ("force_limit", "weight", "held"), [("6.7 N", 0, True), ("9.5 N", 0, False), ("12.7 N", 6, True), (None, 0, False)]
+)
+def test_friction_beyond_the_force_limit_is_told_as_that(force_limit: str | None, weight: float, held: bool) -> None:
+    """Static friction of 9 N ends hunting, where the limit, less the weight that is carried, cannot break it away."""
+    changes = {"controller.force_limit": force_limit, "controller.anti_windup": "clamp"} if force_limit else {}
+    changes |= {"bias": {"stage": f"-{weight} N"}} if weight else {}
+    stage = VARIANTS["rigid"].replace({"friction.static": "3 N", **changes})
+    margin = ParameterMargin(True, None, MarginEnd(2.7, 3.0, True), (1 / 3, 3.0))
+    says = friction_sentences(FakeCase(stage, None, static_friction=margin))
+    assert says[0].startswith("Hunting ends")
+    assert any("force limit" in text and "6.70 N" in text for text in says) == held

@@ -676,3 +676,29 @@ def test_what_is_left_out_is_as_many_lines_as_friso_says(tmp_path: Path) -> None
 
 def test_formats_are_listed() -> None:
     assert [*FORMATS] == ["linuxcnc", "odrive"]
+
+
+@pytest.mark.parametrize("name", ["transfer_function", "sections", "state_space", "sampled_transfer_function"])
+def test_export_tells_every_coefficient(name: str) -> None:
+    """A controller by coefficients has hardly a gain beside them; they are notes as the stage file has them."""
+    stage = friso.load(friso.example(f"controllers/{name}"))
+    notes = " ".join(friso.export("gains", stage).to_dict()["notes"])
+
+    written = {
+        key: value
+        for key, value in stage.as_written()["controller"].items()
+        if key not in ("sample_time", "force_limit")
+    }
+    numbers = re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", json.dumps(written))
+    assert len(numbers) >= 6
+    assert all(number in notes for number in numbers)
+
+
+def test_export_tells_filters() -> None:
+    notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz", "depth": 0.1}
+    stage = friso.load(friso.example("thesis_rig"))
+    notes = " ".join(friso.export("gains", stage.replace({"controller.filters": [notch]})).sentences())
+    assert 'frequency = "120 Hz"' in notes
+    assert "filters" not in " ".join(friso.export("gains", stage).sentences())
+    by_gains = {"kind": "pid", "kp": "3 N/mm", "kd": "6 N*s/m", "derivative_on": "measurement"}
+    assert 'derivative_on = "measurement"' in str(friso.export("gains", stage.replace({"controller": by_gains})))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,9 @@ from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
 from friso.app.uploads import Uploads
 from friso.axis import speaking_of
+from friso.equations.motion import rests
 from friso.errors import InputError
+from friso.hunting import cannot_hunt
 from friso.identification.logs.mapping import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
@@ -28,6 +30,7 @@ from friso.questions.map.places import SHOWN, with_places
 from friso.shown.cases import case_labels
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import Figure
+from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 from friso.studies.metric import metrics
@@ -176,13 +179,16 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict on the machine in one word, for the joint locked and free if it has one.
 
-    It is computed as a map of one or two cells, by a search for attractors.
+    It is computed as a map of one or two cells, by a search for attractors. The word is "none" for a stage that may
+    hunt while its reference keeps moving.
     """
     stage = asked.machine.stage
     key, cases = _cases(stage)
-    runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
-    words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
-    work.notes += work.meanwhile
+    words = dict.fromkeys(cases, "none")
+    if rests(stage.flat()) or cannot_hunt(stage):
+        runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
+        words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
+    work.notes += [*work.meanwhile, *filter(None, [unknown_condition(stage).removesuffix(": ")])]
     yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)]}
 
 
@@ -311,8 +317,10 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     if len(keys) == 2 and not KEPT.holds(friso.boundary, asked.machine, options):
         ranges = {name: f"{options[name]}:{COARSE_TO_FINE[0]}" for name in ("x", "y")}
         coarse = {**ranges, "log": options.get("log", False), "metric": "sketch"}
-        verdicts = KEPT.answer(friso.sweep, asked.machine, work, coarse)
-        rough = {**parts_of(verdicts, lambda figure: _on_map(figure, asked, keys)), **lines}
+        with suppress(InputError):  # there may be no verdicts, but the boundary says why
+            verdicts = KEPT.answer(friso.sweep, asked.machine, work, coarse)
+            rough = {**parts_of(verdicts, lambda figure: _on_map(figure, asked, keys)), **lines}
+    if rough is not None:
         yield {**rough, "kind": "partly"}
     try:
         answer = KEPT.answer(friso.boundary, asked.machine, work, options)

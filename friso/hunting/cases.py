@@ -225,9 +225,11 @@ def _case(
     """Check one stage, within an amount of work.
 
     `done` counts the parts of the check. `tell` is called with the verdict as soon as it is certain. With `traces` the
-    time response is kept, and with `margins` the margin in static friction is computed.
+    time response is kept, and with `margins` the margin in static friction is computed. Nothing is certain if the
+    stage file lists values as unknown.
     """
     flat, ended = stage.flat(), 0
+    tell = (lambda verdict: None) if stage.doubt else tell
 
     def begin(part: CheckPart) -> None:
         """Count a part of the check as begun, and the parts before it as ended."""
@@ -253,6 +255,9 @@ def _case(
         static_friction, keeps = _friction(stage, judgement, work)
         if static_friction and static_friction.open_sides:
             judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
+    if stage.doubt:
+        judgement = judgement.uncertain(stage.doubt)
+        static_friction = static_friction and static_friction.uncertain()
     breakaway = _breakaway(flat)
     # parts left out without an attractor count as done, too
     done.add(PART_COUNT - ended, CheckPart.FRICTION.progress_word)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -44,7 +44,8 @@ class ParameterMargin:
     """Range of a parameter over which a stage keeps hunting, or keeps not hunting.
 
     `attracts` is true if it hunts. `below` and `above` are the nearest factors of the parameter at which that changes
-    (None: at no factor tried up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known.
+    (None: at no factor tried up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known. Nothing of
+    it is certain unless the values of the stage are `sure`.
     """
 
     attracts: bool
@@ -52,14 +53,20 @@ class ParameterMargin:
     above: MarginEnd | None
     range: tuple[float, float]
     open_sides: tuple[int, ...] = ()
+    sure: bool = True
 
     @property
     def certain(self) -> bool:
-        """Tell whether no side is open, and both ends, if there are any, are certain.
+        """Tell whether no side is open, the stage is sure, and both ends, if there are any, are certain.
 
         Between the tried values, hunting may still begin and end unnoticed.
         """
-        return not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
+        return self.sure and not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
+
+    def uncertain(self) -> ParameterMargin:
+        """Return the margin with its ends marked as not certain, of a stage that is not sure."""
+        below, above = (end and replace(end, certain=False) for end in (self.below, self.above))
+        return replace(self, below=below, above=above, sure=False)
 
     def end(self, side: int) -> MarginEnd | None:
         """Return the end below (`side` -1) or above (1) the stage's own value; None without one."""

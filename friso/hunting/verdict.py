@@ -145,6 +145,22 @@ class Judgement:
         """Return the cycle that matters most: the stable one, or else the first; None without any."""
         return next(iter((*self.hunting.attracting, *self.hunting.cycles)), None)
 
+    def uncertain(self, reason: str) -> Judgement:
+        """Return the judgement with the verdict and all ends of hunting marked as not certain, for a `reason`."""
+
+        def unsure(end: AttractionEnd | None) -> AttractionEnd | None:
+            return end and replace(end, certain=False)
+
+        hunting = self.hunting
+        reason = f"{reason}; {hunting.reason}" if hunting.reason and not hunting.certain else reason
+        return replace(
+            self,
+            hunting=replace(hunting, certain=False, reason=reason),
+            margin=self.margin and replace(self.margin, certain=False),
+            windows=tuple(BandwidthWindow(unsure(window.low), unsure(window.high)) for window in self.windows),
+            lower=unsure(self.lower),
+        )
+
     @property
     def slower_advised(self) -> float | None:
         """Return the lower bandwidth advised to a stage that hunts, as a factor of its own.

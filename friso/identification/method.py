@@ -20,7 +20,7 @@ from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, S
 from friso.identification.kinds import KINDS, in_order
 from friso.identification.laws.comparison import LawComparison, compare_laws
 from friso.identification.logs.log import Log
-from friso.identification.stage_file import identified_stage, origins
+from friso.identification.stage_file import identified_stage, origins, with_unknown
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, silent, together
 from friso.stage import Stage
@@ -105,8 +105,10 @@ def identify(
     fits = fitting(stage, estimates)
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
     doubts += words_of("stage", (fitted, estimates))
-    shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes))
     sources = origins(fitted, fits.estimates, fits.follows, None if base is None else made_up)
+    fitted = with_unknown(fitted, sources, fits.left)
+    unknown = [f"the stage file lists as unknown: {', '.join(fitted.unknown_keys)}"] if fitted.unknown_keys else []
+    shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes, *unknown))
     correlated = _correlations(experiments, estimates, fits, fitted)
     return Identification(fitted, correlated, *shown, doubts, failed, sources)
 

@@ -20,11 +20,13 @@ NOT_IDENTIFIED = "not identified: all that is possible"
 
 CHOSEN = "our choice, not identified"
 
+FOLLOWS = "not identified, moved along with"
+
 OUR_CHOICE = "what was identified says so beside its value; the rest is our choice"
 
 PLACEHOLDER = (
-    "The [controller] of the stage file is our choice: put yours there, and delete this note, before you ask whether "
-    "the stage hunts."
+    "The [controller] of the stage file is our choice: put yours there, and delete this note and the controller from "
+    "the list of what is unknown, before you ask whether the stage hunts."
 )
 
 
@@ -105,11 +107,36 @@ def origins(
     sources = {"axis.kind": "that of the log"} if chosen is None else {}
     for estimate in estimates:
         sources[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
-    sources |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
+    sources |= {key: f"{FOLLOWS} {lead}" for key, lead in follows.items()}
     tables = {name: table for name, table in stage.as_written().items() if isinstance(table, dict)}
     keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
     ours = keys if chosen is None else chosen
     return {key: sources.get(key, CHOSEN if key in ours else "as given") for key in keys}
+
+
+def with_unknown(stage: Stage, origins: Mapping[str, str], left: Collection[str]) -> Stage:
+    """Return the stage with a list of the values that are unknown.
+
+    They are those that friso chose, apart from the motion, those `left` open by the logs, and those that only moved
+    along with another key. By `origins`, keys have their origins in words. A value with an interval of its own is
+    known, and a controller that friso chose as a whole is listed as such.
+    """
+    numbers, uncertain = (
+        {".".join(key.split(".")[:2]) for key in keys}  # an array has one origin
+        for keys in (stage.numeric_keys(), stage.uncertain())
+    )
+    unknown = [
+        key
+        for key, origin in origins.items()
+        if key in numbers
+        and not key.startswith("motion.")
+        and (origin.startswith(FOLLOWS) or (key not in uncertain and (origin == CHOSEN or key in left)))
+    ]
+    of_controller = {origin for key, origin in origins.items() if key.startswith("controller.")}
+    if of_controller == {CHOSEN}:
+        unknown = [*(key for key in unknown if not key.startswith("controller.")), "controller"]
+    listed = dict.fromkeys([*stage.unknown_keys, *unknown])
+    return stage.replace({"unknown": ", ".join(listed)}) if listed else stage
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:

@@ -28,12 +28,13 @@ class Fitting:
     """Estimates that the stage file can take together.
 
     `follows` has keys that change with another key (full correlation), and `notes` a sentence for each estimate that
-    was changed or dropped.
+    was changed or dropped. The keys `left` keep their values in the stage file, although logs should have shown them.
     """
 
     estimates: tuple[Estimate, ...]
     follows: Mapping[str, str]
     notes: tuple[str, ...]
+    left: tuple[str, ...] = ()
 
 
 def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
@@ -55,7 +56,9 @@ def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
         if accepted_estimate is not None:
             accepted[estimate.name] = accepted_estimate
     follows = _static_above(stage, fields, accepted, notes)
-    return Fitting(_together(stage, accepted, notes), {k: v for k, v in follows.items() if k in accepted}, tuple(notes))
+    together = _together(stage, accepted, notes)
+    left = tuple(name for name in flat if name in {estimate.name for estimate in estimates} - accepted.keys())
+    return Fitting(together, {k: v for k, v in follows.items() if k in accepted}, tuple(notes), left)
 
 
 def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:

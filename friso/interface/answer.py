@@ -87,6 +87,41 @@ def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) ->
     return shown
 
 
+def _sentences_under_condition(method: Callable[[Any], Sequence[str]]) -> Callable[[Any], Sequence[str]]:
+    """Wrap the sentences of an answer so that the first one states the condition under which they hold."""
+
+    @wraps(method)
+    def shown(answer: Answer) -> Sequence[str]:
+        sentences, condition = method(answer), answer.condition
+        return [condition + sentences[0], *sentences[1:]] if condition and sentences else sentences
+
+    return shown
+
+
+def _document_under_condition(method: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:
+    """Wrap the document of an answer so that it, and its conclusion, state the condition under which they hold."""
+
+    @wraps(method)
+    def shown(answer: Answer) -> dict[str, Any]:
+        document, condition = method(answer), answer.condition
+        if not condition:
+            return document
+        said = document.get("conclusion", "")
+        conclusion = {"conclusion": said if said.startswith(condition) else condition + said} if said else {}
+        return {**document, **conclusion, "condition": condition.removesuffix(": ")}
+
+    return shown
+
+
+_CONDITIONAL = {"sentences": _sentences_under_condition, "document": _document_under_condition}
+"""Wrappers of the methods that state the condition under which an answer holds, by the method's name."""
+
+
+def _shown(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a method by which an answer is shown, called `name`."""
+    return _in_its_units(_CONDITIONAL[name](method) if name in _CONDITIONAL else method)
+
+
 class Answer:
     """What friso answers to a question.
 
@@ -126,7 +161,7 @@ class Answer:
         """Make all methods that show an answer use the units of its axis."""
         cls.package = cls.__module__.rpartition(".")[0]
         for name in _SHOWN & vars(cls).keys():
-            setattr(cls, name, _in_its_units(getattr(cls, name)))
+            setattr(cls, name, _shown(name, vars(cls)[name]))
 
     package: ClassVar[str]
     """Package of the question, whose modules show its answers."""
@@ -148,6 +183,21 @@ class Answer:
         The subject is the result, or the answer itself if it has attributes besides.
         """
         return self.result
+
+    @property
+    def condition(self) -> str:
+        """Say on which values the answer rests that nobody knows; "" if on none.
+
+        An answer that does not rest on the values of its stage overrides this.
+        """
+        from friso.shown.unknown import unknown_condition
+
+        return unknown_condition(vars(self).get("stage") or getattr(self.result, "stage", None), self.varied)
+
+    @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys that the answer varies, so that it does not rest on their values."""
+        return ()
 
     @property
     def failure(self) -> str:
@@ -351,7 +401,7 @@ class Answer:
 
 
 for _name in _SHOWN:
-    setattr(Answer, _name, _in_its_units(getattr(Answer, _name)))
+    setattr(Answer, _name, _shown(_name, getattr(Answer, _name)))
 
 
 def _html_table(table: AnswerTable) -> str:

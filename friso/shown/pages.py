@@ -23,6 +23,7 @@ from friso.shown.drawing.images import ON_PAGE, draw_beforehand, image
 from friso.shown.drawing.prefixes import listed
 from friso.shown.files import Content, Files, pictures
 from friso.shown.glossary import Glossary
+from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.version import VERSION
@@ -37,13 +38,13 @@ OWN_TEMPLATES = "friso.shown"
 """The package with friso's own templates, which other packages' templates extend."""
 
 CONTENTS: Mapping[str, Any] = MappingProxyType(
-    {"verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
+    {"condition": "", "verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
 )
 """Values that every page shows if it has them.
 
-`verdicts` have a colour and `sentences` have none; `notes` stand below them. `columns` of the table are texts, or have
-a label and a colour. Its `rows` are a text and a list of texts. `computed` says how the result was computed; it
-follows the version of friso and has no full stop.
+The `condition` stands before the answer. `verdicts` have a colour and `sentences` have none; `notes` stand below them.
+`columns` of the table are texts, or have a label and a colour. Its `rows` are a text and a list of texts. `computed`
+says how the result was computed; it follows the version of friso and has no full stop.
 """
 
 
@@ -82,6 +83,7 @@ class Report:
         """
         if stage is None:
             return cls(command, name, figures, templates=templates, values=values)
+        values = {"condition": unknown_condition(stage), **values}
         about = (stage.to_toml(), stage.source)
         return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
 

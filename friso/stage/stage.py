@@ -89,6 +89,7 @@ class Stage(Section):
     name: str = ""
     source: str = ""
     note: str = ""
+    unknown: str = ""
     axis: Annotated[AxisTable | None, Table('[axis] kind = "rotary"')] = None
     masses: Annotated[Masses, Table('[masses] cart = "1.2 kg"')]
     friction: Annotated[FrictionSection | None, Table('[friction] model = "lugre" ...', FRICTION)] = None
@@ -147,7 +148,7 @@ class Stage(Section):
         kind = KINDS[self.axis.kind] if self.axis else LINEAR
         return replace(kind, per_ampere=float(self.actuator.motor_constant)) if self.actuator else kind
 
-    @field_validator("name", "source", "note")
+    @field_validator("name", "source", "note", "unknown")
     @classmethod
     def _can_be_saved(cls, text: str) -> str:
         text.encode()  # raises for half a character, which a command line may contain
@@ -175,6 +176,7 @@ class Stage(Section):
                 example = f'[masses] {body} = "1 kg"'
                 raise StageError(f"bias.{body}", f"a force on the {body}, which has no mass", "its mass", example)
         self._has_computable_leaves()
+        self._has_what_is_unknown()
         for rule, broken in _broken_rules(self.flat()):
             if broken:
                 raise StageError(", ".join(rule.keys), self._written(rule), rule.expected, rule.example)
@@ -231,6 +233,25 @@ class Stage(Section):
         if undefined:
             text = f"leaf springs for which {undefined[0]} cannot be computed"
             raise StageError("flexure", text, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
+
+    def _has_what_is_unknown(self) -> None:
+        """Check that the keys and tables listed as unknown are in the file. Raises StageError otherwise."""
+        tables = self.as_written()
+        for key in self.unknown_keys:
+            if not isinstance(tables.get(key), dict) and not ("." in key and _has(tables, key)):
+                expected = "keys and tables of this file with a value that nobody knows, separated by commas"
+                raise StageError("unknown", as_toml(key), expected, 'unknown = "friction.static, controller"')
+
+    @property
+    def unknown_keys(self) -> tuple[str, ...]:
+        """Return the keys, and the tables, whose values in the stage file nobody knows."""
+        return _split(self.unknown)
+
+    @property
+    def doubt(self) -> str:
+        """Return why nothing is certain of a stage with unknown values; "" for another."""
+        keys = self.unknown_keys
+        return f"{' and '.join(keys)} {'is' if len(keys) == 1 else 'are'} listed as unknown" if keys else ""
 
     def _written(self, rule: Rule) -> str:
         """Return the values that a rule compares, as the user wrote them."""
@@ -323,11 +344,12 @@ class Stage(Section):
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
         """Return the stage with some keys set to SI numbers, and `without` some tables.
 
-        Numbers are written so that they read back unchanged. Raises StageError if the result is no valid stage.
+        Numbers are written so that they read back unchanged. Keys that are unknown stay so. Raises StageError if the
+        result is no valid stage.
         """
         keys = numeric_keys({**self.flat(), **numbers})
         texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
-        return self.replace(texts | dict.fromkeys(without))
+        return changed(self.as_written(), texts | dict.fromkeys(without), derived_from_it=True)
 
     def variants(self) -> "Mapping[str, Stage]":
         """Return the stage as "given" and, if it has a joint, with it "locked" and "free".
@@ -351,8 +373,10 @@ class Stage(Section):
         return "\n".join(lines).lstrip() + "\n"
 
 
-def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
+def changed(tables: Mapping[str, Any], changes: Mapping[str, Any], derived_from_it: bool = False) -> Stage:
     """Return a new stage from tables in which some keys are set, or removed by None.
+
+    A key that is set is no longer listed as unknown, unless its value was `derived_from_it`, the stage itself.
 
     A controller that is given in another way, by its gains where the tables have a crossover, replaces the controller
     of the tables. The tables passed in stay as they are. Raises StageError for a key that cannot be set or removed, and
@@ -361,6 +385,11 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
     own, tables = {*tables}, deepcopy(dict(tables))
     for key, value in changes.items():
         _put(tables, key, getattr(value, "text", value))
+    if isinstance(tables.get("unknown"), str) and "unknown" not in changes:
+        stated = () if derived_from_it else changes  # what the user sets is known
+        unset = [key for key in _split(tables.pop("unknown")) if not {key, key.partition(".")[0]} & {*stated}]
+        unset = [key for key in unset if _has(tables, key)]
+        tables |= {"unknown": ", ".join(unset)} if unset else {}
     try:
         return Stage(**tables)
     except StageError as error:
@@ -599,6 +628,21 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
         place[last] = value
     elif place.pop(last, None) is None:
         raise StageError(key, "a key to remove", "a key that the stage has")
+
+
+def _split(text: str) -> tuple[str, ...]:
+    """Return the words of a text, which commas separate."""
+    return tuple(filter(None, map(str.strip, text.split(","))))
+
+
+def _has(tables: Mapping[str, Any], key: str) -> bool:
+    """Tell whether nested tables have a key such as "friction.static", or a table."""
+    place: Any = tables
+    for name in key.split("."):
+        if not isinstance(place, Mapping) or name not in place:
+            return False
+        place = place[name]
+    return True
 
 
 def _number(values: list[Any], key: str, depth: int) -> int:

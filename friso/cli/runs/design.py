@@ -19,12 +19,13 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     from friso.questions.design.document import refused_document
     from friso.questions.design.question import specification_of
     from friso.questions.design.words import refusal
+    from friso.shown.unknown import unknown_condition
 
     try:
         ask(question, about, options, shown)
     except NoDesign as failure:
+        stage = stage_of(about[0], options.get("set"))
         if shown.as_json:
-            stage = stage_of(about[0], options.get("set"))
-            print_document(refused_document(stage.name, specification_of(stage, about[1]).name, failure))
-        say(refusal(failure))
+            print_document(refused_document(stage, specification_of(stage, about[1]).name, failure))
+        say(unknown_condition(stage) + refusal(failure))
         raise typer.Exit(2) from None

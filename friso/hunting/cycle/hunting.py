@@ -246,7 +246,7 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
     reason = survey.families[0].reasons[0] if certain else doubt
     return Hunting(
         cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),
-        reason=reason if not certain or not (closed or repelling) else "",
+        reason="" if certain and (survey.motions or repelling) else reason,
         certain=certain,
         returns=return_map(stages, GUESS_RTOL),
         observed=tuple(

@@ -49,10 +49,15 @@ PLANE_MARGIN = 0.02
 """Margin around the plane of two keys, as a fraction of the range, so that nodes at its sides are fully visible."""
 
 
-def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
-    """Return the figure of a boundary; points such as folds are named in the units shown."""
+def boundary_figure(
+    traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "", condition: str = ""
+) -> Figure:
+    """Return the figure of a boundary; points such as folds are named in the units shown.
+
+    It holds under a `condition`, with which its note begins.
+    """
     figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
-    return replace(figure, subject=subject)
+    return replace(figure, subject=subject, note=condition + figure.note)
 
 
 def _diagram(traced: Diagram, key: ShownKey) -> Figure:

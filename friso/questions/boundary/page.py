@@ -14,26 +14,29 @@ from friso.questions.map.places import SHOWN, with_places
 from friso.shown.drawing.figure import Figure
 from friso.shown.files import Content, image_files
 from friso.shown.pages import Report
+from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
 from friso.studies.boundary import lines
 
 
 def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, stem: str) -> dict[str, Content]:
     """Return the page, the figure in all formats, and the table of points, all named `stem`."""
-    figure = boundary_figure(traced, keys, stage.name)
+    condition = unknown_condition(stage, [swept.key for swept in traced.space.ranges])
+    figure = boundary_figure(traced, keys, stage.name, condition)
     if isinstance(traced, Plane):
         figure = with_places(figure, [(SHOWN, stage)], [key.key for key in keys])
     images = image_files(figure, stem)
-    page = boundary_html(traced, keys, stage, figure)
+    page = boundary_html(traced, keys, stage, figure, condition)
     return {f"{stem}.html": page, **images, f"{stem}.csv": partial(_write_table, traced)}
 
 
-def boundary_html(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, figure: Figure) -> str:
-    """Return the page of a boundary with its figure."""
+def boundary_html(
+    traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, figure: Figure, condition: str = ""
+) -> str:
+    """Return the page of a boundary with its figure; it holds under a `condition`."""
     answer, *details = sentences(traced, keys)
-    return Report.of_stage(
-        "boundary", stage, [replace(figure, note="")], sentences=[answer], details=details, note=figure.note
-    ).html()
+    values = {"condition": condition, "sentences": [answer], "details": details, "note": figure.note}
+    return Report.of_stage("boundary", stage, [replace(figure, note="")], **values).html()
 
 
 def _write_table(traced: Diagram | Plane, path: Path) -> None:

@@ -33,6 +33,11 @@ class BoundaryAnswer(Answer):
     texts: Sequence[str]
     name: str
 
+    @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys over which cycles are followed."""
+        return [swept.key for swept in self.result.space.ranges]
+
     @cached_property
     def keys(self) -> tuple[ShownKey, ...]:
         """Return the keys in the units in which their ranges were given."""
@@ -55,7 +60,7 @@ class BoundaryAnswer(Answer):
         """Return the figure of the branches of cycles, or of the curves on which hunting ends."""
         from friso.questions.boundary.figures import boundary_figure
 
-        return [boundary_figure(self.result, self.keys, self.stage.name)]
+        return [boundary_figure(self.result, self.keys, self.stage.name, self.condition)]
 
     def document(self) -> dict[str, Any]:
         """Return points, branches and curves as a document."""

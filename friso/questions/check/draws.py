@@ -10,6 +10,7 @@ from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import Axis, Band, Figure, Panel
 from friso.shown.drawing.palette import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION
 from friso.shown.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval
+from friso.shown.unknown import if_so
 from friso.studies.draws import Draws, Fates
 from friso.studies.settings import settings
 
@@ -67,7 +68,8 @@ def draws_sentences(draws: Draws) -> list[str]:
     sample = draws.sample
     cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
     cases = case_labels(draws.stage).items()
-    sentences = [*cut, *(f"{label}, over the uncertain values: {_sentence(name, draws)}" for name, label in cases)]
+    over = f"{if_so(draws.stage)}, over the uncertain values"
+    sentences = [*cut, *(f"{label}{over}: {_sentence(name, draws)}" for name, label in cases)]
     sentences += [text for text in [_narrowed(draws)] if text]
     if sample.left_out:
         reasons = [f"{count}: {why}" for why, count in sample.broken.items()]

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from friso.equations.scaled_friction import least_static_factor, static_frictions
+from friso.equations.breakaway import breakaway
+from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
+from friso.equations.structure import carrying_force
 from friso.hunting import SEARCH_LIMITS, Case, MarginEnd, ParameterMargin
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
@@ -16,6 +18,7 @@ from friso.shown.drawing.prefixes import (
     rounded_up,
     with_unit,
 )
+from friso.stage.controllers import FORCE_LIMIT
 
 
 def friction_sentences(case: Case) -> list[str]:
@@ -27,7 +30,23 @@ def friction_sentences(case: Case) -> list[str]:
     if margin is None:
         return []
     lowest = "Coulomb friction" if margin.range[0] > 1 / SEARCH_LIMITS.most_friction else ""
-    return [margin_sentence("static friction", margin, _forces(case, margin) or " (Coulomb friction held)", lowest)]
+    says = margin_sentence("static friction", margin, _forces(case, margin) or " (Coulomb friction held)", lowest)
+    return [says, *_too_strong(case, margin)]
+
+
+def _too_strong(case: Case, margin: ParameterMargin) -> list[str]:
+    """Say that hunting ends with more static friction because the force limit no longer breaks the stage away.
+
+    Empty if hunting ends for another reason, or does not end.
+    """
+    flat, end = case.stage.flat(), margin.above
+    if not (margin.attracts and end and FORCE_LIMIT in flat):
+        return []
+    left = flat[FORCE_LIMIT] - abs(float(carrying_force(flat)))  # of the limit, beside the constant forces
+    if breakaway(with_static_friction(flat, end.other)) <= left:
+        return []
+    held = f"Static friction above {with_unit(left, 'N')} holds the stage where it sticks"
+    return [f"{held}, because the force limit cannot break it away."]
 
 
 def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest: str = "") -> str:
@@ -37,7 +56,7 @@ def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest
     searched by a word, such as "no stroke".
     """
     does, starts = ("ends", "ends") if margin.attracts else ("begins", "starts")
-    sure = all(end.certain for end in (margin.below, margin.above) if end)
+    sure = margin.sure and all(end.certain for end in (margin.below, margin.above) if end)
     doubt = "" if sure else "; this is not certain"
     left = listed([_side(side) for side in margin.open_sides], "and")
     if left:
@@ -125,8 +144,8 @@ def _forces(case: Case, margin: ParameterMargin) -> str:
     ((static, coulomb),) = pairs.items()
     (end,) = ends
     held = flat[coulomb]
-    least, most = (flat[static] * factor for factor in _factors(end))
-    above = range_with_unit(max(least - held, 0.0), max(most - held, 0.0), "N")
+    least, most = (max(flat[static] * factor, held) for factor in _factors(end))
+    above = range_with_unit(least - held, most - held, "N")
     digits = digits_that_differ([least, most, held])
     at = range_with_unit(least, most, "N", digits)
     return f" ({at}: {above} above Coulomb friction, which is held at {with_unit(held, 'N', digits)})"

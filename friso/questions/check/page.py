@@ -19,6 +19,7 @@ from friso.shown.cases import shown_cases
 from friso.shown.files import Content
 from friso.shown.motion_words import motion_sentences
 from friso.shown.pages import Report
+from friso.shown.unknown import if_so
 from friso.stage.rig import left_out
 from friso.studies.draws import Draws
 
@@ -63,7 +64,7 @@ def check_html(
         "check",
         stage,
         (*check_figures(cases), *([draws_figure(draws)] if draws else [])),
-        verdicts=[(item.colour, f"{item.label}: {verdict_sentence(item, cases)}") for item in in_order],
+        verdicts=[(item.colour, f"{item.label}{if_so(stage)}: {verdict_sentence(item, cases)}") for item in in_order],
         sentences=[
             *filter(None, [conclusion(cases)]),
             *(f"{omitted}." for omitted in [left_out(stage)] if omitted),

@@ -35,6 +35,7 @@ from friso.shown.drawing.prefixes import (
 )
 from friso.shown.loop_words import unstable_where
 from friso.shown.motion_words import dwell_sentences, following_sentence
+from friso.shown.unknown import if_so
 from friso.stage.controllers import FORCE_LIMIT, integral_leak
 from friso.stage.motion import motion_of
 from friso.stage.section import numeric_fields
@@ -63,7 +64,7 @@ IN_SHORT: Mapping[Verdict, str] = {
 """Words for the verdict on a stage before its margin is known."""
 
 ONE_PLACE = 1.01
-"""Ratio of the ends of a window of bandwidths below which its centre and width are stated instead."""
+"""Ratio of the ends of a window of bandwidths below which its centre and its greatest width are stated instead."""
 
 ROUGH_EDGE = 5e-4
 """Relative uncertainty of an edge above which it is mentioned, because the shown digits are not certain."""
@@ -114,7 +115,7 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
 
     If something was given up, the last sentence says which commands go on.
     """
-    says = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown_cases(cases)]
+    says = [f"{item.label}{if_so(item.case.stage)}: {verdict_sentence(item, cases)}" for item in shown_cases(cases)]
     return [*says, *filter(None, [conclusion(cases)]), *_goes_on(cases, says)]
 
 
@@ -346,7 +347,8 @@ def _doubts(case: Case) -> Iterator[str]:
     """Yield why the verdict is not certain, if it is not."""
     hunting = case.judgement.hunting
     if not hunting.certain:
-        yield f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."
+        searched = hunting.target or hunting.reason == case.stage.doubt
+        yield f"This is not certain ({hunting.reason}){'' if searched else ': other motions may end in hunting'}."
 
 
 def _running_away(case: Case) -> list[str]:
@@ -460,9 +462,9 @@ def _window(case: Case, window: BandwidthWindow) -> str:
     """Write a range of bandwidths, such as one beyond the edge of hunting in which the stage hunts again."""
     low, high = window.low, window.high
     if low and high and high.inside < low.inside * ONE_PLACE:
-        width = percent(high.inside / low.inside - 1)
+        width = percent(high.outside / low.outside - 1)
         middle = (low.inside + high.inside) / 2
-        return f"within a range of {width} about {_bandwidth(case, middle, up=None, digits=5)}"
+        return f"within a range of at most {width} about {_bandwidth(case, middle, up=None, digits=5)}"
     lowest, highest = (
         f"{_bandwidth(case, factor, up=None)} (the {name} searched)"
         for factor, name in ((SEARCH_LIMITS.lowest_bandwidth, "lowest"), (SEARCH_LIMITS.highest_bandwidth, "highest"))

@@ -21,6 +21,8 @@ from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.questions.design.window import lower, upper
 from friso.questions.design.words import need_words, refusal, so_far
 from friso.shown.documents import entries, plain_json, unit_suffix
+from friso.shown.unknown import unknown_condition
+from friso.stage import Stage
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
@@ -68,9 +70,10 @@ def _by_law(design: Design) -> dict[str, Any]:
     }
 
 
-def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
+def refused_document(stage: Stage, spec: str, failure: NoDesign) -> dict[str, Any]:
     """Return the reason why no design meets the specification, and what to relax."""
-    document = {"conclusion": refusal(failure), "stage": stage, "spec": spec, "feasible": False}
+    conclusion = unknown_condition(stage) + refusal(failure)
+    document = {"conclusion": conclusion, "stage": stage.name, "spec": spec, "feasible": False}
     document["reason"] = failure.reason
     return plain_json(document | {"relax": _relax(failure.relaxed)})
 

@@ -25,4 +25,4 @@ def export_html(gains: Gains) -> str:
         "drawing_of_loop": gains.diagram,
         "parameters": gains.text,
     }
-    return Report.of_stage("export", gains.stage, (), title(gains), **values).html()
+    return Report.of_stage("export", gains.stage, (), title(gains), condition="", **values).html()

@@ -6,7 +6,9 @@ from typing import Any
 
 from friso.drives.gains import Gains
 from friso.interface.answer import AnswerTable
+from friso.quantities import as_toml
 from friso.shown.documents import entries, plain_json
+from friso.stage.section import numeric_fields
 
 COLUMNS = ("Symbol", "In this file", "In other units")
 
@@ -34,8 +36,13 @@ def rows(gains: Gains) -> list[tuple[str, list[str]]]:
 
 
 def notes(gains: Gains) -> list[str]:
-    """Write remarks on the numbers: missing units, formulas used, and keys left out."""
-    texts = []
+    """Write remarks on the numbers: what else the controller has, missing units, formulas used, and keys left out."""
+    controller = gains.stage.controller
+    gains_or_kind = {"kind", *numeric_fields(type(controller))}
+    others = [
+        f"{key} = {_in_one_line(value)}" for key, value in controller.as_written().items() if key not in gains_or_kind
+    ]
+    texts = [f"Also part of the controller: {'; '.join(others)}"] if others else []
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
         texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
     if not any(unit.startswith("A") for row in gains.conversions for _, unit in row.values):
@@ -45,6 +52,13 @@ def notes(gains: Gains) -> list[str]:
         if gains.not_held:
             texts.append(f"Not among them: {', '.join(gains.not_held)}")
     return texts
+
+
+def _in_one_line(value: Any) -> str:
+    """Write a value of a stage file as TOML in one line, tables and arrays too."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_in_one_line(entry)}' for key, entry in value.items())} }}"
+    return f"[{', '.join(map(_in_one_line, value))}]" if isinstance(value, list) else as_toml(value)
 
 
 def _with_unit(value: tuple[float, str]) -> str:

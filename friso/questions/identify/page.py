@@ -38,6 +38,7 @@ def identify_files(
         stage,
         identify_figures(identification, predictions),
         ", ".join(file.path.name for file in logs),
+        condition="",
         verdicts=words.headline(identification),
         columns=words.COLUMNS,
         rows=words.estimate_rows(identification),

@@ -64,6 +64,11 @@ class IdentifyAnswer(Answer):
     checked: CheckAnswer | None
 
     @property
+    def condition(self) -> str:
+        """Return "": estimates rest on the logs."""
+        return ""
+
+    @property
     def failure(self) -> str:
         """Say that a model does not describe its log; empty if all do."""
         return "a model does not describe its log" if self.result.failed else ""

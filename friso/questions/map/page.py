@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import xarray as xr
@@ -23,6 +24,7 @@ from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand,
 from friso.shown.drawing.packing import packed_json
 from friso.shown.files import Content
 from friso.shown.pages import Report, print_image, script
+from friso.shown.unknown import unknown_condition
 from friso.studies.traces import Traces
 
 FORMS = (*FORMATS, "html")
@@ -66,6 +68,7 @@ def map_html(
         version=runs.attrs.get("friso", ""),
         scripted=True,
         values={
+            "condition": _condition(runs),
             "headline": headline(runs, metric),
             "verification": verification(runs),
             "own_place": own_place(runs, metric),
@@ -82,9 +85,15 @@ def map_html(
     ).html()
 
 
+def _condition(runs: xr.Dataset) -> str:
+    """Write the condition under which a map holds; "" without unknown values."""
+    return unknown_condition(machine_of(runs), [axis.key for axis in axes_of(runs)])
+
+
 def marked_figure(runs: xr.Dataset, metric: str) -> Figure:
     """Return the figure of a map; over two axes, with a mark where the swept machine lies."""
     figure, stage = map_figure(runs, metric), machine_of(runs)
+    figure = replace(figure, note=_condition(runs) + figure.note)
     keys = [] if SAMPLE in runs.dims else [axis.key for axis in axes_of(runs)]
     return with_places(figure, [(SHOWN, stage)], keys) if stage and len(keys) == 2 else figure
 

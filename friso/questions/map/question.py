@@ -72,6 +72,11 @@ class SweepAnswer(Answer):
     exports: Sequence[Path]
 
     @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys on the axes."""
+        return [axis.name for dimension in self.study.dimensions for axis in dimension.axes]
+
+    @property
     def data(self) -> xr.Dataset:
         """Return outcome, peaks, amplitude, status and more over the axes, with coordinates in SI."""
         return self.result
@@ -111,7 +116,8 @@ class SweepAnswer(Answer):
         """Return the map, unless it has too many cells."""
         from friso.questions.map.figures import map_figure
 
-        return [map_figure(self.result, self.metric)] if self.drawable else []
+        figures = [map_figure(self.result, self.metric)] if self.drawable else []
+        return [replace(figure, note=self.condition + figure.note) for figure in figures]
 
     def document(self) -> dict[str, Any]:
         """Return the axes, the results, and how many of them survive a tighter tolerance."""

@@ -60,7 +60,7 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
         "keys_changed": tuning.size(outcome).keys,
         "factor": tuning.size(outcome).factor,
         "verdict": confirmation.verdict if confirmation else None,
-        "certain": bool(confirmation and confirmation.certain),
+        "certain": bool(confirmation and confirmation.certain and not outcome.stage.unknown_keys),
         "windows": [asdict(window) for window in outcome.windows],
         **_performance(outcome.measured, tuning),
     }

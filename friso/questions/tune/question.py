@@ -150,12 +150,16 @@ def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
     """Log the first remedy tried if it works, while others are still tried."""
     from friso.questions.tune.words import changes, slowest_time
     from friso.shown.drawing.prefixes import listed
+    from friso.shown.unknown import unknown_condition
 
     if outcome.certainty != "works" or outcome.stage is None or outcome.measured is None:
         return
     changed = listed(changes(stage, outcome.stage), "and")
     when = slowest_time(outcome.measured, goal)
-    LOGGER.info(f"this works: {changed}, in position after {when}; others are tried", extra={"meanwhile": True})
+    LOGGER.info(
+        f"{unknown_condition(stage)}this works: {changed}, in position after {when}; others are tried",
+        extra={"meanwhile": True},
+    )
 
 
 def _goal(

@@ -192,8 +192,13 @@ def _shows_the_same(stage: Stage, law: str, keys: Mapping[str, Any], other: Mapp
 
 
 def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
-    """Return the stage with another friction law and that law's keys [SI]."""
-    return stage.replace({"friction": _table(stage, law, keys)})
+    """Return the stage with another friction law and that law's keys [SI].
+
+    If some of its friction is unknown, all of the new law's is.
+    """
+    of_friction = ("friction" if key.startswith("friction.") else key for key in stage.unknown_keys)
+    unknown = {"unknown": ", ".join(dict.fromkeys(of_friction))} if stage.unknown else {}
+    return stage.replace({"friction": _table(stage, law, keys), **unknown})
 
 
 def compared(

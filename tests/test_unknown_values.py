@@ -1,0 +1,142 @@
+"""Values of a stage file that nobody knows: listed as unknown, and nothing that rests on them is certain."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from inside import friso_inside
+
+import friso
+from friso.design_method.method import NoDesign
+from friso.questions.design.document import refused_document
+from friso.stage import Stage
+
+KEY = "friction.bristle_stiffness"
+
+
+@pytest.fixture(scope="module")
+def guessed(rig: Stage) -> Stage:
+    """The thesis rig, locked, whose bristle stiffness is a guess."""
+    return rig.replace({"joint.locked": True, "unknown": KEY})
+
+
+def test_the_list_is_read_and_written(guessed: Stage) -> None:
+    again = friso.loads(guessed.to_toml())
+    assert again == guessed
+    assert again.unknown_keys == (KEY,)
+    assert guessed.replace({"unknown": "controller, friction.static"}).unknown_keys == ("controller", "friction.static")
+
+
+@pytest.mark.parametrize("listed", ["friction.statc", "bias.cart", "friction.", "friction.static.1", "rail"])
+def test_what_the_file_lacks_cannot_be_unknown(rig: Stage, listed: str) -> None:
+    with pytest.raises(friso.InputError) as caught:
+        rig.replace({"unknown": listed})
+    assert caught.value.key == "unknown"
+    assert listed in caught.value.actual
+    assert "friction.static" in caught.value.example
+
+
+def test_what_is_set_is_known(guessed: Stage) -> None:
+    assert guessed.replace({KEY: "2e5 N/m"}).unknown_keys == ()
+    assert "unknown" not in guessed.replace({KEY: "2e5 N/m"}).to_toml()
+    assert guessed.replace({"friction.static": "4 N"}).unknown_keys == (KEY,)
+    assert guessed.replace({"friction": None}).unknown_keys == ()
+    assert guessed.replace({"friction": guessed.as_written()["friction"]}).unknown_keys == ()
+    both = guessed.replace({"unknown": f"{KEY}, controller"})
+    assert both.replace({"controller.crossover": "9 Hz"}).unknown_keys == (KEY, "controller")
+    assert both.replace({"controller": both.as_written()["controller"]}).unknown_keys == (KEY,)
+
+
+def test_what_follows_from_an_unknown_value_is_unknown(guessed: Stage) -> None:
+    """Numbers that friso sets, cells of a map, machines drawn, and the friction of another law."""
+    assert guessed.with_numbers({KEY: 2e5, "friction.static": 4.0}).unknown_keys == (KEY,)
+    cell = friso.sweep(guessed, {"friction.static": "2 N..4 N:2"}, metric="outcome").cell(1)
+    assert cell.unknown_keys == (KEY,)
+    converted = friso.convert(guessed, "gms").stage
+    assert converted.unknown_keys == ("friction",)
+    assert friso.loads(converted.to_toml()) == converted
+
+
+@pytest.fixture(scope="module")
+def checked(guessed: Stage) -> Any:
+    return friso.check(guessed)
+
+
+def test_no_verdict_edge_or_margin_is_certain(checked: Any, rig: Stage) -> None:
+    sure = friso.check(rig.replace({"joint.locked": True}))["locked"]
+    case = checked["locked"]
+    assert case.verdict == sure.verdict == "hunts"
+    assert sure.judgement.hunting.certain
+    assert sure.judgement.margin.certain
+    assert sure.static_friction.certain
+    assert not case.judgement.hunting.certain
+    assert not case.judgement.margin.certain
+    assert not case.static_friction.certain
+    assert case.judgement.margin.crossover == sure.judgement.margin.crossover
+    assert KEY in case.judgement.hunting.reason
+    assert not checked["free"].static_friction.certain  # no end was found, and that is not certain either
+    free = checked.sentences()[1]
+    assert "starts hunting" in free
+    assert free.rstrip(".").endswith("this is not certain")
+
+
+def test_every_headline_is_conditional(checked: Any) -> None:
+    first, *rest = checked.sentences()
+    assert first.startswith(f"If {KEY} is 100 kN/m, which the stage file lists as unknown: ")
+    assert all(", if so" in text.partition(":")[0] for text in rest if ": hunts" in text or ": settles" in text)
+    assert "The free joint stops the hunting" not in " ".join(checked.sentences())
+    assert repr(checked).startswith(f"<friso check: If {KEY}")
+    document = checked.to_dict()
+    assert document["conclusion"].startswith(f"If {KEY}")
+    assert document["condition"].startswith(f"If {KEY}")
+    assert not any(case["certain"] or (case["margin"] or {}).get("certain") for case in document["cases"].values())
+    assert "other motions may end in hunting" not in first  # the search itself was certain
+
+
+def test_a_page_says_the_condition_first(checked: Any) -> None:
+    page = checked.files()["report.html"]
+    main = page[page.index("<main>") :]
+    assert main.index("lists as unknown") < main.index("±")
+
+
+def test_a_key_that_is_varied_is_no_condition(guessed: Stage) -> None:
+    over_it = friso.sweep(guessed, {KEY: "5e4 N/m..2e5 N/m:2"}, metric="outcome")
+    over_another = friso.sweep(guessed, {"controller.crossover": "4 Hz..20 Hz:2"}, metric="outcome")
+    assert not over_it.sentences()[0].startswith("If")
+    assert over_another.sentences()[0].startswith(f"If {KEY}")
+    assert friso.bode(guessed).sentences()[0].startswith(f"If {KEY}")
+
+
+def test_a_stage_without_the_list_answers_as_before(rig: Stage) -> None:
+    answer = friso.bode(rig)
+    assert not answer.sentences()[0].startswith("If")
+    assert "condition" not in answer.to_dict()
+
+
+def test_the_command_line_reads_the_list(guessed: Stage, tmp_path: Path) -> None:
+    path = tmp_path / "guessed.toml"
+    path.write_text(guessed.to_toml(), encoding="utf-8")
+    document = json.loads(friso_inside(tmp_path, "simulate", path, "--json").stdout)
+    assert document["condition"].startswith(f"If {KEY}")
+    assert document["conclusion"].startswith(f"If {KEY}")
+    assert "condition" not in json.loads(
+        friso_inside(tmp_path, "simulate", path, "--set", f"{KEY}=2e5 N/m", "--json").stdout
+    )
+
+
+def test_pictures_and_conclusions_are_conditional(guessed: Stage) -> None:
+    answers = [
+        friso.sweep(guessed, {"controller.crossover": "4 Hz..20 Hz:3"}, metric="sketch"),
+        friso.boundary(guessed, x="controller.crossover=6 Hz..12 Hz"),
+    ]
+    for answer in answers:
+        assert answer.figures()[0].note.startswith(f"If {KEY}")
+        assert answer.to_dict()["conclusion"].startswith(f"If {KEY}")
+        assert answer.sentences()[0].count(f"If {KEY}") == 1
+
+
+def test_a_refused_design_is_conditional(guessed: Stage) -> None:
+    document = refused_document(guessed, "spec.toml", NoDesign("no leaf spring is soft enough"))
+    assert document["conclusion"].startswith(f"If {KEY}")
+    assert not refused_document(guessed.replace({"unknown": ""}), "", NoDesign("why"))["conclusion"].startswith("If")
