@@ -310,3 +310,50 @@ def test_measures_are_those_of_an_asymmetric_cycle_where_that_attracts() -> None
     assert runs.amplitude.values[0] == pytest.approx(0.876e-3, rel=0.01)
     assert not abs(runs.multiplier.values[0]) >= 1
     assert np.isnan([runs.amplitude.values[1], runs.multiplier.values[1]]).all()
+
+
+RAMP = """
+masses.cart = "1 kg"
+friction = { model = "lugre", static = "1.5 N", coulomb = "1 N", stribeck_velocity = "1 mm/s", stribeck_exponent = 2, \
+bristle_stiffness = "1e5 N/m", bristle_damping = "316 N*s/m", viscous = "0.4 N*s/m" }
+controller = { kind = "pid", kp = "8 N/m", ki = "0.8 N/(m*s)", kd = "1 N*s/m", derivative_on = "measurement" }
+motion = { kind = "ramp", velocity = "0.1 m/s", duration = "60 s" }
+"""
+
+
+@pytest.mark.parametrize("metric", [None, "sketch", "verdict", "attractor", "multiplier"])
+def test_there_is_no_map_of_verdicts_where_the_reference_keeps_moving(metric: str | None) -> None:
+    """A check gives no verdict there; runs can be mapped, and swing."""
+    stage = friso.loads(RAMP.replace("\\\n", ""))
+    assert friso.check(stage).verdict == "none"
+    axes = {"motion.velocity": ["0.02 m/s", "0.05 m/s"], "friction.static": ["1.5 N", "3 N"]}
+    with pytest.raises(friso.InputError) as caught:
+        friso.sweep(stage, axes, metric=metric)
+    assert caught.value.key == "metric"
+    assert "ramp" in caught.value.actual
+    assert "outcome" in caught.value.example
+    runs = friso.sweep(stage, axes, metric="outcome")
+    assert (runs.outcome == "swings").any()
+    standing = stage.replace({"motion.velocity": "0 m/s"})
+    with pytest.raises(friso.InputError):  # it stands in the file, and moves on the axis
+        friso.sweep(standing, axes, metric=metric)
+    of_friction = {"friction.static": ["1.5 N", "3 N"]}
+    with pytest.raises(friso.InputError):  # or by a link
+        friso.sweep(standing, of_friction, link={"motion.velocity": "friction.static / 30"}, metric=metric)
+
+
+def test_a_stage_that_cannot_hunt_has_a_verdict_whatever_its_reference_does() -> None:
+    stage = friso.loads(RAMP.replace("\\\n", "")).replace({"controller.ki": None})
+    verdict = friso.check(stage).verdict
+    assert verdict in ("transient", "settles")
+    cells = friso.sweep(stage, {"motion.velocity": ["0.05 m/s", "0.1 m/s"]}, metric="verdict").data["verdict"]
+    assert cells.values[1] == verdict
+    with pytest.raises(friso.InputError):
+        friso.sweep(stage, {"controller.ki": ["0 N/(m*s)", "0.8 N/(m*s)"]}, metric="verdict")
+
+
+def test_there_is_no_boundary_where_the_reference_keeps_moving() -> None:
+    with pytest.raises(friso.InputError) as caught:
+        friso.boundary(friso.loads(RAMP.replace("\\\n", "")), x="friction.static=1 N..3 N")
+    assert caught.value.key == "motion"
+    assert "hold" in caught.value.example

@@ -15,6 +15,7 @@ import numpy as np
 from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.tolerance import checked_rtol
 from friso.equations.bandwidth import range_example
+from friso.equations.motion import rests
 from friso.errors import InputError
 from friso.hunting import (
     CLOSED,
@@ -70,10 +71,14 @@ def boundary(
         if reason == DITHERS:
             raise InputError("controller", reason, "a controller without dither", example)
         raise InputError("stage", f"one that cannot hunt: {reason}", "friction and integral action", example)
-    for swept in ranges:
-        if swept.key.startswith("motion."):
+    if not rests(stage.flat()):
+        actual = f'motion.kind = "{stage.flat()["motion.kind"]}", whose reference keeps moving'
+        expected = "a reference that comes to stand, as there is a verdict on hunting only there"
+        raise InputError("motion", actual, expected, """--set 'motion={kind="hold", duration="20 s"}'""")
+    for key in (*(swept.key for swept in ranges), *followers):
+        if key.startswith("motion."):
             problem = "a key of the motion, which plays no part"
-            raise InputError(swept.key, problem, "a key of the stage or its controller", example)
+            raise InputError(key, problem, "a key of the stage or its controller", example)
     if rtol > settings.loosest_rtol:
         raise InputError(
             "rtol", f"{rtol:g}", f"at most {settings.loosest_rtol:g}, since multipliers are derivatives", "1e-9"

@@ -68,6 +68,10 @@ class StudySettings(Settings):
     """Largest block of a survey [cells], which needs a hundred runs for each cell. Larger ones report progress too
     rarely."""
 
+    most_motions: int = setting(100_000, "")
+    """Most cells whose motions are looked at before a study begins. More take seconds; larger maps over a motion have
+    their extremes among fewer."""
+
     look_interval: float = setting(0.05, "s")
     """Interval between checks for cancellation. Longer ones are felt after Ctrl-C."""
 

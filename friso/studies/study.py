@@ -17,7 +17,9 @@ import numpy as np
 
 from friso.engine.cache import code_digest, machine
 from friso.engine.tolerance import checked_rtol
+from friso.equations.motion import rests
 from friso.errors import InputError
+from friso.hunting import cannot_hunt
 from friso.stage import Stage, loads
 from friso.studies.axes import (
     SAMPLE,
@@ -33,6 +35,7 @@ from friso.studies.axes import (
 )
 from friso.studies.cells import flat_cells
 from friso.studies.metric import every_variable, in_order, metrics, usual_metrics
+from friso.studies.settings import settings
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -334,7 +337,9 @@ class Request:
             if names.count(name) > 1 or name in (*every_variable(), SAMPLE):
                 raise InputError(name, "a name that is taken", "each axis once, each under a different name")
         check_links(self.stage, self.links, frozenset(names))
-        return Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
+        study = Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
+        _check_verdicts(study)
+        return study
 
 
 def _points(axis: SweptAxis | SweptRange) -> int:
@@ -353,6 +358,28 @@ def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
         return axis
     _points(axis)
     return axis.axis()
+
+
+def _check_verdicts(study: Study) -> None:
+    """Refuse verdicts on stages whose reference keeps moving, since there are none.
+
+    Raises InputError if the study has a metric that rests on a stage's attractors, and the reference keeps moving in
+    the stage file or, where axes or links vary the motion, in some cell. A stage that cannot hunt has a verdict.
+    """
+    flat, every = study.stage.flat(), metrics()
+    if not any(every[name].source != "run" for name in study.metrics if name in every):
+        return
+    cells, varied = [flat], (*(axis.name for axis in study.axes), *study.links)
+    if cannot_hunt(study.stage) and not any(name.startswith("controller.") for name in varied):
+        return
+    if any(name.startswith("motion.") for name in varied):
+        numeric = {axis.name for axis in study.axes if axis.numeric}
+        columns = study.columns(np.arange(min(study.cells, settings.most_motions)))
+        cells.append(flat_cells(study.stage, study.links, {name: columns[name] for name in numeric}))
+    if not all(map(rests, cells)):
+        actual = f'verdicts, with motion.kind = "{flat["motion.kind"]}", whose reference keeps moving'
+        expected = "what the runs do, as there is a verdict on hunting only where the reference comes to stand"
+        raise InputError("metric", actual, expected, "metric=outcome")
 
 
 def _checked_metrics(names: Sequence[str] | None) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ METRIC = Metric(
     findings=(MapFinding("The run swings at its end", (SWINGS,)),),
     doubt=(
         CREEPS,
-        "It still creeps at its end in {share} of the map: a longer run, or the verdict of every cell (--metric "
-        "sketch), shows whether it hunts there.",
+        "It still creeps at its end in {share} of the map: a longer run shows whether it hunts there, and, if the "
+        "reference comes to stand, so does the verdict of every cell (--metric sketch).",
     ),
 )
