@@ -16,8 +16,8 @@ _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """Characters around a key and its value that belong to neither."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
 _AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
-_GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
-"""Pattern of digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<sign>[.,])\d{3}")
+"""Pattern of digits in which a sign may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNITS = re.compile(r"(?:vertical |y )?units?|einheit(?:en)?", re.IGNORECASE)
 _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)
 
@@ -36,10 +36,11 @@ class Preamble:
     read: tuple[str, ...] = ()
 
 
-def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
-    """Read the lines above a table with columns of the given names.
+def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str, decimal: str = ".") -> Preamble:
+    """Read the lines above a table with columns of the given names, and its delimiter and decimal sign.
 
-    If lines state different sampling intervals, none is used.
+    If lines state different sampling intervals, none is used. Where a sign may group thousands, a number is taken only
+    if it has a point, and so have the decimals of the table.
     """
     lines = [line for line in lines if line.strip()]
     pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
@@ -52,7 +53,8 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
         key = re.sub(r"[\W\d_]+", "", name.lower())
         asked = key in RATES | STEPS and len(value) < settings.characters_of_an_amount
         amount = _AMOUNT.fullmatch(value) if asked else None
-        if amount is None or _GROUPED.fullmatch(amount["number"]):
+        grouped = amount and _GROUPED.fullmatch(amount["number"])
+        if amount is None or (grouped and not grouped["sign"] == decimal == "."):
             continue
         number = float(amount["number"].replace(",", "."))
         seconds = _seconds(number, amount["unit"].strip("[]()") or unit)

@@ -1,4 +1,4 @@
-"""Find the layout of a text file from its first lines: encoding, delimiter, decimal sign, first row of numbers."""
+"""Find the layout of a text file from its first lines: encoding, delimiter, first row of numbers."""
 
 from __future__ import annotations
 
@@ -11,21 +11,25 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 from friso.errors import LogError
+from friso.identification.logs.number_format import SPACES, NumberFormat, is_number, likely_format
 from friso.identification.logs.settings import settings
 from friso.identification.logs.units import is_unit, split_heading
+from friso.quantities import quoted
 
 REMEMBERED_LAYOUTS = 4
 """Number of files whose layout is cached, because each file is examined several times."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-_CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
-"""Pairs of delimiter and decimal sign; of two that fit equally well the first is taken."""
-NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"  # one way to read a run of digits: thousands take no time
-_NUMBER = re.compile(rf"[+-]?{NUMBER}|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
+_DELIMITERS = (";", "\t", ",", " ")
+"""Delimiters; of two that fit equally well the first is taken."""
 CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,:](\d+))?)?(?: ?([AaPp])\.?[Mm]\.?)?"
 """A time of day: hours, minutes, seconds, their fraction, and the half of the day."""
 _DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2}))"
+_GROUPED = re.compile(r"[+\-\u2212]?\d{1,3}(?: \d{3}|,\d{3}[.,])")
+"""Digits in groups, between which stands a sign that delimits cells in other texts."""
+_BLANKS = re.compile(rf"[^\S{SPACES}]+")
 DOS_END = "\x1a"
 """Ctrl-Z, with which DOS programs end a text."""
 ISO = re.compile(r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?)?")
@@ -37,20 +41,19 @@ STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK})")
 class TextLayout:
     """Layout of a text.
 
-    `first` is the number of lines before the numbers, and `above` has these lines; `names` and `units` are per column.
-    `certain` is true if the text shows its decimal sign. With `exact` every delimiter ends a cell, so that several
-    spaces are empty cells.
+    `numbers` is how numbers are written, as far as the first lines show it. `first` is the number of lines before the
+    numbers, and `above` has these lines; `names` and `units` are per column. With `exact` every delimiter ends a cell,
+    so that several spaces are empty cells.
     """
 
     encoding: str
     delimiter: str
-    decimal: str
+    numbers: NumberFormat
     first: int
     columns: int
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     above: tuple[str, ...] = ()
-    certain: bool = True
     exact: bool = False
 
     @property
@@ -58,7 +61,7 @@ class TextLayout:
         """Return the layout in words."""
         names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon"}
         return (
-            f"delimiter {names[self.delimiter]}, decimal {'comma' if self.decimal == ',' else 'point'}, "
+            f"delimiter {names[self.delimiter]}, {self.numbers.in_words}, "
             f"encoding {self.encoding}, {self.first} line{'' if self.first == 1 else 's'} before the numbers"
         )
 
@@ -105,7 +108,7 @@ def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
 
 def _may_stand_in_text(character: str) -> bool:
     """Tell whether a character may occur in a text file."""
-    return character.isprintable() or character in "\t\r\n\f"
+    return character.isprintable() or character in f"\t\r\n\f{SPACES}"
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -113,7 +116,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         if '"' not in line:
             line = re.sub(r"(?<!\s)\s+(?=[\[(])", "\0", line.strip())  # "Time (s)" is one heading
-            return [cell.replace("\0", " ") for cell in line.split()]
+            return [cell.strip().replace("\0", " ") for cell in _BLANKS.split(line) if cell]
         return [cell for cell in csv_cells(line.strip(), " ", skipinitialspace=True) if cell]
     return [cell.strip() for cell in csv_cells(line, delimiter, skipinitialspace=True)]
 
@@ -126,23 +129,15 @@ def csv_cells(line: str, delimiter: str, skipinitialspace: bool = False) -> list
         return [line]
 
 
-def is_number(cell: str, decimal: str) -> bool:
-    """Tell whether a cell is a number with this decimal sign."""
-    if decimal == ",":
-        cell = cell.replace(".", "?").replace(",", ".")
-    return _NUMBER.fullmatch(cell) is not None
-
-
-def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) -> bool:
+def _is_row(cells: list[str], numeric: list[bool], words: bool) -> bool:
     """Tell whether cells, of which some are `numeric`, are a row of values.
 
     A row has numbers, empty cells and time stamps. With `words`, it may have a few words instead, such as a state.
     """
     numbers = sum(numeric)
     rest = [cell for cell, number in zip(cells, numeric, strict=True) if cell and not number]
-    if words:  # no cell may be a number with the other decimal sign: 1.234 may be 1234
-        other = "." if decimal == "," else ","
-        return numbers >= 2 and len(rest) <= numbers and not any(is_number(cell, other) for cell in rest)
+    if words:
+        return numbers >= 2 and len(rest) <= numbers
     return numbers > 0 and len(rest) <= 0.5 * numbers + 1 and all(STAMP.fullmatch(cell) for cell in rest)
 
 
@@ -153,8 +148,15 @@ def layout(path: Path) -> TextLayout:
     """
     encoding, lines = decoded_head(path)
     lines = lines[: settings.lines_of_a_head]
-    best = _best_fit(encoding, tuple(lines))
-    if best is not None:
+    fits = _best_fit(encoding, tuple(lines))
+    if fits is not None:
+        best, rival = fits[0].layout, fits[1]
+        if rival is not None:
+            row = fits[0].grouped or rival.grouped
+            actual = f"{quoted(row)}, which may be {best.columns} or {rival.columns} numbers"
+            expected = "a heading for every column, or another delimiter than the sign that groups thousands"
+            raise LogError("log", actual, expected, "1,234.5;0.5 or 1234.5,0.5", str(path))
+        _no_number_in_parts(lines, best, path)
         if best.columns > settings.columns_of_a_table:
             expected = f"at most {settings.columns_of_a_table}: one a channel, one row a sample"
             raise LogError("log", f"{best.columns} columns", expected, "", str(path))
@@ -165,16 +167,37 @@ def layout(path: Path) -> TextLayout:
     raise LogError("log", actual, expected, "time [s];position [mm];force [N]", str(path))
 
 
+_IN_PARTS = re.compile(r"(?<![\d.])[1-9]\d{0,2}[ ,]\d{3}(?!\d)")
+"""Two cells that may be one number, whose thousands are grouped by the sign between the cells."""
+
+
+def _no_number_in_parts(lines: Sequence[str], form: TextLayout, path: Path) -> None:
+    """Check that no number was divided at its decimal comma, or where its thousands are grouped.
+
+    Raises LogError where headings are fewer than cells, and that may be why.
+    """
+    heading = _filled(split_line(lines[form.first - 1], form.delimiter)) if form.first else []
+    if form.delimiter not in (",", " ") or not 1 < len(heading) < form.columns:
+        return
+    halves = form.delimiter == "," and form.columns == 2 * len(heading)
+    row = next((line for line in lines[form.first :] if line.strip() and (halves or _IN_PARTS.search(line))), "")
+    if row:
+        actual = f"{quoted(row)} below {len(heading)} headings, which may be {form.columns} or {len(heading)} numbers"
+        expected = "a heading for every column, or another delimiter than the signs within numbers"
+        raise LogError("log", actual, expected, "1,234.5;0.5 or 1234.5,0.5", str(path))
+
+
 @lru_cache(REMEMBERED_LAYOUTS)
-def _best_fit(encoding: str, lines: Sequence[str]) -> TextLayout | None:
-    """Return the layout that fits lines best; None if none fits."""
-    split = {delimiter: [split_line(line, delimiter) for line in lines] for delimiter, _ in _CANDIDATES}
-    fits = [_fits(lines, encoding, delimiter, decimal, split[delimiter]) for delimiter, decimal in _CANDIDATES]
-    plain, worded = (
-        max((fit for fit in by if fit), key=lambda fit: fit[0], default=None) for by in zip(*fits, strict=True)
-    )
-    chosen = worded if plain is None or (worded is not None and worded[0][0] > 2 * plain[0][0]) else plain
-    return chosen and chosen[1]
+def _best_fit(encoding: str, lines: Sequence[str]) -> tuple[_Fit, _Fit | None] | None:
+    """Return the layout that fits lines best, with one that divides them otherwise and fits as well; None for none."""
+    fits = [_fits(lines, encoding, delimiter) for delimiter in _DELIMITERS]
+    plain, worded = ([fit for fit in by if fit] for by in zip(*fits, strict=True))
+    rows = max((fit.rows for fit in worded if fit.layout.delimiter in (";", "\t")), default=0)
+    worded = [fit for fit in worded if fit.layout.delimiter != "," or fit.rows > rows]  # commas may begin decimals
+    best, best_worded = (max(by, key=lambda fit: fit.score, default=None) for by in (plain, worded))
+    if best_worded is not None and (best is None or best_worded.rows > 2 * best.rows):
+        return best_worded, None
+    return best and (best, next((fit for fit in plain if best.is_rivalled_by(fit)), None))
 
 
 def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
@@ -190,44 +213,55 @@ def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
             raise LogError("log", actual, "a heading with its quotation marks closed", "", str(path))
 
 
-_Fit = tuple[tuple[int, bool, int], TextLayout] | None
-"""A layout, preceded by the quality of its fit: rows of numbers, whether the heading is as long as they, columns. None
-if it does not fit."""
+class _Fit(NamedTuple):
+    """A layout and how well it fits: rows of numbers, whether all columns have names, and columns.
 
-
-def _fits(
-    lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]
-) -> tuple[_Fit, _Fit]:
-    """Rate how well a delimiter and a decimal sign fit the lines of a text.
-
-    `rows` are the lines split by this delimiter. The first result accepts no words in rows of numbers, the second does.
-    Each is a score with the layout, or None if no row fits.
+    `grouped` is the first row in which a sign groups digits that delimits cells elsewhere; "" for none.
     """
-    numeric = [[is_number(cell, decimal) for cell in cells] for cells in rows]
 
-    def fit(words: bool) -> _Fit:
-        is_row = [_is_row(cells, numbers, decimal, words) for cells, numbers in zip(rows, numeric, strict=True)]
-        return _fit(lines, encoding, delimiter, decimal, rows, is_row)
+    rows: int
+    named: bool
+    columns: int
+    grouped: str
+    layout: TextLayout
+
+    @property
+    def score(self) -> tuple[int, bool, int]:
+        """Return what decides between layouts, most important first."""
+        return self.rows, self.named, self.columns
+
+    def is_rivalled_by(self, other: _Fit) -> bool:
+        """Tell whether another layout fits as well, and its numbers are others because of a sign that groups digits."""
+        divides_otherwise = other.columns != self.columns and bool(self.grouped or other.grouped)
+        as_well = self.columns == 1 or (other.columns > 1 and other.named == self.named)
+        return other.rows == self.rows and divides_otherwise and as_well
+
+
+def _fits(lines: Sequence[str], encoding: str, delimiter: str) -> tuple[_Fit | None, _Fit | None]:
+    """Rate how well a delimiter fits the lines of a text.
+
+    The first result accepts no words in rows of numbers, the second does. Each is None if no row fits.
+    """
+    rows = [split_line(line, delimiter) for line in lines]
+    numeric = [[is_number(cell) for cell in cells] for cells in rows]
+
+    def fit(words: bool) -> _Fit | None:
+        is_row = [_is_row(cells, numbers, words) for cells, numbers in zip(rows, numeric, strict=True)]
+        return _fit(lines, encoding, delimiter, rows, is_row) if any(is_row) else None
 
     return fit(words=False), fit(words=True)
 
 
-def _fit(
-    lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
-) -> _Fit:
-    """Rate a delimiter and a decimal sign, given which rows are numbers.
-
-    The result is a score with the layout: the number of such rows, whether all columns have names, the number of
-    columns. Returns None without any row of numbers.
-    """
-    if not any(is_row):
-        return None
+def _fit(lines: Sequence[str], encoding: str, delimiter: str, rows: list[list[str]], is_row: list[bool]) -> _Fit:
+    """Rate a delimiter, given which rows, of which there are some, are numbers."""
     first = next(i for i, row in enumerate(is_row) if row and _goes_on(is_row, rows, i))
     columns = Counter(len(cells) for cells in rows[first : first + 50] if any(cells)).most_common(1)[0][0]
     names, units = _headings(lines, first, columns, delimiter)
-    certain = decimal == "," or any("." in cell for cells in rows[first:] for cell in cells)
-    score = sum(is_row[first:]), all(names) and bool(names), columns
-    return score, TextLayout(encoding, delimiter, decimal, first, columns, names, units, tuple(lines[:first]), certain)
+    below = [i for i, row in enumerate(is_row) if row and i >= first]
+    grouped = next((lines[i] for i in below if any(map(_GROUPED.match, rows[i]))), "")
+    numbers = likely_format(cell for i in below for cell in rows[i])
+    form = TextLayout(encoding, delimiter, numbers, first, columns, names, units, tuple(lines[:first]))
+    return _Fit(len(below), all(names) and bool(names), columns, grouped, form)
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
@@ -252,11 +286,11 @@ def _headings(
     if not heads:
         return (), ()
     last = heads[-1]
-    bare = ["" if is_number(cell, ".") else cell.strip("[]()") for cell in last]  # single values beside a table
+    bare = ["" if is_number(cell) else cell.strip("[]()") for cell in last]  # single values beside a table
     cells = [cell for cell in bare if cell and cell != "-"]
     if len(heads) == 2 and cells and sum(is_unit(cell) for cell in cells) >= 0.5 * len(cells):
         return tuple(heads[0]), tuple(bare)
-    if 2 * sum(is_number(cell, ".") for cell in last) >= sum(map(bool, last)):
+    if 2 * sum(is_number(cell) for cell in last) >= sum(map(bool, last)):
         return (), ()  # a row of values with a word among them
     names, units = zip(*(split_heading(cell) for cell in last), strict=True)
     return tuple(names), tuple(units)

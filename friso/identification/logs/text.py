@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import mmap
 import re
-import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
+from friso.identification.logs.cells import read_cells
 from friso.identification.logs.channel import Channel, ChannelTable, unique
+from friso.identification.logs.number_format import as_floats, as_numbers, number_texts
 from friso.identification.logs.preamble import preamble
 from friso.identification.logs.roles import role_of
-from friso.identification.logs.sniff import CLOCK, DOS_END, ISO, STAMP, TextLayout, layout, split_line
+from friso.identification.logs.sniff import CLOCK, ISO, STAMP, TextLayout, layout, split_line
 from friso.identification.logs.units import unit_factor
 from friso.quantities import quoted
 
@@ -27,12 +26,9 @@ def read_text(path: Path) -> ChannelTable:
 
     Raises LogError, with the line, for ragged rows and for a text among the numbers.
     """
-    form = layout(path)
-    if not form.certain and form.delimiter != "," and _has_comma(path, form):
-        form = replace(form, decimal=",")
-    frame = read_frame(path, form)
+    form, frame = read_cells(path, layout(path))
     names = unique(list(form.names) or [f"column {i + 1}" for i in range(form.columns)])
-    heading = preamble(form.above, names, form.delimiter)
+    heading = preamble(form.above, names, form.delimiter, form.numbers.decimal)
     stated = form.units or [""] * len(names)
     units = [unit or heading.units.get(name, "") for unit, name in zip(stated, names, strict=True)]
     notes, columns = list(heading.read), []
@@ -64,65 +60,6 @@ def _such_as(cells: Any) -> str:
     return f", but texts such as {quoted(first[:40])}" if re.search(r"\d", first) else ""
 
 
-def read_frame(path: Path, form: TextLayout) -> Any:
-    """Read all cells from the first row of numbers on; columns without text are floats.
-
-    Lines before the table are skipped here, because pandas would take a lone quotation mark in them as opening. Raises
-    LogError for ragged rows.
-    """
-    options: dict[str, Any] = {
-        "header": None, "decimal": form.decimal,
-        "skip_blank_lines": False, "low_memory": False, "names": range(form.columns + 1),
-        "index_col": False, "sep": form.delimiter, "skipinitialspace": not form.exact,
-    }  # fmt: skip
-    if form.delimiter == " " and not form.exact:
-        options["sep"] = r"\s+"
-    try:
-        with path.open(encoding=form.encoding, errors="replace", newline="") as file:
-            for _ in range(form.first):
-                file.readline()
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", pd.errors.ParserWarning)  # pandas warns that cells are dropped
-                frame = pd.read_csv(_WithoutDosEnd(file), **options, on_bad_lines="error")  # pyright: ignore
-    except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
-        raise ragged(path, form, str(error)) from None
-    if frame.iloc[:, -1].notna().any():  # one cell more than columns: a row may end with a delimiter
-        raise ragged(path, form)
-    return frame.iloc[:, :-1]
-
-
-class _WithoutDosEnd:
-    """A text file without the end mark of DOS programs."""
-
-    def __init__(self, file: TextIO) -> None:
-        """Wrap a text file, from whose text the mark is removed."""
-        self._file = file
-
-    def read(self, size: int = -1) -> str:
-        """Read `size` characters (-1: all), without the mark."""
-        return self._file.read(size).replace(DOS_END, "")
-
-    def __iter__(self) -> Iterator[str]:
-        """Yield lines without the mark."""
-        return (line.replace(DOS_END, "") for line in self._file)
-
-
-def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
-    """Return the error for a line with too many cells, or an unclosed quotation mark.
-
-    Other errors of the parser are quoted in its own words.
-    """
-    with path.open(encoding=form.encoding, errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            cells = split_line(line.rstrip("\r\n"), form.delimiter) if number > form.first else []
-            if len(cells) > form.columns and any(cells[form.columns :]):
-                actual = f"{len(cells)} cells in line {number}"
-                return LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
-    if quote := re.search(r"EOF inside string starting at row (\d+)", why):
-        why = f"a quotation mark in line {form.first + 1 + int(quote[1])} that is not closed"
-    return LogError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
-
-
 def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
     """Check that no row lacks its last cells while later rows have them.
 
@@ -141,15 +78,6 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
                 raise LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
 
 
-def _has_comma(path: Path, form: TextLayout) -> bool:
-    """Tell whether a comma occurs anywhere in a file, from the first row of numbers on."""
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
-        at = 0
-        for _ in range(form.first):
-            at = bytes_.find(b"\n", at) + 1
-        return bytes_.find(b",", at) >= 0
-
-
 def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
     """Return a column's values, with "s" if they are time stamps; None for a column of texts.
 
@@ -162,12 +90,9 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
     present = cells.notna() & (texts != "")
     if texts[present].str.fullmatch(STAMP.pattern).all() and present.any():
         return _stamped(path, texts, present, form), "s"
-    texts = texts.where(~texts.str.lower().isin(("true", "false")), texts.str.lower().map({"true": "1", "false": "0"}))
-    texts = _ungrouped(texts, present, form.decimal)
-    points = texts.str.replace(",", ".", regex=False) if form.decimal == "," else texts
-    values = as_numbers(points.where(present))
+    values = as_floats(number_texts(cells), form.numbers)
     wrong = present.to_numpy() & np.isnan(values) & (texts.str.lower() != "nan").to_numpy()
-    if wrong.sum() > 0.5 * present.sum():
+    if wrong.sum() > 0.5 * present.sum() or not present.any():
         return None
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
@@ -175,26 +100,6 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
         actual = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
         raise LogError("log", actual, "numbers in every row", "", str(path))
     return values, ""
-
-
-def _ungrouped(texts: Any, present: Any, decimal: str) -> Any:
-    """Return texts without the signs that group thousands: 12.345,67.
-
-    All texts must be such numbers, and one must have a decimal sign too.
-    """
-    group = "." if decimal == "," else ","
-    digits = rf"[+-]?(?:\d{{1,3}}(?:\{group}\d{{3}})*|\d+)"
-    with_both = rf"[+-]?\d{{1,3}}(?:\{group}\d{{3}})+\{decimal}\d+"
-    stated = texts[present]
-    if not (stated.str.fullmatch(with_both).any() and stated.str.fullmatch(rf"{digits}(?:\{decimal}\d*)?").all()):
-        return texts
-    return texts.str.replace(group, "", regex=False)
-
-
-def as_numbers(texts: Any) -> np.ndarray:
-    """Return texts as floats, NaN for other texts."""
-    numbers: Any = pd.to_numeric(texts, errors="coerce")
-    return numbers.to_numpy(dtype=float)
 
 
 def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:

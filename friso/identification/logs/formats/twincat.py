@@ -14,10 +14,11 @@ import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
+from friso.identification.logs.cells import read_cells
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import LogFormat
-from friso.identification.logs.sniff import TextLayout, csv_cells, decoded_head, is_number
-from friso.identification.logs.text import as_numbers, read_frame
+from friso.identification.logs.number_format import as_floats, is_number, likely_format, number_texts
+from friso.identification.logs.sniff import TextLayout, csv_cells, decoded_head
 from friso.identification.logs.units import spelled
 from friso.quantities import quoted
 
@@ -57,14 +58,10 @@ def read_twincat(path: Path) -> ChannelTable:
     if first is None or names_at is None:
         raise LogError("log", "a TwinCAT Scope export without rows of numbers", "an export with data", "", str(path))
     table = {cells[0]: cells for cells in rows[names_at:first] if cells and cells[0]}
-    below = (cell for cells in rows[names_at:] for cell in cells)
-    sample = ";".join(cell for cell in below if is_number(cell, ",") or is_number(cell, "."))
-    decimal = "," if delimiter != "," and "," in sample else "."
-    if delimiter != "," and decimal == "." and "." not in sample:
-        decimal = ","  # whole numbers only so far: the export's locale writes a comma unless a point shows
     columns = max(len(table["Name"]), max(len(cells) for cells in rows[first : first + 50]))
-    form = TextLayout(encoding, delimiter, decimal, first, columns, exact=True)
-    frame = _without_end(read_frame(path, form))
+    numbers = likely_format(cell for cells in rows[first:] for cell in cells)
+    form, frame = read_cells(path, TextLayout(encoding, delimiter, numbers, first, columns, exact=True))
+    frame = _without_end(frame)
     channels, notes = _channels(path, form, table, frame)
     return ChannelTable(channels, {}, (f"format: TwinCAT Scope CSV, {form.in_words}", f"{len(frame)} rows", *notes))
 
@@ -77,7 +74,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
 def _is_data(cells: list[str]) -> bool:
     """Tell whether all cells of a row that are filled are numbers."""
     filled = [cell for cell in cells if cell]
-    return bool(filled) and all(is_number(cell, ",") or is_number(cell, ".") for cell in filled)
+    return bool(filled) and all(is_number(cell) for cell in filled)
 
 
 def _without_end(frame: Any) -> Any:
@@ -162,10 +159,9 @@ def _floats(path: Path, form: TextLayout, frame: Any, column: int) -> np.ndarray
     cells = frame.iloc[:, column]
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return cells.to_numpy(dtype=float)
-    texts = cells.astype(str).str.strip().str.replace(",", ".", regex=False)
-    present = (cells.notna() & (texts != "")).to_numpy()
-    values = as_numbers(texts)
-    wrong = np.flatnonzero(np.isnan(values) & present)
+    texts = number_texts(cells)
+    values = as_floats(texts, form.numbers)
+    wrong = np.flatnonzero(np.isnan(values) & (texts != "").to_numpy())
     if wrong.size:
         line = form.first + 1 + int(cells.index[wrong[0]])
         actual = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
