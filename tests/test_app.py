@@ -879,6 +879,18 @@ def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Serv
     assert served.ask("verdict", RIG, UNSTABLE)[-1]["notes"] == [first["text"]]
 
 
+def test_a_reference_that_keeps_moving_has_no_verdict(served: Served, tmp_path: Path) -> None:
+    """The word of the slider is that of the check; values that nobody knows are said beside it."""
+    sine = tmp_path / "sine.toml"
+    sine.write_text(Path(friso.example("motions/sine")).read_text(encoding="utf-8"), encoding="utf-8")
+    assert served.ask("verdict", sine)[-1]["verdict"] == "none"
+    guessed = tmp_path / "guessed.toml"
+    guessed.write_text(friso.load(RIG).replace({"unknown": "friction.static"}).to_toml(), encoding="utf-8")
+    answer = served.ask("verdict", guessed)[-1]
+    assert answer["verdict"] == served.ask("verdict", RIG)[-1]["verdict"]
+    assert any(note.startswith("If friction.static") for note in answer["notes"])
+
+
 # ---------------------------------------------------------------- overtaken
 
 
@@ -908,8 +920,11 @@ def test_what_is_compiled_is_told_to_those_that_wait_for_it_and_to_nobody_else(m
     built.set()
     for thread in threads:
         thread.join()
-    texts = [[part["text"] for part in parts if part.get("kind") == "message"] for parts in said]
+    messages = [[part for part in parts if part.get("kind") == "message"] for parts in said]
+    texts = [[part["text"] for part in parts] for parts in messages]
     assert texts == [["compiling, once on this machine, 1 of 1: a kernel of both"]] * 2 + [[]]
+    assert not any(part["lasts"] for parts in messages for part in parts)  # it goes from the page with the answer
+    assert not any(work.notes for work in works)
 
 
 def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> None:

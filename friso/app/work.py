@@ -100,7 +100,7 @@ class Work:
 class Messages(logging.Handler):
     """A log handler that sends each message to the question that caused it.
 
-    Messages stay on the page below the answer, except those on the compilation of kernels.
+    Messages stay on the page below the answer, except those marked as `passing`, such as that a kernel is compiled.
     """
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -108,7 +108,7 @@ class Messages(logging.Handler):
         work, text = ASKER.get(), record.getMessage()
         if not isinstance(work, Work):
             return
-        lasts = not record.name.startswith("friso.engine")
+        lasts = not getattr(record, "passing", False)
         if lasts:
             (work.meanwhile if getattr(record, "meanwhile", False) else work.notes).append(text)
         work.put({"kind": "message", "text": text, "lasts": lasts})
