@@ -14,7 +14,6 @@ from threading import TIMEOUT_MAX
 import pytest
 from hypothesis import settings
 from patched import patched
-from refusals import Refused, Wording
 from snapshots import Snapshots
 
 import friso
@@ -136,15 +135,3 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def snapshots(pytestconfig: pytest.Config) -> Snapshots:
     """Return the stored texts of commands, in tests/snapshots."""
     return Snapshots(bool(pytestconfig.getoption("--refresh-snapshots")))
-
-
-@pytest.fixture
-def refused(request: pytest.FixtureRequest, snapshots: Snapshots) -> Refused:
-    """Inputs that this test has refused."""
-    return Refused(request.node.nodeid.removeprefix("tests/"), snapshots)
-
-
-@pytest.fixture
-def wording(refused: Refused) -> Wording:
-    """Return a check of this test's warnings, reasons and sentences, stored with the messages."""
-    return refused.says

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from refusals import Refused, Wording
+from refusals import refused
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
 from friso.errors import InputError
@@ -389,13 +389,13 @@ def test_missing_table(table: str) -> None:
     assert others[1].split()[1] == f"[{table}]"
 
 
-def test_empty_masses(wording: Wording) -> None:
+def test_empty_masses() -> None:
     text = message(RIG.replace('cart  = "1.2 kg"', "").replace('stage = "0.5 kg"', ""))
     assert text.startswith("rig.toml: masses\n")
     wording(text)
 
 
-def test_parasitic_mode_needs_a_joint(wording: Wording) -> None:
+def test_parasitic_mode_needs_a_joint() -> None:
     start, end = RIG.index("\n[joint]"), RIG.index("\n[parasitic]")
     text = message(RIG[:start] + RIG[end:])
     assert text.startswith("rig.toml: parasitic\n")
@@ -443,7 +443,7 @@ def test_contents(content: bytes, expected: str, tmp_path: Path) -> None:
     assert expected in str(caught.value)
 
 
-def test_no_file_and_folder(tmp_path: Path, refused: Refused) -> None:
+def test_no_file_and_folder(tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match=r"missing\.toml\n  given:    no such file or directory\n  expected: a stage f"
     ):
@@ -490,12 +490,12 @@ def test_a_controller_in_another_form_replaces_that_of_the_file() -> None:
 
 
 @pytest.mark.parametrize("text", ["controller.crossover", "=12 Hz", "", " = 3"])
-def test_set_without_key_or_value(text: str, refused: Refused) -> None:
+def test_set_without_key_or_value(text: str) -> None:
     with refused():
         parse_set(text)
 
 
-def test_wrong_sections_from_python(refused: Refused) -> None:
+def test_wrong_sections_from_python() -> None:
     with refused("cart"):
         Masses(cart="3 m")  # pyright: ignore[reportArgumentType]
     masses = Masses(cart="3 kg")  # pyright: ignore[reportArgumentType]

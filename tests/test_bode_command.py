@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from inside import command_of, friso_inside
 from pages import Page
-from refusals import Refused
+from refusals import refused
 from snapshots import Snapshots
 
 import friso
@@ -499,7 +499,7 @@ def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
         ("1 Hz..2 Hz..3 Hz", "is not a unit", "convertible to Hz, rad/s or rpm"),
     ],
 )
-def test_frequencies_that_are_refused(text: str, shown: str, expected: str, refused: Refused) -> None:
+def test_frequencies_that_are_refused(text: str, shown: str, expected: str) -> None:
     with refused():
         command(RIG, frequencies=text)
 
@@ -513,7 +513,7 @@ def test_frequencies_that_are_refused(text: str, shown: str, expected: str, refu
         (["crossover"], None),
     ],
 )
-def test_overrides_that_are_refused(overrides: list[str], frequencies: str | None, refused: Refused) -> None:
+def test_overrides_that_are_refused(overrides: list[str], frequencies: str | None) -> None:
     with refused():
         command(RIG, set=overrides, frequencies=frequencies)
 
@@ -523,7 +523,7 @@ def test_half_the_sampling_frequency_itself_is_shown(tmp_path: Path, capsys: pyt
     assert capsys.readouterr().out.startswith("{")
 
 
-def test_a_folder_that_is_a_file_is_refused(tmp_path: Path, refused: Refused) -> None:
+def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     with refused():
         command(RIG, out=tmp_path / "taken")

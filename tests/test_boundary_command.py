@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from inside import friso_inside
 from pages import Page
-from refusals import Refused, Wording
+from refusals import refused
 from snapshots import Snapshots
 
 from friso.hunting import (
@@ -191,7 +191,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(
         (*CROSSOVER, "--out", str(RIG)),
     ],
 )
-def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple, refused: Refused) -> None:
+def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple) -> None:
     done = friso_inside(tmp_path, "boundary", RIG, *LOCKED, *arguments)
     assert done.returncode == 2
     refused.says(done.stderr)
@@ -278,7 +278,7 @@ def test_sentences_tell_what_becomes_of_a_cycle_as_the_key_rises(round_a_fold: D
     snapshots.check("boundary", "one key", "\n".join([answer, *changes, followed]))
 
 
-def test_an_unstable_loop_is_said_first(round_a_fold: Diagram, crossing: Plane, wording: Wording) -> None:
+def test_an_unstable_loop_is_said_first(round_a_fold: Diagram, crossing: Plane) -> None:
     high = replace(round_a_fold, unstable=np.array([False, True, True]))
     said = sentences(high, (MM,))[0]
     wording(said)
@@ -344,7 +344,7 @@ def met(crossing: Plane) -> Plane:
     return replace(crossing, curves=(flip, fold), meetings=meetings)
 
 
-def test_where_curves_meet_and_end_is_told(met: Plane, wording: Wording) -> None:
+def test_where_curves_meet_and_end_is_told(met: Plane) -> None:
     keys = (MM, ShownKey("controller.kp", "N/m"))
     first, second = sentences(met, keys)[1:3]
     assert "at both, the range ends" in first
@@ -388,7 +388,7 @@ def test_the_answer_tells_in_three_digits_where_a_curve_runs(crossing: Plane) ->
     assert "from joint.stroke = 1.12 mm, controller.kp = 1 N/m to" in said
 
 
-def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane, wording: Wording) -> None:
+def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane) -> None:
     """Hunting ends on a curve or between two stages, along the first key or else the second.
 
     Otherwise the corners are told.

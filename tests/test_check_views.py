@@ -30,7 +30,6 @@ from made_up import (
 )
 from pages import NAMESPACES, Page, packed_values
 from patched import patched
-from refusals import Wording
 from snapshots import Snapshots
 
 from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing
@@ -411,11 +410,11 @@ def changed_rows(before: dict[str, str | None], after: dict[str, str | None]) ->
     return "\n".join(f"{name}: {after[name]}" for name in differing)
 
 
-def test_rows_of_a_stage_that_hunts(wording: Wording) -> None:
+def test_rows_of_a_stage_that_hunts() -> None:
     wording(changed_rows(tabled(cannot_hunt()), tabled(hunts())))
 
 
-def test_rows_of_other_cycles(wording: Wording) -> None:
+def test_rows_of_other_cycles() -> None:
     pair = fake_cycle(symmetric=False, multiplier=1.0105)
     repels = fake_cycle(multiplier=-1.01)
     whole = hunts(hunting=fake_hunting(replace(pair, multiplier=-0.93, growth=np.nan)))
@@ -437,19 +436,19 @@ def test_the_time_constant_is_that_of_a_cycle_that_attracts() -> None:
     assert row not in tabled(settles(verdict="transient", hunting=repels))
 
 
-def test_windows_of_kicks(wording: Wording) -> None:
+def test_windows_of_kicks() -> None:
     many = tuple((i * 1e-3, i * 1e-3 + 5e-4) for i in range(1, 8))
     for windows in ((), ((1e-5, 0.1),), ((1e-5, 2e-3), (3e-3, 4e-3)), many):
         wording(changed_rows(tabled(hunts()), tabled(hunts(displacement=Kick(windows, (1e-5, 0.1))))))
 
 
-def test_kicks_that_were_given_up_are_told(wording: Wording) -> None:
+def test_kicks_that_were_given_up_are_told() -> None:
     lost = Kick((), (1e-5, 0.1), unknown=3)
     for kick in (lost, replace(lost, windows=((1e-3, 2e-3),))):
         wording(changed_rows(tabled(hunts()), tabled(hunts(displacement=kick))))
 
 
-def test_kicks_that_start_hunting_are_told_where_others_were_given_up(wording: Wording) -> None:
+def test_kicks_that_start_hunting_are_told_where_others_were_given_up() -> None:
     none = Kick((), (1e-5, 0.1), unknown=3)
     silent = hunts(verdict="bistable", displacement=none, push=none, moves=None, given_up=(CheckPart.STARTS,))
     wording(sentence(silent))
@@ -475,7 +474,7 @@ def test_what_a_check_leaves_open_for_its_work_goes_with_commands_that_go_on() -
         assert [command for command in commands if command in says] == (commands if given_up else [])
 
 
-def test_a_peak_count_that_contradicts_the_verdict_is_explained(wording: Wording) -> None:
+def test_a_peak_count_that_contradicts_the_verdict_is_explained() -> None:
     cases = ((hunts(), 0), (hunts(verdict="bistable"), 0), (settles(verdict="transient"), 8), (settles(), 0))
     for judgement, peaks in cases:
         wording(changed_rows(tabled(judgement, peaks=6), tabled(judgement, peaks=peaks)))
@@ -516,7 +515,7 @@ def test_no_conclusion_from_a_case_that_is_not_certain(locked: str, free: str) -
     assert conclusion({**cases, "free": uncertain(cases["free"])}) is None
 
 
-def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it(wording: Wording) -> None:
+def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it() -> None:
     """8 Hz: something attracts at 9.7496 Hz, nothing at 9.7984 Hz; 1.2 times that is rounded upward."""
     sure, unsure = (Margin(1.2187, 9.7496, certain, 1.2248) for certain in (True, False))
     for edge in (sure, unsure):
@@ -626,7 +625,7 @@ def test_an_edge_is_told_with_what_is_known_of_it() -> None:
     assert edge in changed_rows(tabled(settles()), tabled(settles(margin=rough)))
 
 
-def test_a_motion_that_does_not_break_the_stage_away_says_so(wording: Wording) -> None:
+def test_a_motion_that_does_not_break_the_stage_away_says_so() -> None:
     judgements = settles(), hunts(verdict="bistable")
     unmoved = [sentence(judgement, unmoved=True, largest_force=2.44) for judgement in judgements]
     wording("\n".join(unmoved))

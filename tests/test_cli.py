@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import xarray as xr
 from inside import friso_inside
-from refusals import Refused
+from refusals import refused
 
 import friso
 from friso.cli.app import _failed
@@ -219,7 +219,7 @@ def test_version() -> None:
         ["tune", RIG, "--only", "jont"],
     ],
 )
-def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, tmp_path: Path, refused: Refused) -> None:
+def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, tmp_path: Path) -> None:
     done = run(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     refused.says(done.stderr)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from inside import friso_inside
 from pages import Page
 from patched import patched
-from refusals import Refused, Wording
+from refusals import refused
 from snapshots import Snapshots
 
 from friso.equations.motion import Stand
@@ -153,7 +153,7 @@ def test_same_seed_same_machines(built: Stage, machines: Machines) -> None:
     assert len({*machines.keys["rail.seed"].tolist()}) == len({*machines.seeds.tolist()}) == 1000
 
 
-def test_a_drive_without_a_clock_gets_one(built: Stage, wording: Wording) -> None:
+def test_a_drive_without_a_clock_gets_one(built: Stage) -> None:
     machines = draw_machines(built.replace({"drive": None, "rail": None}), Correlations(), 20, 1)
     assert machines.stage.flat()["drive.sample_time"] == 50e-6
     assert any("50 us" in note for note in machines.notes)
@@ -499,7 +499,7 @@ def test_how_many_machines_miss_the_far_end_is_told(made_up: Comparison) -> None
     assert "to come to rest in the end" in too_late
 
 
-def test_standstill_is_compared_on_a_floor_only(made_up: Comparison, wording: Wording) -> None:
+def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
     settled = [
         replace(result, measures=replace(result.measures, settling=np.ones(COUNT))) for result in made_up.results
     ]
@@ -613,13 +613,13 @@ def test_ctrl_c_while_figures_are_drawn_waits_for_the_files(
         ["--set", 'drive.sample_time="20 ms"'],
     ],
 )
-def test_bad_input(tmp_path: Path, arguments: list[object], refused: Refused) -> None:
+def test_bad_input(tmp_path: Path, arguments: list[object]) -> None:
     done = friso_inside(tmp_path, "compare", EXAMPLE, *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     refused.says(done.stderr)
 
 
-def test_no_controller_no_comparison(built: Stage, refused: Refused) -> None:
+def test_no_controller_no_comparison(built: Stage) -> None:
     with refused("controller"):
         built.replace({"controller": {"kind": "pid"}})
 

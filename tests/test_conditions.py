@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from plain import under_conditions
-from refusals import Refused
+from refusals import refused
 from variants import CONDITIONS, VARIANTS
 
 import friso
@@ -66,6 +66,6 @@ def test_a_drive_as_built_moves_along_the_rail_whatever_the_place() -> None:
         ),
     ],
 )
-def test_conditions_that_cannot_be(changes: dict[str, object], key: str, refused: Refused) -> None:
+def test_conditions_that_cannot_be(changes: dict[str, object], key: str) -> None:
     with refused(key):
         VARIANTS["rigid"].replace(changes)

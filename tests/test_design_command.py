@@ -19,7 +19,7 @@ import typer
 from inside import command_of
 from pages import Page
 from patched import patched
-from refusals import Refused, Wording
+from refusals import refused
 from snapshots import Snapshots
 
 import friso
@@ -271,7 +271,7 @@ def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapsh
     snapshots.check("design", "isolator needed", "\n".join([first, step.title, *step.sentences]))
 
 
-def test_the_joint_is_held_below_the_static_friction(designed: Design, wording: Wording) -> None:
+def test_the_joint_is_held_below_the_static_friction(designed: Design) -> None:
     text = " ".join(joint_step(designed).sentences)
     allowed = 1 / (1.1 * 1.1)  # [N]: friction over the safety factor and the stiffness error
     for fact in ("no less than 1 N", "factor of 1.1", "error of 10 %", f"{allowed:.3g} N", "stroke of 1 mm"):
@@ -290,7 +290,7 @@ def test_edges_in_words(designed: Design, snapshots: Snapshots) -> None:
     snapshots.check("design", "edges", "\n".join(texts))
 
 
-def test_leaves_and_what_binds_them(designed: Design, wording: Wording) -> None:
+def test_leaves_and_what_binds_them(designed: Design) -> None:
     excess = np.array([0.985, 0.2, 0.1, 0.6, 0.99])
     tight = replace(designed.fitted.choice, excess=excess)
     designed = replace(designed, fitted=replace(designed.fitted, choice=tight))
@@ -356,7 +356,7 @@ def test_moves_that_swing_or_take_too_long(designed: Design, snapshots: Snapshot
     assert "4 moves" in " ".join(step.sentences)
 
 
-def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapshots, wording: Wording) -> None:
+def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapshots) -> None:
     off = np.arange(64) < 20
     locked = replace(designed.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
     other = replace(designed, verification=replace(designed.verification, locked=locked))
@@ -369,7 +369,7 @@ def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapsh
     assert "never" in brings(replace(designed, verification=replace(designed.verification, locked=never)))
 
 
-def test_laws_that_a_corner_loses_are_named(designed: Design, wording: Wording) -> None:
+def test_laws_that_a_corner_loses_are_named(designed: Design) -> None:
     other = replace(designed, lost={"dahl": [1, 2]})
     wording(headline(other)[-1][1])
     assert design_document(other)["friction_laws_lost_in_corners"] == {"dahl": [1, 2]}
@@ -454,9 +454,7 @@ def test_settling_ends_where_moves_do_not_rest(designed: Design) -> None:
 # ---------------------------------------------------------------- what is refused
 
 
-def test_no_design_says_what_to_relax(
-    no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture, wording: Wording
-) -> None:
+def test_no_design_says_what_to_relax(no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     with pytest.raises(typer.Exit) as left:
         command(RIG, SPEC, out=tmp_path / "out")
     shown = capsys.readouterr()
@@ -465,9 +463,7 @@ def test_no_design_says_what_to_relax(
     assert not (tmp_path / "out").exists()
 
 
-def test_no_design_as_a_document(
-    no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture, wording: Wording
-) -> None:
+def test_no_design_as_a_document(no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     with pytest.raises(typer.Exit):
         command(RIG, SPEC, out=tmp_path / "out", as_json=True)
     shown = capsys.readouterr()
@@ -481,7 +477,7 @@ def test_no_design_as_a_document(
     wording(shown.err)
 
 
-def test_no_single_relaxation(wording: Wording) -> None:
+def test_no_single_relaxation() -> None:
     wording(refusal(NoDesign("too tight")))
     many = refusal(NoDesign("too tight", RELAXED * 3))
     assert len(many.splitlines()) == 7
@@ -500,21 +496,19 @@ def test_relaxations_are_rounded_to_be_enough(value: float, larger: bool, expect
 
 
 @pytest.mark.parametrize("name", ["design.toml", "worst.toml"])
-def test_files_of_no_design_are_not_overwritten(
-    finished: list[str], tmp_path: Path, name: str, refused: Refused
-) -> None:
+def test_files_of_no_design_are_not_overwritten(finished: list[str], tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine")
     with refused():
         command(RIG, SPEC, out=tmp_path)
     assert (tmp_path / name).read_text() == "mine"
 
 
-def test_the_stage_that_is_read_is_not_overwritten(finished: list[str], folder: Path, refused: Refused) -> None:
+def test_the_stage_that_is_read_is_not_overwritten(finished: list[str], folder: Path) -> None:
     with refused():
         command(folder / "design.toml", SPEC, out=folder)
 
 
-def test_a_folder_that_is_a_file_is_refused(finished: list[str], tmp_path: Path, refused: Refused) -> None:
+def test_a_folder_that_is_a_file_is_refused(finished: list[str], tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     with refused():
         command(RIG, SPEC, out=tmp_path / "taken")
@@ -526,8 +520,6 @@ def test_overrides_are_of_the_stage(
     quick: None,
     spec: Path,
     caplog: pytest.LogCaptureFixture,
-    refused: Refused,
-    wording: Wording,
 ) -> None:
     command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
@@ -572,7 +564,6 @@ def test_a_specification_that_is_not_met_is_told(
     designed: Design,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture,
-    wording: Wording,
 ) -> None:
     """What exists is written all the same; the status is 2, and the message says what would be met."""
     hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]

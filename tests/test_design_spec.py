@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusals import Refused
+from refusals import refused
 
 import friso
 from friso.design_method.geometry import Geometry, Sheet, box, round_geometries, sheets
@@ -88,7 +88,7 @@ def test_what_is_refused(table: str, keys: dict[str, Any], words: str) -> None:
     assert caught.value.key.startswith(table)
 
 
-def test_a_missing_file_and_an_empty_one(tmp_path: Path, refused: Refused) -> None:
+def test_a_missing_file_and_an_empty_one(tmp_path: Path) -> None:
     with refused():
         load_spec(tmp_path / "none.toml")
     (tmp_path / "empty.toml").write_text("")
@@ -131,7 +131,7 @@ def test_the_typical_move_is_in_the_middle() -> None:
     assert move["motion.acceleration"] == pytest.approx(np.sqrt(10 * 100))
 
 
-def test_a_range_the_friction_law_does_not_have(rig: friso.Stage, refused: Refused) -> None:
+def test_a_range_the_friction_law_does_not_have(rig: friso.Stage) -> None:
     dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
     stage = rig.replace({"friction": dahl})
     with refused("friction.static"):
@@ -145,7 +145,7 @@ def test_a_range_the_friction_law_does_not_have(rig: friso.Stage, refused: Refus
         {"friction": {"model": "none"}},
     ],
 )
-def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any], refused: Refused) -> None:
+def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any]) -> None:
     with refused():
         prepared(rig.replace(change), load_spec(SPEC))
 

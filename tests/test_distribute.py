@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 from distributed import LocalCluster
 from distributed.security import Security
-from refusals import Refused
+from refusals import refused
 
 from friso.stage import Stage
 from friso.studies import execute
@@ -59,7 +59,7 @@ def authority(folder: Path) -> dict[str, str]:
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates")
 def test_a_scheduler_with_tls_is_reached_by_dask_s_configuration_alone(
-    tmp_path: Path, refused: Refused, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = authority(tmp_path)
     security = Security(require_encryption=True, **names)
@@ -144,18 +144,14 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
     xr.testing.assert_identical(stage, whole)
 
 
-def test_a_worker_with_another_friso_is_refused(
-    cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch, refused: Refused
-) -> None:
+def test_a_worker_with_another_friso_is_refused(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(execute, "equations_version", lambda: "9.9.9 (0123456789ab)")
     with refused() as error, connected(cluster.scheduler_address):
         pass
     assert "9.9.9 (0123456789ab)" in str(error.value)
 
 
-def test_a_worker_that_joins_later_with_another_friso_is_refused(
-    rig: Stage, cluster: LocalCluster, refused: Refused
-) -> None:
+def test_a_worker_that_joins_later_with_another_friso_is_refused(rig: Stage, cluster: LocalCluster) -> None:
     with connected(cluster.scheduler_address) as crew:
         crew.arguments["expected"] = "9.9.9 (0123456789ab)"
         with refused():
@@ -189,14 +185,14 @@ def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster)
         assert all(count == 1 for count in before.values())
 
 
-def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, refused: Refused) -> None:
+def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     with StudySettings(scheduler_timeout=0.3).in_use():
         for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
             with refused(), connected(address):
                 pass
 
 
-def test_a_scheduler_without_workers(refused: Refused) -> None:
+def test_a_scheduler_without_workers() -> None:
     with (
         LocalCluster(n_workers=0, dashboard_address=":0") as empty,
         refused(),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import Refused, Wording
+from refusals import refused
 from scipy.stats import beta
 
 import friso
@@ -202,7 +202,7 @@ def test_loops_of_draws_are_judged(rig: Stage) -> None:
     assert outcome.unstable.tolist() == [True, False]
 
 
-def test_document_rows_and_sentences(wording: Wording) -> None:
+def test_document_rows_and_sentences() -> None:
     shown = draws(made(6, 3, 1))
     document = json.loads(json.dumps(plain_json(draws_document(shown, "given")), allow_nan=False))
     verdicts = {"hunts": 6, "bistable": 0, "transient": 0, "settles": 3, "undecided": 1, "failed": 0}
@@ -240,7 +240,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 
 
 def test_check_draws(
-    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], wording: Wording
+    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Correlations come from the file beside the stage; a key made certain by --set drops out of them."""
     path = tmp_path / "stage.toml"
@@ -272,7 +272,7 @@ def test_check_draws(
     ],
 )
 def test_check_draws_refused(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], refused: Refused
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
 ) -> None:
     assert run(monkeypatch, "check", Path(__file__).parents[1] / "examples" / "thesis_rig.toml", *options) == 2
     shown = capsys.readouterr()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from inside import friso_inside
-from refusals import Refused
+from refusals import refused
 
 import friso
 from friso.errors import InputError
@@ -37,7 +37,7 @@ def test_keys_that_may_be_left_out_say_what_they_take(key: str, value: object, e
     assert "class" not in error.value.expected + error.value.example
 
 
-def test_leaf_springs_that_no_float_holds(refused: Refused) -> None:
+def test_leaf_springs_that_no_float_holds() -> None:
     with refused("flexure"):
         LEAVES.replace({"flexure.length": "1e-30 m"})
 
@@ -46,7 +46,7 @@ def test_leaf_springs_that_no_float_holds(refused: Refused) -> None:
     ("key", "value"),
     [("flexure.spacing", "1e200 m"), ("controller.crossover", "1e-300 Hz"), ("friction.static", "1e300 N")],
 )
-def test_values_that_no_machine_has(key: str, value: str, refused: Refused) -> None:
+def test_values_that_no_machine_has(key: str, value: str) -> None:
     """If squares of them overflowed, a check would end in a traceback."""
     with refused(key):
         LEAVES.replace({key: value})
@@ -65,7 +65,7 @@ def test_values_that_no_machine_has(key: str, value: str, refused: Refused) -> N
         f'{RIG}\n"a"{".a" * 10_000} = 1',
     ],
 )
-def test_what_is_too_long_or_too_deep(text: str, refused: Refused) -> None:
+def test_what_is_too_long_or_too_deep(text: str) -> None:
     with refused():
         loads(text)
 
@@ -97,7 +97,7 @@ def test_a_unit_in_other_capitals_is_recognised(unit: str, meant: str) -> None:
         ('"8 Hz"', "\u201c8 Hz\u201d", "\u201c"),
     ],
 )
-def test_the_line_is_shown_with_a_caret(old: str, new: str, below: str, refused: Refused) -> None:
+def test_the_line_is_shown_with_a_caret(old: str, new: str, below: str) -> None:
     with refused() as error:
         loads(RIG.replace(old, new))
     lines = str(error.value).splitlines()
@@ -151,7 +151,7 @@ def test_what_is_wrong_in_several_tables_is_told_at_once() -> None:
         "\xff",
     ],
 )
-def test_a_mapping_that_is_kept_is_checked_like_an_option(tmp_path: Path, text: str, refused: Refused) -> None:
+def test_a_mapping_that_is_kept_is_checked_like_an_option(tmp_path: Path, text: str) -> None:
     log = tmp_path / "log.csv"
     mapping.sidecar(log).write_text(text, encoding="utf-8")
     with refused():

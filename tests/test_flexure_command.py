@@ -16,7 +16,7 @@ import pytest
 import typer
 from inside import command_of
 from pages import Page
-from refusals import Refused, Wording
+from refusals import refused
 from snapshots import Snapshots
 
 import friso
@@ -185,7 +185,7 @@ def test_the_stroke_is_that_of_the_joint_unless_told(path: Path, capsys: pytest.
 
 
 def test_a_failure_of_the_beams_leaves_the_closed_forms(
-    broken: None, path: Path, capsys: pytest.CaptureFixture, wording: Wording
+    broken: None, path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     with pytest.raises(typer.Exit) as leave:
         command(path, as_json=True)
@@ -248,7 +248,7 @@ def test_models_that_differ_are_a_warning(models: BothModels) -> None:
     assert "+2" in text
 
 
-def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: Stage, wording: Wording) -> None:
+def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: Stage) -> None:
     sound = {"flexure.material": "stainless 1.4310", **MATERIAL}
     across = {"flexure.actuation_y": "20 mm"}
     alike, against = (
@@ -264,7 +264,7 @@ def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: S
     wording(" ".join(assumptions(against.stage)))
 
 
-def test_only_what_is_left_out_is_assumed(stage: Stage, wording: Wording) -> None:
+def test_only_what_is_left_out_is_assumed(stage: Stage) -> None:
     inputs = {f"flexure.{name}_x": "30 mm" for name in ("centre", "actuation", "sensor")} | {"flexure.load": "0 N"}
     inertia = {f"flexure.inertia_{axis}": "2e-4 kg*m^2" for axis in "xyz"}
     assert assumptions(stage.replace({**inputs, **inertia})) == []
@@ -420,7 +420,7 @@ def test_the_block_of_the_stage_has_its_moments_of_inertia(stage: Stage) -> None
 # ---------------------------------------------------------------- what is refused
 
 
-def test_a_stage_without_leaves_is_shown_a_table_that_works(refused: Refused) -> None:
+def test_a_stage_without_leaves_is_shown_a_table_that_works() -> None:
     with refused("flexure") as refused:
         command(RIG)
     table = refused.value.example
@@ -446,14 +446,12 @@ def test_strokes_that_are_refused(path: Path, stroke: str, shown: str, expected:
         command(path, stroke=stroke)
 
 
-def test_a_stroke_of_the_stage_file_is_refused_alike(path: Path, refused: Refused) -> None:
+def test_a_stroke_of_the_stage_file_is_refused_alike(path: Path) -> None:
     with refused("joint.stroke"):
         command(path, set=['joint.stroke="36 mm"'])
 
 
-def test_a_locked_joint_without_a_stroke_needs_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture, refused: Refused
-) -> None:
+def test_a_locked_joint_without_a_stroke_needs_one(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     file = tmp_path / "locked.toml"
     file.write_text(with_leaves().replace("locked = false", "locked = true").replace('stroke = "1 mm"\n', ""))
     with refused("--stroke"):
@@ -470,12 +468,12 @@ def test_a_locked_joint_without_a_stroke_needs_one(
         ["flexure.leaves=1"],
     ],
 )
-def test_overrides_that_are_refused(path: Path, overrides: list[str], refused: Refused) -> None:
+def test_overrides_that_are_refused(path: Path, overrides: list[str]) -> None:
     with refused():
         command(path, set=overrides)
 
 
-def test_an_unknown_material_names_the_nearest(tmp_path: Path, refused: Refused) -> None:
+def test_an_unknown_material_names_the_nearest(tmp_path: Path) -> None:
     file = tmp_path / "material.toml"
     start = LEAVES.index("young")
     file.write_text(with_leaves(LEAVES[:start] + 'material = "titanum"\n'))

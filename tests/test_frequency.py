@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 from scipy.linalg import expm
 from scipy.optimize import brentq
 from variants import VARIANTS
@@ -371,7 +371,7 @@ def test_a_long_delay_and_a_sharp_mode(rig: Stage, delay: str, crossover: float,
     assert loop_margins.abscissa == pytest.approx(growth, abs=0.005)
 
 
-def test_a_delay_too_long_is_refused(rig: Stage, refused: Refused) -> None:
+def test_a_delay_too_long_is_refused(rig: Stage) -> None:
     with refused("drive.delay"):
         bode(rig.replace({"drive.sample_time": "50 us", "drive.delay": "6 ms"}))
     with refused("drive.delay"):
@@ -386,7 +386,7 @@ def test_a_delay_is_lag(rig: Stage) -> None:
     assert (early, late) == (True, False)
 
 
-def test_the_sample_time_is_at_most_a_tenth_of_the_crossovers_period(rig: Stage, refused: Refused) -> None:
+def test_the_sample_time_is_at_most_a_tenth_of_the_crossovers_period(rig: Stage) -> None:
     with refused():
         rig.replace({"drive.sample_time": "50 ms", "controller.crossover": "10 Hz"})
 
@@ -444,7 +444,7 @@ def test_a_position_that_is_not_controlled_is_on_the_edge(rig: Stage, drive: dic
         assert limits(changed.flat()).stable == ()
 
 
-def test_a_controller_that_does_nothing_is_refused(rig: Stage, refused: Refused) -> None:
+def test_a_controller_that_does_nothing_is_refused(rig: Stage) -> None:
     with refused("controller"):
         bode(by_gains(rig, kp="0 N/m"))
 
@@ -556,7 +556,7 @@ def test_closed_loop_follows_its_reference(rig: Stage) -> None:
     assert abs(at[0, closed.input_labels.index("disturbance on cart")]) < 1e-6
 
 
-def test_linear_takes_states_that_the_stage_can_be_in(rig: Stage, refused: Refused) -> None:
+def test_linear_takes_states_that_the_stage_can_be_in(rig: Stage) -> None:
     with refused("case"):
         friso.linear(rig, friso.member(bias=5.0))
     with refused("case"):

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import plain
 import pytest
-from refusals import Refused
+from refusals import refused
 from scipy.integrate import solve_ivp
 from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains, lugre, stage, stribeck, van_dijk
 
@@ -276,6 +276,6 @@ def one_period(one: Stage) -> tuple[np.ndarray, np.ndarray]:
         lambda: single_harmonic(hunting(8.0), [], [1.0]),
     ],
 )
-def test_bad_input(ask: Callable[[], object], refused: Refused) -> None:
+def test_bad_input(ask: Callable[[], object]) -> None:
     with refused():
         ask()

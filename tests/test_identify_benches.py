@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from refusals import Wording
 from scipy import signal
 
 from friso.identification.response.analysis import visible
@@ -127,7 +126,7 @@ def test_leuven_realisations_share_their_damping(name: str) -> None:
     assert all(0 < estimate.low < estimate.high < 3 * estimate.value for estimate in (one, other))
 
 
-def test_leuven_departure_by_friction(wording: Wording) -> None:
+def test_leuven_departure_by_friction() -> None:
     model = leuven_model((1, 2))
     result = departure(leuven_response((1, 2), 0), model.predict)
     assert 1 < result.frequency.value < 4
@@ -170,7 +169,7 @@ def test_tokyo_modes() -> None:
     assert seen.words[-1].startswith("cart sliding")
 
 
-def test_tokyo_second_encoder_counts_the_other_way(wording: Wording) -> None:
+def test_tokyo_second_encoder_counts_the_other_way() -> None:
     fit = fit_two_mass(tokyo("theta_mx"), tokyo("theta_my"))
     assert fit.signs == (1.0, -1.0)
     wording("\n".join(fit.warnings))

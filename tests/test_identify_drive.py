@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-from refusals import Wording
-
 from friso import load
 from friso.identification.output_error.problem import why_continuous
 
@@ -18,7 +16,7 @@ def test_the_log_of_the_drive_itself_is_simulated_sampled() -> None:
     assert why_continuous(axis(), 0.99998e-3) == ""
 
 
-def test_a_log_at_another_rate_is_not_and_says_so(wording: Wording) -> None:
+def test_a_log_at_another_rate_is_not_and_says_so() -> None:
     wording(why_continuous(axis(), 2e-3))
 
 

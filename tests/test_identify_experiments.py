@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from machines import break_aways, creeping, drawn
 from numba import njit
-from refusals import Refused, Wording
+from refusals import refused
 from scipy.io import loadmat
 from scipy.signal import lfilter
 
@@ -137,7 +137,7 @@ def test_steps_hold_the_stiffness(rig: friso.Stage) -> None:
     assert np.median(widths) < 0.06
 
 
-def test_steps_without_noise_are_exact_with_and_without_reference(rig: friso.Stage, wording: Wording) -> None:
+def test_steps_without_noise_are_exact_with_and_without_reference(rig: friso.Stage) -> None:
     signals = stairs(rig, 2400.0, (1, 1, -1, -1))
     for leave_out in ((), ("reference",)):
         log = record("steps", DT, **{k: v for k, v in signals.items() if k not in leave_out})
@@ -186,7 +186,7 @@ def test_hysteresis_shows_in_steps(rig: friso.Stage) -> None:
     assert steps.hysteresis.value == pytest.approx(0.2, rel=0.05)
 
 
-def test_a_cart_that_creeps_is_told_and_does_not_matter(rig: friso.Stage, wording: Wording) -> None:
+def test_a_cart_that_creeps_is_told_and_does_not_matter(rig: friso.Stage) -> None:
     signals = stairs(rig, 2400.0, (1, 1, -1, -1))
     relative = signals["position"].copy()
     creep = low_pass(0.2 * signals["reference"], DT, 5.0)
@@ -218,7 +218,7 @@ def test_drifting_plateaus_of_few_samples_count_too() -> None:
     assert steps.stiffness.holds(2400)
 
 
-def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage, wording: Wording) -> None:
+def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage) -> None:
     signals = stairs(rig, 2400.0, (1, -1, 1, -1))
     quarter = 2 * round(2.0 / DT)
     swing = np.zeros_like(signals["position"])
@@ -232,7 +232,7 @@ def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage, wording: Wordin
     wording(few.stiffness.reason)
 
 
-def test_what_needs_no_more_force_to_move_shows_no_stiffness(rig: friso.Stage, wording: Wording) -> None:
+def test_what_needs_no_more_force_to_move_shows_no_stiffness(rig: friso.Stage) -> None:
     """A cart that is free, or a force of the wrong sign: no stiffness, and none to go on with."""
     signals = stairs(rig, 2400.0, (1, 1, -1, -1, 1, -1))
     noise = 0.05 * np.random.default_rng(3).standard_normal(len(signals["force"]))
@@ -319,7 +319,7 @@ def test_peaks_come_before_velocity_spikes_and_the_actuator_says_the_same(rig: f
     assert actuator.break_away_forward.value == pytest.approx(slips.break_away_forward.value, rel=0.02)
 
 
-def test_an_offset_of_the_sensor_drops_out_of_both_directions(rig: friso.Stage, wording: Wording) -> None:
+def test_an_offset_of_the_sensor_drops_out_of_both_directions(rig: friso.Stage) -> None:
     log = pulled(rig, 1e-3, np.random.default_rng(5))
     both = {role: np.concatenate([values, -values]) for role, values in log.signals.items()}
     both["relative_position"] = both["relative_position"] + 1e-4
@@ -340,7 +340,7 @@ def test_a_touched_limiter_gives_a_lower_bound_only(rig: friso.Stage) -> None:
         assert 2.3 < expected.static.low < 3.0
 
 
-def test_one_direction_alone_is_a_bound_where_the_other_shows_less(rig: friso.Stage, wording: Wording) -> None:
+def test_one_direction_alone_is_a_bound_where_the_other_shows_less(rig: friso.Stage) -> None:
     """If the limiter is touched in one direction, an offset of the position sensor stays half unknown."""
     free = pulled(rig, 0.7e-3, np.random.default_rng(6))
     touched = pulled(rig, 0.7e-3, np.random.default_rng(7), **{"joint.stroke": "1 mm"})
@@ -365,7 +365,7 @@ def test_motion_hidden_in_noise_widens_the_interval_downwards() -> None:
     assert slips.static.holds(flat["friction.static"])
 
 
-def test_what_shows_no_slips_says_so(refused: Refused, wording: Wording) -> None:
+def test_what_shows_no_slips_says_so() -> None:
     time = np.arange(0, 5, DT)
     rng = np.random.default_rng(0)
     log = record("slides", DT, position=0.01 * time, force=1 + 0.01 * rng.standard_normal(len(time)))
@@ -499,7 +499,7 @@ def test_an_integrator_that_winds_up_makes_no_ramps_from_none(rig: friso.Stage, 
     assert recognised(log, Path("log.csv"))[0] == "moves"
 
 
-def test_break_away_that_rises_with_the_rate_is_no_value(wording: Wording) -> None:
+def test_break_away_that_rises_with_the_rate_is_no_value() -> None:
     """A motion that is noticed 50 ms late: bristles break away lower at higher rates, never higher."""
     rng, rates = np.random.default_rng(5), np.repeat([1.0, 3.0, 10.0, 30.0], 4)
     forces = 3.0 + 0.05 * rates + rng.normal(0, 0.05, len(rates))
@@ -509,7 +509,7 @@ def test_break_away_that_rises_with_the_rate_is_no_value(wording: Wording) -> No
     wording(estimate.reason)
 
 
-def test_rates_that_are_too_high_are_told(wording: Wording) -> None:
+def test_rates_that_are_too_high_are_told() -> None:
     for rates in ([10.0, 10.0, 10.0, 20.0, 20.0, 20.0], [35.0] * 4):
         result = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(2)), 1.0)
         assert not result.static.determined
@@ -549,7 +549,7 @@ def test_a_step_of_the_force_behind_a_slow_rise_is_no_ramp() -> None:
     assert ramps.notes
 
 
-def test_break_aways_that_do_not_fall_with_the_rate_are_not_extrapolated(wording: Wording) -> None:
+def test_break_aways_that_do_not_fall_with_the_rate_are_not_extrapolated() -> None:
     rates = np.array([50.0, 50.0, 100.0, 100.0, 200.0, 200.0])
     forces = np.array([1.0, 1.01, 1.02, 1.0, 1.01, 1.0])
     friction = static_friction("friction.static", forces, rates)
@@ -580,7 +580,7 @@ def travels(speeds: list[float], profile: tuple[np.ndarray, np.ndarray], rng: np
     return record("travels", DT, position=position, force=force, reference=reference)
 
 
-def test_friction_velocity_map_without_slow_speeds(wording: Wording) -> None:
+def test_friction_velocity_map_without_slow_speeds() -> None:
     """Coulomb, viscous and bias come back; static friction and Stribeck velocity are said to be unseen."""
     friction = np.array([1.5, 1.0, 1e-3, 1e5, 316.2, 4.0])
     curve = friction_velocity(travels([0.02, 0.05, 0.1], FLAT, np.random.default_rng(1), friction=friction), 1.0)
@@ -703,7 +703,7 @@ def test_slow_passes_count_though_they_go_a_three_hundredth_of_the_speed() -> No
     assert np.allclose(np.sort(speeds)[::2], np.sort(speeds)[1::2], rtol=1e-3)  # there and back
 
 
-def test_an_exponent_that_the_forces_refute_is_not_believed(wording: Wording) -> None:
+def test_an_exponent_that_the_forces_refute_is_not_believed() -> None:
     log, truth = at_speeds(0)
     wrong = 2.0 if truth["stribeck_exponent"] < 1.3 else 0.7
     curve = friction_velocity(log, 0.0, wrong)
@@ -733,7 +733,7 @@ def test_the_exponent_of_constant_speeds_is_that_which_the_stage_file_states(sta
     assert ("of the stage" in names["friction.static"].method) == stated
 
 
-def test_one_speed_leaves_a_range(wording: Wording) -> None:
+def test_one_speed_leaves_a_range() -> None:
     curve = friction_velocity(travels([0.05, 0.05, 0.05], FLAT, np.random.default_rng(3)), 1.0)
     for item, truth in ((curve.both.coulomb, 1.0), (curve.both.viscous, 0.4)):
         assert not item.determined
@@ -768,7 +768,7 @@ def field(length: float, spread: float, rng: np.random.Generator) -> tuple[np.nd
     return places, np.clip(1 + spread * values, 0.3, None)
 
 
-def test_friction_that_varies_along_the_rail_repeats(wording: Wording) -> None:
+def test_friction_that_varies_along_the_rail_repeats() -> None:
     rng = np.random.default_rng(8)
     profile = field(3e-3, 0.15, rng)
     log = travels([0.02, 0.05], profile, rng, way=0.15)
@@ -795,7 +795,7 @@ def test_a_swinging_loop_is_not_the_friction_of_the_rail() -> None:
     assert passes.passes[0].harmonics[0].amplitude == pytest.approx(0.4, rel=0.2)
 
 
-def test_motion_that_sticks_shows_no_dynamic_friction(wording: Wording) -> None:
+def test_motion_that_sticks_shows_no_dynamic_friction() -> None:
     rng = np.random.default_rng(10)
     log = travels([2.5e-3], FLAT, rng, way=0.02, gains=np.array([2e3, 5.0]))
     passes = friction_position(log, 1.0)
@@ -804,7 +804,7 @@ def test_motion_that_sticks_shows_no_dynamic_friction(wording: Wording) -> None:
     assert len(friction_velocity(log, 1.0).unsteady) == 2
 
 
-def test_one_pass_shows_no_repeatability_and_a_slow_loop_does_not_follow(wording: Wording) -> None:
+def test_one_pass_shows_no_repeatability_and_a_slow_loop_does_not_follow() -> None:
     rng = np.random.default_rng(11)
     log = travels([0.05], field(3e-3, 0.15, rng), rng)
     half = record("one", DT, **{role: values[:2200] for role, values in log.signals.items()})
@@ -874,7 +874,7 @@ def test_passes_that_hardly_overlap_are_read_whole() -> None:
     assert high - low > 0.02
 
 
-def test_what_is_no_record_is_refused(refused: Refused) -> None:
+def test_what_is_no_record_is_refused() -> None:
     ones = np.ones(100)
     with refused("speed"):
         record("x", DT, speed=ones)
@@ -904,7 +904,7 @@ def test_short_and_still_records_show_nothing(length: int) -> None:
 
 
 @pytest.mark.parametrize("deviation", [0.1, 1.0, 10.0, 1e6])
-def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float, wording: Wording) -> None:
+def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float) -> None:
     """The interval is one of the logarithm; beyond a factor of 1000 it tells nothing, and does not overflow."""
     result = ResponseFit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
         "mass", "kg", "fit", lambda p: float(p[0]), positive=True

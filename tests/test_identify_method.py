@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Wording
 from scipy.ndimage import gaussian_filter1d
 
 import friso
@@ -169,7 +168,7 @@ def test_static_friction_moves_along_with_coulomb(base: Stage) -> None:
     assert {estimate.name: estimate.value for estimate in fit.estimates} == {COULOMB: 25.0, STATIC: 25.0}
 
 
-def test_static_friction_is_no_less_than_its_bound(base: Stage, wording: Wording) -> None:
+def test_static_friction_is_no_less_than_its_bound(base: Stage) -> None:
     stage = identified_stage(base, fitting(base, ODD["static at least"]).estimates, ["log"])
     assert stage.uncertain()[STATIC].low == 35.0
     fit = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from emps import emps_log
 from machines import drawn, moves
-from refusals import Refused, Wording
+from refusals import refused
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lsim
 
@@ -242,7 +242,7 @@ def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Identif
     assert simulated_log(result, silent).errors.force > 5 * errors.force
 
 
-def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, IdentifiedMoves], refused: Refused) -> None:
+def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
     _, log, result = quick
     bare = replace(log, signals={role: log[role] for role in ("position", "force")})
     with refused("reference"):
@@ -365,9 +365,7 @@ def fit_case(log: Log, fitted: OutputErrorFit, bandwidth: float, led: bool = Tru
 
 @pytest.mark.parametrize("behind", [False, True], ids=["position of the motor", "position of the load"])
 @pytest.mark.parametrize("rate", [25.0, 40.0])
-def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
-    rate: float, behind: bool, wording: Wording
-) -> None:
+def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(rate: float, behind: bool) -> None:
     """The mass is too large where a load swings behind the measured position, and too small where that is behind."""
     log = on_a_coupling(rate, behind)
     fitted, bandwidth = rigid(log)
@@ -391,7 +389,7 @@ def test_no_coupling_is_seen_where_there_is_none() -> None:
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
-def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, wording: Wording) -> None:
+def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float) -> None:
     """A mass seems heavier driven than braked; intervals of mass and friction reach over it."""
     plain = on_a_coupling(1e4, False)
     fitted, bandwidth = rigid(plain)
@@ -415,7 +413,7 @@ def with_force(log: Log, force: np.ndarray) -> Log:
 
 
 @pytest.mark.parametrize("effect", ["cogging", "friction-by-place", "drifting-delay", "play"])
-def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wording: Wording) -> None:
+def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str) -> None:
     """The right effect of those that the model leaves out comes first; none is named for a sound log."""
     plain = on_a_coupling(1e4, False)
     fitted, bandwidth = rigid(plain)
@@ -494,7 +492,7 @@ def test_first_estimates_are_told_before_the_whole_model_is_fitted() -> None:
     assert said[log.name]["mass"].low < sum(TWO_MASSES) < said[log.name]["mass"].high
 
 
-def test_a_force_in_coarse_digits_is_told(wording: Wording) -> None:
+def test_a_force_in_coarse_digits_is_told() -> None:
     plain = on_a_coupling(1e4, False)
     digit = 0.4 * FRICTION[0]
     log = replace(plain, signals={**plain.signals, "force": np.round(plain["force"] / digit) * digit})
@@ -505,7 +503,7 @@ def test_a_force_in_coarse_digits_is_told(wording: Wording) -> None:
 
 
 @pytest.mark.parametrize("late", [1, 3, -2])
-def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(late: int, wording: Wording) -> None:
+def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(late: int) -> None:
     """A force that acts some samples after it was logged, or before."""
     plain = on_a_coupling(1e4, False)
     log = replace(plain, signals={**plain.signals, "force": np.roll(plain["force"], -late)})
@@ -629,7 +627,7 @@ def test_emps_fits_better_than_the_inverse_model(identified: IdentifiedMoves, em
     assert identified.errors.force < errors_of(emps, identified.part, plain, 20.0).force
 
 
-def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves, wording: Wording) -> None:
+def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves) -> None:
     by_name = {estimate.name: estimate for estimate in identified.estimates}
     for name in ("friction.static", "friction.stribeck_velocity", *BRISTLES):
         assert not by_name[name].determined, name

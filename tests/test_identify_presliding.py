@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused, Wording
+from refusals import refused
 from rig_machines import EXAMPLE, built
 from scipy.integrate import solve_ivp
 from scipy.ndimage import gaussian_filter1d
@@ -160,7 +160,7 @@ def test_a_mode_of_the_structure_is_told_from_the_mass() -> None:
     assert expected.mass.value == pytest.approx(MASS, rel=1e-3)
 
 
-def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it(wording: Wording) -> None:
+def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it() -> None:
     bristles = bristles_from_presliding(shaken(noise=2e-9))
     assert bristles.stiffness.holds(STIFFNESS)
     assert bristles.damping.holds(DAMPING)
@@ -168,7 +168,7 @@ def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it(wording:
     wording(lost.stiffness.reason)
 
 
-def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> None:
+def test_what_a_log_cannot_show_is_told() -> None:
     slow = bristles_from_presliding(shaken(top=1, noise=1e-8))
     assert slow.stiffness.holds(STIFFNESS)
     assert slow.mass.holds(MASS)
@@ -185,7 +185,7 @@ def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> N
 
 
 @pytest.mark.parametrize("size", [2e-5, 5e-5, 1e-4])
-def test_sliding_is_not_taken_for_bristles(size: float, wording: Wording) -> None:
+def test_sliding_is_not_taken_for_bristles(size: float) -> None:
     """Most of the force is inertia then, which hides how little of the friction the model explains."""
     bristles = bristles_from_presliding(shaken(size=size))
     assert not bristles.stiffness.determined
@@ -234,7 +234,7 @@ def test_loops_before_sliding_close_under_gms_and_drift_under_lugre() -> None:
     assert drift["lugre"] > 2 * drift["gms"]  # the integrator moves the loop, too
 
 
-def test_friction_without_bristles_has_none_to_show(refused: Refused) -> None:
+def test_friction_without_bristles_has_none_to_show() -> None:
     stage = friso.load(EXAMPLE).replace({"friction": {"model": "none"}})
     with refused("friction.model"):
         run_experiment(stage, 1, silent)
@@ -249,7 +249,7 @@ def test_a_slow_current_loop_is_taken_off() -> None:
     assert bristles.mass.holds(1.7)
 
 
-def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness(wording: Wording) -> None:
+def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness() -> None:
     """If the deflection is measured, the joint need not be held.
 
     If not, the stiffness of the joint is not taken for that of the bristles. Cables pull at the stage, which then moves
@@ -299,7 +299,7 @@ def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
     assert np.median(widths) < 0.02
 
 
-def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that(wording: Wording) -> None:
+def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that() -> None:
     """However much of the sum is viscous friction."""
     viscous = DAMPING / 3
     log = shaken()

@@ -10,7 +10,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from refusals import Wording
 from scipy.signal import lfilter
 from variants import VARIANTS
 
@@ -340,7 +339,7 @@ def test_intervals_hold_only_values_that_keys_may_have() -> None:
     assert case.correlation.tolist() == [[1.0, 0.4], [0.4, 1.0]]
 
 
-def test_what_comes_out_negative_is_not_told_and_never_as_next_to_nothing(wording: Wording) -> None:
+def test_what_comes_out_negative_is_not_told_and_never_as_next_to_nothing() -> None:
     """A log of -7.8 N of Coulomb friction had "next to nothing", and a range from 0 down to -7.777 N."""
     negative = Estimate("friction.coulomb", "N", -7.8, -7.823, -7.777, "")
     case = judged_keys(key_case([negative], VARIANTS["rigid"].flat()))
@@ -414,7 +413,7 @@ def sentences(log: Log) -> str:
     return " ".join(cause.words for cause in causes_of(log))
 
 
-def test_a_delay_is_found(wording: Wording) -> None:
+def test_a_delay_is_found() -> None:
     log = axis()
     late = replace(log, signals={**log.signals, "force": np.roll(log["force"], 16)})
     (cause,) = causes_of(late)
@@ -443,7 +442,7 @@ def test_an_interval_spans_what_the_log_says_with_and_without_a_delay() -> None:
     assert fair.value == off.value
 
 
-def test_an_averaged_force_is_found_and_the_mass_behind_it(wording: Wording) -> None:
+def test_an_averaged_force_is_found_and_the_mass_behind_it() -> None:
     log = axis()
     late = np.convolve(log["force"], np.full(65, 1 / 65), "full")[: len(log.time)]
     filtered = replace(log, signals={**log.signals, "force": late})
@@ -455,7 +454,7 @@ def test_an_averaged_force_is_found_and_the_mass_behind_it(wording: Wording) -> 
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.02)
 
 
-def test_a_force_along_the_way_is_found(wording: Wording) -> None:
+def test_a_force_along_the_way_is_found() -> None:
     log = axis()
     force = log["force"] + 8 * np.sin(2 * np.pi * log["position"] / 0.15)
     uneven = replace(log, signals={**log.signals, "force": force})
@@ -465,7 +464,7 @@ def test_a_force_along_the_way_is_found(wording: Wording) -> None:
     assert cause.without.value("coulomb") == pytest.approx(COULOMB, rel=0.1)
 
 
-def test_a_feed_forward_that_is_not_logged_is_found(wording: Wording, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_feed_forward_that_is_not_logged_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     log = axis()
     ahead = np.roll(log["position"], -20)
     force = log["force"] - 4.0 * np.gradient(np.gradient(ahead, DT), DT)
@@ -498,7 +497,7 @@ def test_what_friction_does_to_a_servo_that_follows_well_is_no_missing_feedforwa
 
 
 @pytest.mark.parametrize("change", ["after", "above", "beyond", "none"])
-def test_a_controller_that_changes_its_gains_is_named(change: str, wording: Wording) -> None:
+def test_a_controller_that_changes_its_gains_is_named(change: str) -> None:
     """The reference of a PD servo, by its force, with gains of 0.6 times as much in a part of the record."""
     log, lag = axis(), 0.02
     position, speed, force = log["position"], np.abs(np.gradient(log["position"], DT)), log["force"]
@@ -534,7 +533,7 @@ def test_an_integral_that_stands_while_the_force_is_limited_is_no_change_of_gain
     assert not [*changing_gains.find(RecordCase(log, inverse_model(log)))]
 
 
-def test_a_force_that_is_cut_off_spoils_the_record(wording: Wording) -> None:
+def test_a_force_that_is_cut_off_spoils_the_record() -> None:
     log = axis()
     cut = replace(log, signals={**log.signals, "force": np.clip(log["force"], -15, 15)})
     cause = causes_of(cut)[-1]
@@ -569,7 +568,7 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
     assert fair.half_width <= viscous.half_width
 
 
-def test_a_record_in_pieces_says_how_little_is_fitted(wording: Wording) -> None:
+def test_a_record_in_pieces_says_how_little_is_fitted() -> None:
     log = axis()
     inverse = inverse_model(log, 5.0)
     assert not [*gaps.find(RecordCase(log, inverse))]
@@ -579,7 +578,7 @@ def test_a_record_in_pieces_says_how_little_is_fitted(wording: Wording) -> None:
 
 
 @pytest.mark.parametrize("what", ["a jump", "coarse digits"])
-def test_a_broken_record_says_what_is_broken(what: str, wording: Wording) -> None:
+def test_a_broken_record_says_what_is_broken(what: str) -> None:
     log = axis()
     position = np.where(log.time > 3, log["position"] - 0.05, log["position"])
     position = position if what == "a jump" else np.round(log["position"], 3)
@@ -587,7 +586,7 @@ def test_a_broken_record_says_what_is_broken(what: str, wording: Wording) -> Non
     wording(causes_of(broken)[0].words)
 
 
-def test_gravity_is_found(wording: Wording) -> None:
+def test_gravity_is_found() -> None:
     log = axis(offset=60.0)
     wording(sentences(log))
 
@@ -847,7 +846,7 @@ def _parameters(flat: dict[str, Any]) -> list[FitParameter]:
 # --- the stage file ---------------------------------------------------------------------------------------------------
 
 
-def test_every_key_says_where_it_comes_from(wording: Wording) -> None:
+def test_every_key_says_where_it_comes_from() -> None:
     log = axis()
     stage = made_up(log, inverse_model(log, 5.0))
     estimates = [

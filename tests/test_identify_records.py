@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusals import Refused
+from refusals import refused
 from test_identify_views import moves
 
 import friso
@@ -76,7 +76,7 @@ def test_each_stretch_between_gaps_is_integrated_from_0(tmp_path: Path) -> None:
     assert read["position"][999] == pytest.approx(log["position"][999] - log["position"][0], abs=DT**2)
 
 
-def test_a_velocity_is_not_integrated_beside_what_may_be_the_position(tmp_path: Path, refused: Refused) -> None:
+def test_a_velocity_is_not_integrated_beside_what_may_be_the_position(tmp_path: Path) -> None:
     log = axis()
     names, place = "time [s],velocity [m/s],qm [m]", log["position"]
     path = csv(tmp_path / "qm.csv", names, log.time, log["velocity"], place)
@@ -136,7 +136,7 @@ def test_what_needs_newtons_is_not_written_and_says_so(volts: tuple[Path, Identi
     assert "mass_v_s2_per_m" in document["experiments"][0]["inverse_model"]
 
 
-def test_a_stage_file_in_newtons_needs_a_scale(volts: tuple[Path, Identification], refused: Refused) -> None:
+def test_a_stage_file_in_newtons_needs_a_scale(volts: tuple[Path, Identification]) -> None:
     (experiment,) = volts[1].experiments
     with refused("force"):
         identify([(experiment.logs[0], "moves")], friso.load("examples/emps_axis.toml"))
@@ -145,7 +145,7 @@ def test_a_stage_file_in_newtons_needs_a_scale(volts: tuple[Path, Identification
 # --- a time in another unit -------------------------------------------------------------------------------------------
 
 
-def test_moves_that_end_before_a_stage_can_follow_them_are_refused(refused: Refused) -> None:
+def test_moves_that_end_before_a_stage_can_follow_them_are_refused() -> None:
     """Milliseconds taken for seconds."""
     log = axis()
     hasty = record("hasty", 1e-3 * DT, position=log["position"], force=log["force"])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from refusals import Refused, Wording
+from refusals import refused
 from scipy import signal
 from scipy.linalg import expm
 
@@ -85,7 +85,7 @@ def test_exact_period_and_whole_periods_from_the_end(before: int, after: int) ->
     assert periods.stop - periods.start == periods.count * 997
 
 
-def test_a_period_given_roughly_is_corrected_and_that_is_said(wording: Wording) -> None:
+def test_a_period_given_roughly_is_corrected_and_that_is_said() -> None:
     rng = np.random.default_rng(2)
     record = played(rng, rig, np.arange(1, 40))
     assert find_periods(record.input, 1004.0).samples == PERIOD
@@ -106,7 +106,7 @@ def test_a_record_that_is_constant_before_a_step_does_not_repeat() -> None:
         find_periods(np.repeat([0.0, 5.0], 2000))
 
 
-def test_what_does_not_repeat_is_refused(refused: Refused) -> None:
+def test_what_does_not_repeat_is_refused() -> None:
     with refused("period"):
         find_periods(np.random.default_rng(4).normal(size=4000))
     with refused("period"):
@@ -146,7 +146,7 @@ def test_noise_and_distortion_are_told_apart() -> None:
     assert np.sqrt(np.mean((result.deviation**2 - result.noise**2 - result.distortion**2) ** 2)) < 1e-12
 
 
-def test_one_realisation_says_that_distortion_is_unknown_unless_lines_are_free(wording: Wording) -> None:
+def test_one_realisation_says_that_distortion_is_unknown_unless_lines_are_free() -> None:
     rng = np.random.default_rng(7)
     full = multisine([played(rng, rig, np.arange(2, 60), noise=0.01)])
     assert np.isnan(full.distortion).all()
@@ -168,7 +168,7 @@ def test_a_transient_is_left_out_and_a_drift_does_not_matter() -> None:
     assert not any("transient" in text for text in multisine([record]).warnings)
 
 
-def test_realisations_that_do_not_belong_together_are_refused(refused: Refused) -> None:
+def test_realisations_that_do_not_belong_together_are_refused() -> None:
     rng = np.random.default_rng(9)
     one = played(rng, rig, np.arange(2, 60))
     with refused("records"):
@@ -226,12 +226,12 @@ def test_one_period_sampled_at_two_rates() -> None:
         lambda one: ResponseRecord(one.input[:5], one.output[:5], DT),
     ],
 )
-def test_bad_records_are_refused(spoilt: Callable[[ResponseRecord], ResponseRecord], refused: Refused) -> None:
+def test_bad_records_are_refused(spoilt: Callable[[ResponseRecord], ResponseRecord]) -> None:
     with refused():
         multisine([spoilt(played(np.random.default_rng(10), rig, np.arange(2, 60)))])
 
 
-def test_weak_lines_are_left_out_and_nothing_left_is_an_error(refused: Refused, wording: Wording) -> None:
+def test_weak_lines_are_left_out_and_nothing_left_is_an_error() -> None:
     rng = np.random.default_rng(11)
     result = multisine([played(rng, rig, np.arange(2, 200), noise=0.3)])
     strong = result.usable()
@@ -242,7 +242,7 @@ def test_weak_lines_are_left_out_and_nothing_left_is_an_error(refused: Refused, 
         multisine([ResponseRecord(record.input, rng.normal(size=6000), DT)]).usable(ratio=10)
 
 
-def test_other_forms_of_a_response(refused: Refused) -> None:
+def test_other_forms_of_a_response() -> None:
     result = multisine([played(np.random.default_rng(12), rig, np.arange(2, 60), noise=0.01)])
     assert result.accelerations().response == pytest.approx(-((2 * np.pi * result.frequency) ** 2) * result.response)
     assert result.accelerations().channels.output_unit == "m/s^2"
@@ -250,7 +250,7 @@ def test_other_forms_of_a_response(refused: Refused) -> None:
         result.between(400, 500)
 
 
-def test_a_log_becomes_a_record(refused: Refused) -> None:
+def test_a_log_becomes_a_record() -> None:
     one = played(np.random.default_rng(31), rig, np.arange(2, 60))
     signals = {"force": one.input, "position": one.output}
     parts = (slice(0, 100), slice(100, 6000))
@@ -339,7 +339,7 @@ def test_indirect_multisine_holds_the_truth() -> None:
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
 
-def test_feedback_is_noticed_and_not_imagined(wording: Wording) -> None:
+def test_feedback_is_noticed_and_not_imagined() -> None:
     rng = np.random.default_rng(18)
     loop = looped(rng, 8000, rng.normal(size=8000))
     wording(feedback(ResponseRecord(loop.input, loop.output, DT))[0])
@@ -428,7 +428,7 @@ def test_modes_and_their_intervals() -> None:
     assert min(held.values()) >= 35
 
 
-def test_the_number_of_modes_is_found_and_said(refused: Refused) -> None:
+def test_the_number_of_modes_is_found_and_said() -> None:
     def three(frequency: np.ndarray) -> np.ndarray:
         s = 2j * np.pi * frequency
         modes = ((11.0, 0.02, 0.4), (60.0, 0.01, 0.3))
@@ -479,7 +479,7 @@ def test_two_mass_intervals_hold_the_truth() -> None:
     assert min(held.values()) >= 53, held
 
 
-def test_two_mass_predicts_another_record_and_signs_are_told(refused: Refused, wording: Wording) -> None:
+def test_two_mass_predicts_another_record_and_signs_are_told() -> None:
     rng, lines = np.random.default_rng(26), np.arange(6, 80)
     first, second = (multisine([played(rng, lambda f, i=i: -rig(f, i), lines, noise=0.01)]) for i in (0, 1))
     fit = fit_two_mass(first, second, (3, 40))
@@ -574,7 +574,7 @@ def test_one_mass_without_a_joint_is_not_told_as_two() -> None:
         assert all(line.value.holds(mass) for line in bench.lines)
 
 
-def test_intervals_grow_where_realisations_scatter(refused: Refused) -> None:
+def test_intervals_grow_where_realisations_scatter() -> None:
     frequency, rng = np.arange(3.0, 40.0, 1.0), np.random.default_rng(27)
     softer = TRUE + np.array([0, 0, 0.2, *np.zeros(len(TRUE) - 3)])
     alike = [fit_two_mass(exact(rig, frequency, 0.01, rng)) for _ in range(2)]
@@ -594,7 +594,7 @@ def dragged(frequency: np.ndarray) -> np.ndarray:
     return 1 / (1.7 * s**2 + 8.0 * s + 20.0)
 
 
-def test_departure_from_the_mass_line(wording: Wording) -> None:
+def test_departure_from_the_mass_line() -> None:
     rng, frequency = np.random.default_rng(28), np.arange(0.2, 20, 0.2)
     response = exact(dragged, frequency, 0.05, rng)
     result = departure(response, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
@@ -637,7 +637,7 @@ def test_sliding_mass_against_its_closed_form() -> None:
 
 
 @pytest.mark.parametrize(("value", "factors"), [(0.0, (1.0,)), (0.1, (0.5, 2.0))])
-def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...], refused: Refused) -> None:
+def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...]) -> None:
     estimate = Estimate.normal("x", "N", value, 0.01, "")
     drag = Drag(estimate, estimate, estimate, estimate, 1.0, 1.0, 0.1, ())
     response = exact(dragged, np.arange(1.0, 30), 0.05, None)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from inside import friso_inside
-from refusals import Refused
+from refusals import refused
 from test_identify_experiments import LUGRE, ramps
 from test_identify_records import axis, csv
 from test_rotary_axis import LENGTHS, texts
@@ -124,7 +124,7 @@ def test_a_stage_around_a_rotary_log_is_one_of_a_rotary_axis() -> None:
     assert bends(turned.axis_kind)[1] > settings.longest_bristle_bend
 
 
-def test_logs_and_stage_are_of_one_kind_of_axis(refused: Refused) -> None:
+def test_logs_and_stage_are_of_one_kind_of_axis() -> None:
     log = axis()
     assert axis_of_all([replace(log, axis=ROTARY)], None) == ROTARY
     with refused("--axis"):
@@ -133,13 +133,13 @@ def test_logs_and_stage_are_of_one_kind_of_axis(refused: Refused) -> None:
         axis_of_all([replace(log, axis=ROTARY)], friso.load("examples/emps_axis.toml"))
 
 
-def test_forces_of_all_logs_are_in_one_unit(refused: Refused) -> None:
+def test_forces_of_all_logs_are_in_one_unit() -> None:
     log = axis()
     with refused("force"):
         axis_of_all([log, replace(log, name="other", axis=LINEAR.per("A"))], None)
 
 
-def test_a_kind_of_axis_that_is_none_is_refused(tmp_path: Path, refused: Refused) -> None:
+def test_a_kind_of_axis_that_is_none_is_refused(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     sidecar(log).write_text(mapping_text(Mapping(axis="round")))
     with refused("--axis"), pytest.MonkeyPatch.context() as patch:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from refusals import Refused
+from refusals import refused
 from test_identify_experiments import DT, FLAT, LUGRE, ramps, travels
 
 import friso
@@ -154,7 +154,7 @@ def axis() -> Stage:
     return friso.load("examples/emps_axis.toml")
 
 
-def test_a_controller_of_its_own(axis: Stage, refused: Refused) -> None:
+def test_a_controller_of_its_own(axis: Stage) -> None:
     """Another gain takes its place among the others; a controller of another form replaces the stage's whole."""
     log = record("moves", 1e-3, position=np.arange(100.0), force=np.arange(100.0))
     gain = as_set_up(axis, replace(log, setup={"controller.kp": "1e6 N*s/m"}))
@@ -173,7 +173,7 @@ def test_a_controller_of_its_own(axis: Stage, refused: Refused) -> None:
         as_set_up(axis, replace(log, setup={"controller.kpp": "1e6 N*s/m"}))
 
 
-def test_predictions_that_cannot_be_made_are_refused_before_the_fit(axis: Stage, refused: Refused) -> None:
+def test_predictions_that_cannot_be_made_are_refused_before_the_fit(axis: Stage) -> None:
     signals = {"position": np.arange(100.0), "force": np.arange(100.0)}
     bare, moved = record("bare", 1e-3, **signals), record("moved", 1e-3, reference=np.arange(100.0), **signals)
     check_predictions([(moved, "moves")], [moved], axis)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusals import Refused, Wording
+from refusals import refused
 from rig_machines import EXAMPLE, built
 
 import friso
@@ -141,7 +141,7 @@ def reason(log: Log, bristles: MassOnBristles | None = KNOWN) -> str:
 
 
 @pytest.mark.thorough
-def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> None:
+def test_what_a_log_cannot_show_is_told() -> None:
     assert "--as presliding" in reason(sliding(), None)
     assert "delay" in stribeck_from_slow_sliding(sliding(), replace(THERE, delay=None), KNOWN).estimates[0].reason
     short = record("x", DT, **{role: signal[:1500] for role, signal in sliding().signals.items()})
@@ -159,7 +159,7 @@ def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> N
         stribeck_from_slow_sliding(record("x", DT, position=np.zeros(9000)), THERE, KNOWN)
 
 
-def test_level_friction_shows_its_level_alone(wording: Wording) -> None:
+def test_level_friction_shows_its_level_alone() -> None:
     sliding_fit = stribeck_from_slow_sliding(sliding(coulomb=STATIC), THERE, KNOWN)
     coulomb, static, stribeck = sliding_fit.estimates
     assert coulomb.value == pytest.approx(STATIC, rel=0.02)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import Refused
+from refusals import refused
 
 import friso
 from friso.identification.experiments.hunting import PredictedCycle, swings_of
@@ -51,7 +51,7 @@ def test_a_log_of_standstill_with_its_force_is_told_how_to_go_on(tmp_path: Path)
         friso.identify([log])
 
 
-def test_a_log_without_cycles_is_refused(refused: Refused) -> None:
+def test_a_log_without_cycles_is_refused() -> None:
     with refused():
         swings_of(made("rests", np.linspace(1e-4, 0.0, 5000)))
 

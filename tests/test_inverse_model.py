@@ -10,7 +10,7 @@ import pytest
 from emps import emps_log
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 
 from friso.errors import InputError
 from friso.identification.inverse_model import bandwidth_of, inverse_model
@@ -160,7 +160,7 @@ def test_the_cart_of_a_joint_has_the_friction() -> None:
     assert inverse_model(both, 10.0).value("mass") != pytest.approx(2.0, rel=0.02)
 
 
-def test_too_little_motion_is_refused(refused: Refused) -> None:
+def test_too_little_motion_is_refused() -> None:
     log = swinging(2.0, 1.0, 4.0, 0.5, seconds=0.3)
     with refused("position"):
         inverse_model(log, 4.0)

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from inside import friso_inside
-from refusals import Wording
 from variants import VARIANTS, gains, lugre, release, stage
 
 from friso.questions.check.laws import laws_document, laws_rows, laws_sentences
@@ -50,7 +49,7 @@ def across(*verdicts: LawVerdict) -> VerdictsByLaw:
     return VerdictsByLaw(RIGID, verdicts, {"dahl": ("static",)})
 
 
-def test_one_verdict_under_all_laws(wording: Wording) -> None:
+def test_one_verdict_under_all_laws() -> None:
     laws = across(under("lugre", ("hunts", 9.7)), under("gms", ("hunts", 9.1), ("hunts", 10.4)))
     assert laws.hunts("given") is True
     wording(" ".join(laws_sentences(laws)))
@@ -61,7 +60,7 @@ def test_one_verdict_under_all_laws(wording: Wording) -> None:
     assert rows["As given: edge"] == ["9.70 Hz", "9.10 to 10.4 Hz"]
 
 
-def test_laws_that_disagree(wording: Wording) -> None:
+def test_laws_that_disagree() -> None:
     """The measurement that separates the fewer laws from the others is named.
 
     No measurement separates LuGre from all others.
@@ -82,20 +81,20 @@ def test_laws_that_disagree(wording: Wording) -> None:
     assert document["laws"]["rolling"]["verdicts"] == ["settles"]
 
 
-def test_a_stage_that_can_hunt_but_settles_after_this_move_does_not_hunt_for_sure(wording: Wording) -> None:
+def test_a_stage_that_can_hunt_but_settles_after_this_move_does_not_hunt_for_sure() -> None:
     laws = across(under("lugre", ("bistable", 9.7)), under("elasto_plastic", ("hunts", 9.1)))
     assert laws.hunts("given") is True
     wording(" ".join(laws_sentences(laws)))
 
 
-def test_a_verdict_that_hangs_on_what_is_open_in_a_law(wording: Wording) -> None:
+def test_a_verdict_that_hangs_on_what_is_open_in_a_law() -> None:
     laws = across(under("lugre", ("hunts", 9.7)), under("gms", ("hunts", 9.1), ("settles", 7.0)))
     assert laws.verdicts[1].hunts("given") is None
     assert laws.deciding("given") == [friction_law("gms").decided_by["friction.attraction"]]
     wording(laws_sentences(laws)[0])
 
 
-def test_failed_runs_leave_it_open(wording: Wording) -> None:
+def test_failed_runs_leave_it_open() -> None:
     laws = across(under("lugre", ("failed", None)))
     assert laws.hunts("given") is None
     assert not laws.depends_on_law("given")
@@ -104,7 +103,7 @@ def test_failed_runs_leave_it_open(wording: Wording) -> None:
 
 
 @pytest.mark.parametrize("verdict", [("settles", 6.0, False), ("hunts", 6.0, False), ("failed", None)])
-def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple, wording: Wording) -> None:
+def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple) -> None:
     laws = across(under("lugre", ("settles", 6.0)), under("rolling", ("settles", 6.1)), under("gms", verdict))
     assert laws.hunts("given") is None
     assert laws.uncertain("given") == ["gms"]
@@ -115,7 +114,7 @@ def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple, w
     assert (document["hunts"], document["depends_on_law"], document["not_certain"]) == (None, False, ["gms"])
 
 
-def test_laws_that_certainly_disagree_do_so_beside_one_that_is_not_certain(wording: Wording) -> None:
+def test_laws_that_certainly_disagree_do_so_beside_one_that_is_not_certain() -> None:
     laws = across(
         under("lugre", ("hunts", 9.7)), under("rolling", ("settles", 6.0)), under("gms", ("settles", 7.0, False))
     )
@@ -123,13 +122,13 @@ def test_laws_that_certainly_disagree_do_so_beside_one_that_is_not_certain(wordi
     wording(laws_sentences(laws)[0])
 
 
-def test_no_law_is_certain(wording: Wording) -> None:
+def test_no_law_is_certain() -> None:
     laws = across(under("lugre", ("settles", 6.0, False)), under("gms", ("hunts", 6.0, False)))
     assert (laws.hunts("given"), laws.depends_on_law("given")) == (None, False)
     wording(laws_sentences(laws)[0])
 
 
-def test_a_law_that_is_certain_with_some_of_what_is_open(wording: Wording) -> None:
+def test_a_law_that_is_certain_with_some_of_what_is_open() -> None:
     """Measuring an open parameter may exclude the values with which the law is uncertain."""
     laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0), ("settles", 7.1, False)))
     assert laws.hunts("given") is None
@@ -137,7 +136,7 @@ def test_a_law_that_is_certain_with_some_of_what_is_open(wording: Wording) -> No
     wording(laws_sentences(laws)[0])
 
 
-def test_no_law_that_gives_one_answer(wording: Wording) -> None:
+def test_no_law_that_gives_one_answer() -> None:
     """The text says nothing of the stage before the first law; values that differ are printed differently."""
     gms = under("gms", ("hunts", 9.1), ("settles", 7.0))
     (key,), trials = gms.conversion.open, gms.trials
@@ -145,7 +144,7 @@ def test_no_law_that_gives_one_answer(wording: Wording) -> None:
     wording(laws_sentences(across(replace(gms, trials=close)))[0])
 
 
-def test_edges_that_were_given_up_are_not_told_as_absent(wording: Wording) -> None:
+def test_edges_that_were_given_up_are_not_told_as_absent() -> None:
     lost = ("settles", None, True, True, ("other bandwidths",))
     laws = across(under("lugre", ("settles", None)), under("gms", lost))
     wording(laws_sentences(laws)[0])
@@ -166,7 +165,7 @@ def test_edges_as_factors_that_look_the_same_are_one_number() -> None:
     assert "edge at 2 times the bandwidth." in laws_sentences(replace(gains, verdicts=(laws.verdicts[0], several)))[0]
 
 
-def test_an_edge_that_is_not_certain_says_so(wording: Wording) -> None:
+def test_an_edge_that_is_not_certain_says_so() -> None:
     laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0, True, False)))
     wording(laws_sentences(laws)[0])
     assert dict(laws_rows(laws))["As given: edge"] == ["6.00 Hz", "7.00 to 9.33 Hz (not certain)"]

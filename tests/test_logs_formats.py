@@ -18,7 +18,7 @@ import psutil
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from refusals import Refused, Wording
+from refusals import refused
 from scipy.io import savemat
 from systems import posix
 
@@ -54,7 +54,7 @@ def check_motion(table: ChannelTable, unit: str = "mm", scale: float = 1e3) -> N
     ("delimiter", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")]
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252"])
-def test_text_in_any_writing(tmp_path: Path, delimiter: str, decimal: str, encoding: str, wording: Wording) -> None:
+def test_text_in_any_writing(tmp_path: Path, delimiter: str, decimal: str, encoding: str) -> None:
     path = log_files.write_text(
         tmp_path / "a.csv", HEADING, COLUMNS, delimiter, decimal, encoding, "Prüfstand 3\nµ = 1\n"
     )
@@ -314,7 +314,7 @@ def test_any_numbers_come_back(tmp_path: Path, rows: list[tuple[float, ...]], wr
 @pytest.mark.parametrize(
     ("delimiter", "full"), [*itertools.product(["\t", ";", ","], [True, False]), (":", True), (" ", True)]
 )
-def test_twincat_groups_end_at_different_rows(tmp_path: Path, delimiter: str, full: bool, wording: Wording) -> None:
+def test_twincat_groups_end_at_different_rows(tmp_path: Path, delimiter: str, full: bool) -> None:
     slow = np.sin(np.arange(100) * 4e-3)
     groups = [
         (1.0, [("ActPos", "mm (Length)", M["position"] * 1e3), ("ActVelo", "", M["velocity"])]),
@@ -335,7 +335,7 @@ def test_twincat_groups_end_at_different_rows(tmp_path: Path, delimiter: str, fu
 
 
 @pytest.mark.parametrize("delimiter", ["\t", " "])
-def test_twincat_rows_that_have_shifted(tmp_path: Path, delimiter: str, refused: Refused) -> None:
+def test_twincat_rows_that_have_shifted(tmp_path: Path, delimiter: str) -> None:
     """Without the empty cells of a group that has ended, those behind it would be read as its own."""
     groups = [
         (4.0, [("ActTorque", "%", np.sin(np.arange(100) * 4e-3))]),
@@ -396,7 +396,7 @@ def test_mat_73(tmp_path: Path) -> None:
     assert any("result (timeseries)" in line and "structure with time" in line for line in table.read)
 
 
-def test_mat_with_objects_only(tmp_path: Path, refused: Refused) -> None:
+def test_mat_with_objects_only(tmp_path: Path) -> None:
     path = log_files.write_mat73(tmp_path / "a.mat", {})
     with refused("log"):
         read_table(path)
@@ -566,7 +566,7 @@ def test_a_log_is_no_frequency_response(tmp_path: Path) -> None:
         "f [Hz],Re [m/N],Im [m/V]\n1,2,3\n2,2,3\n3,2,3\n",
     ],
 )
-def test_bad_frequency_responses(tmp_path: Path, text: str, refused: Refused) -> None:
+def test_bad_frequency_responses(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.csv").write_text(text)
     with refused():
         read_frequency_response(tmp_path / "a.csv")
@@ -592,7 +592,7 @@ def test_bad_frequency_responses(tmp_path: Path, text: str, refused: Refused) ->
         b"Name\trig\nStarttime of export\t1\n\nName\tpos\n\n0\t1\n1\t2\n2\tx\n3\t4\n4\t4\n",
     ],
 )
-def test_bad_files_end_in_one_message(tmp_path: Path, content: bytes, refused: Refused) -> None:
+def test_bad_files_end_in_one_message(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.log").write_bytes(content)
     with refused("log") as caught:
         read_table(tmp_path / "a.log")
@@ -605,16 +605,14 @@ def test_a_line_that_does_not_end_is_a_text(tmp_path: Path) -> None:
         read_table(tmp_path / "a.csv")
 
 
-def test_missing_files_and_folders(tmp_path: Path, refused: Refused) -> None:
+def test_missing_files_and_folders(tmp_path: Path) -> None:
     with refused("log"):
         read_table(tmp_path / "none.csv")
     with refused("log"):
         read_table(tmp_path)
 
 
-def test_a_file_too_large_is_refused_with_its_size(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
-) -> None:
+def test_a_file_too_large_is_refused_with_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading, "decoded_head", lambda path: pytest.fail("read before it was refused"))
     with (tmp_path / "big.csv").open("wb") as file:
         file.truncate(10 * 2**30)
@@ -628,7 +626,7 @@ def test_format_by_content_not_by_name(tmp_path: Path) -> None:
     assert file_format(tmp_path / "a.csv") == "mat"
 
 
-def test_a_matrix_is_a_channel_per_column(tmp_path: Path, wording: Wording) -> None:
+def test_a_matrix_is_a_channel_per_column(tmp_path: Path) -> None:
     both = np.stack([M["position"], M["force"]], axis=1)
     savemat(tmp_path / "old.mat", {"y": both, "image": np.zeros((90, 80))})
     log_files.write_mat73(tmp_path / "new.mat", {"y": both.T})  # HDF5 holds MATLAB's arrays transposed
@@ -640,7 +638,7 @@ def test_a_matrix_is_a_channel_per_column(tmp_path: Path, wording: Wording) -> N
 
 
 @pytest.mark.parametrize("way", ["link", "storage", "virtual", "link in a group", "link to a link", "reference"])
-def test_values_in_another_file_are_not_read(tmp_path: Path, way: str, refused: Refused) -> None:
+def test_values_in_another_file_are_not_read(tmp_path: Path, way: str) -> None:
     """A file may name any other one of the system as the place of its values."""
     import h5py
 
@@ -680,7 +678,7 @@ def zeros_as_mat(path: Path, count: int) -> None:
 
 
 @pytest.mark.skipif(not LIMITS_MEMORY, reason="this system does not hold a process to an amount of memory")
-def test_a_file_that_swells_is_an_error_of_its_own(tmp_path: Path, refused: Refused) -> None:
+def test_a_file_that_swells_is_an_error_of_its_own(tmp_path: Path) -> None:
     with LogSettings(memory_of_reading=400 << 20).in_use():
         zeros_as_mat(tmp_path / "small.mat", 1000)
         assert channel(read_table(tmp_path / "small.mat"), "x").values.shape == (1000,)
@@ -700,7 +698,7 @@ def endless_mat(path: Path) -> None:
         file.create_dataset("x", data=[below.ref], dtype=h5py.ref_dtype)
 
 
-def test_a_file_that_never_ends_is_an_error_of_its_own(tmp_path: Path, refused: Refused) -> None:
+def test_a_file_that_never_ends_is_an_error_of_its_own(tmp_path: Path) -> None:
     endless_mat(tmp_path / "a.mat")
     with refused("log"), LogSettings(time_of_reading=3.0).in_use():
         read_table(tmp_path / "a.mat")
@@ -727,7 +725,7 @@ def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monk
         read_table(tmp_path / "b.mat")
 
 
-def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path, refused: Refused) -> None:
+def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path) -> None:
     """The library's reader recurses once per level and dies by a signal."""
     log_files.cells_in_cells_as_mat(tmp_path / "a.mat", 200_000)
     assert (tmp_path / "a.mat").stat().st_size < 30_000
@@ -735,7 +733,7 @@ def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path, refused
         read_table(tmp_path / "a.mat")
 
 
-def test_an_array_that_no_disk_holds(tmp_path: Path, refused: Refused) -> None:
+def test_an_array_that_no_disk_holds(tmp_path: Path) -> None:
     """Numbers that were never written take two kilobytes: they are not read, though there would be room for them."""
     import h5py
 
@@ -768,7 +766,7 @@ def test_the_process_that_reads_ends_with_who_started_it(tmp_path: Path) -> None
     children[0].wait(30)
 
 
-def test_a_group_that_contains_itself(tmp_path: Path, refused: Refused) -> None:
+def test_a_group_that_contains_itself(tmp_path: Path) -> None:
     import h5py
 
     with h5py.File(tmp_path / "a.mat", "w") as file:
@@ -780,7 +778,7 @@ def test_a_group_that_contains_itself(tmp_path: Path, refused: Refused) -> None:
 
 @pytest.mark.parametrize("text", ["import os\nos.abort()\n", NEVER_ENDING], ids=["crash", "endless"])
 def test_a_library_that_crashes_or_writes_for_ever_is_an_error_of_the_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused, text: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:
     program = tmp_path / "crash.py"
     program.write_text(text, encoding="utf-8")
@@ -803,7 +801,7 @@ def test_nothing_but_numbers_and_texts_comes_back(tmp_path: Path, monkeypatch: p
 
 
 @posix
-def test_pipes_and_devices_are_refused_at_once(tmp_path: Path, refused: Refused) -> None:
+def test_pipes_and_devices_are_refused_at_once(tmp_path: Path) -> None:
     """Opening a pipe would wait for a writer, and a device may never end."""
     os.mkfifo(tmp_path / "a.csv")
     for path in (tmp_path / "a.csv", Path("/dev/zero")):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 
 import friso
 from friso.errors import LogError
@@ -107,13 +107,13 @@ def test_decimals_that_nothing_speaks_against_are_decimals(
         ["1.234;1,234", "2.345;2,345"],
     ],
 )
-def test_what_may_be_another_number_is_not_read(rows: list[str], tmp_path: Path, refused: Refused) -> None:
+def test_what_may_be_another_number_is_not_read(rows: list[str], tmp_path: Path) -> None:
     with refused("log"):
         read_table(written(tmp_path / "a.txt", rows * 30, ";".join("txy"[: rows[0].count(";") + 1])))
 
 
 @pytest.mark.parametrize("rows", [["1,234,567", "2,345,678"], ["1 234", "2 345"]])
-def test_one_number_in_groups_may_be_several(rows: list[str], tmp_path: Path, refused: Refused) -> None:
+def test_one_number_in_groups_may_be_several(rows: list[str], tmp_path: Path) -> None:
     with refused("log"):
         read_table(written(tmp_path / "a.txt", rows * 30, "x [um]"))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused, Wording
+from refusals import refused
 from scipy.io import savemat
 
 import friso
@@ -59,7 +59,7 @@ def message(tmp_path: Path, names: list[str], values: list[np.ndarray], mapping:
     return str(caught.value)
 
 
-def test_a_log_in_si_units(tmp_path: Path, wording: Wording) -> None:
+def test_a_log_in_si_units(tmp_path: Path) -> None:
     log = log_of(tmp_path, NAMES, columns())
     assert log.name == "a"
     assert log.sample_time == pytest.approx(1e-3, rel=1e-12)
@@ -126,7 +126,7 @@ def test_a_letter_that_names_an_axis(tmp_path: Path, position: str, reference: s
     assert {"position", "reference", "force"} <= {*log.signals}
 
 
-def test_two_candidates_are_listed(tmp_path: Path, wording: Wording) -> None:
+def test_two_candidates_are_listed(tmp_path: Path) -> None:
     text = message(tmp_path, ["time [s]", "enc1 [mm]", "enc2 [mm]", "force [N]"], columns())
     wording(text)
     assert "--map position=enc1" in text
@@ -144,7 +144,7 @@ def test_an_exact_name_wins(first: str, others: list[str], tmp_path: Path) -> No
     assert recognised(log.read, f'the name is "{first}"')
 
 
-def test_two_names_that_are_alike_are_still_asked_for(tmp_path: Path, wording: Wording) -> None:
+def test_two_names_that_are_alike_are_still_asked_for(tmp_path: Path) -> None:
     wording(message(tmp_path, [*NAMES[:3], "force a [N]", "force b [N]"], [*columns(), M["force"]]))
 
 
@@ -234,7 +234,7 @@ def test_a_torque_is_no_time_whatever_its_letter(tmp_path: Path) -> None:
     assert log["force"] == pytest.approx(M["force"])
 
 
-def test_no_candidate_lists_the_channels(tmp_path: Path, wording: Wording) -> None:
+def test_no_candidate_lists_the_channels(tmp_path: Path) -> None:
     text = message(tmp_path, ["time [s]", "a [mm]", "b [mm]", "force [N]"], columns())
     wording(text)
 
@@ -247,7 +247,7 @@ def test_a_mapped_name_that_is_not_there(tmp_path: Path) -> None:
         log_of(tmp_path, ["Zeit [s]", "Istposition [mm]", "F [N]"], columns()[:3], from_options(["position=IstPos"]))
 
 
-def test_no_units(tmp_path: Path, wording: Wording) -> None:
+def test_no_units(tmp_path: Path) -> None:
     text = message(tmp_path, ["time [s]", "position", "velocity [m/s]", "force [N]"], columns())
     wording(text)
     assert "--unit position=mm" in text
@@ -272,7 +272,7 @@ def test_current_needs_a_scale(tmp_path: Path) -> None:
     assert log["force"] == pytest.approx(M["force"] * 1e-3)
 
 
-def test_disturbance_in_volts(tmp_path: Path, wording: Wording) -> None:
+def test_disturbance_in_volts(tmp_path: Path) -> None:
     pulses = np.where(M["time"] % 0.5 < 0.05, 0.4, 0.0)
     names = ["time [s]", "position [mm]", "pulses_N", "force [N]"]
     mapping = from_options(["disturbance=pulses_N"], scales=["disturbance=35.15 N/V"])
@@ -304,7 +304,7 @@ def test_scales(text: str, unit: str, factor: float) -> None:
 @pytest.mark.parametrize(
     ("text", "unit"), [("35", ""), ("35 N", "V"), ("35 m/V", "V"), ("3 N/V", "A"), ("x N/V", "V"), ("24 N/A", "N")]
 )
-def test_wrong_scales(text: str, unit: str, refused: Refused) -> None:
+def test_wrong_scales(text: str, unit: str) -> None:
     with refused("scale"):
         read_scale("force", text, unit)
 
@@ -384,7 +384,7 @@ def test_no_counter_is_left_as_it_is() -> None:
         assert unwrapped(values)[1] == 0
 
 
-def test_the_log_tells_of_the_counter(tmp_path: Path, wording: Wording) -> None:
+def test_the_log_tells_of_the_counter(tmp_path: Path) -> None:
     counts = (np.arange(2000.0) * 40) % 65536
     log = log_of(tmp_path, ["time [s]", "position [mm]"], [M["time"], counts])
     wording("\n".join(log.warnings))
@@ -399,7 +399,7 @@ def test_gaps_split_and_are_not_bridged(tmp_path: Path) -> None:
     assert log.time == pytest.approx(M["time"][keep])
 
 
-def test_nan_splits_and_is_counted(tmp_path: Path, wording: Wording) -> None:
+def test_nan_splits_and_is_counted(tmp_path: Path) -> None:
     values = columns()
     values[3] = values[3].copy()
     values[3][500:504] = np.nan
@@ -464,7 +464,7 @@ def test_a_clock_that_begins_anew_is_not_bridged() -> None:
     assert track("position", time, time).segments == [slice(0, 500), slice(500, time.size)]
 
 
-def test_decreasing_time(tmp_path: Path, wording: Wording) -> None:
+def test_decreasing_time(tmp_path: Path) -> None:
     time = M["time"].copy()
     time[900:] -= 0.3
     assert "decreases" in message(tmp_path, NAMES, [time, *columns()[1:]])
@@ -473,7 +473,7 @@ def test_decreasing_time(tmp_path: Path, wording: Wording) -> None:
     wording(text)
 
 
-def test_repeated_rows_are_left_out_and_rounded_stamps_refused(tmp_path: Path, wording: Wording) -> None:
+def test_repeated_rows_are_left_out_and_rounded_stamps_refused(tmp_path: Path) -> None:
     again = np.sort(np.r_[0:2000, 300, 301])
     log = log_of(tmp_path, NAMES, [column[again] for column in columns()])
     assert log.time.size == 2000
@@ -482,7 +482,7 @@ def test_repeated_rows_are_left_out_and_rounded_stamps_refused(tmp_path: Path, w
     assert "--dt" in text
 
 
-def test_jitter_is_interpolated_and_told(tmp_path: Path, wording: Wording) -> None:
+def test_jitter_is_interpolated_and_told(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     time = M["time"] + 1e-4 * rng.uniform(-1, 1, 2000)
     exact = log_files.motion(2000)["position"]
@@ -553,21 +553,21 @@ def test_saturation_is_told_with_its_share(tmp_path: Path) -> None:
     assert clipped_share(values[3]) == 0
 
 
-def test_amperes_rms_are_told_from_those_of_peak(tmp_path: Path, wording: Wording) -> None:
+def test_amperes_rms_are_told_from_those_of_peak(tmp_path: Path) -> None:
     """A motor constant per ampere of peak would put mass and friction off by a factor of 1.41."""
     names = [name.replace("[N]", "[Arms]") if "[N]" in name else name for name in NAMES]
     assert names != NAMES
     wording("\n".join(log_of(tmp_path, names, columns(), from_options(scales=["force=12 N/A"])).warnings))
 
 
-def test_values_held(tmp_path: Path, wording: Wording) -> None:
+def test_values_held(tmp_path: Path) -> None:
     assert samples_held(np.repeat(M["position"][:200], 4)) == 4
     assert samples_held(M["position"]) == 1
     log = log_of(tmp_path, NAMES, [*columns()[:3], np.repeat(M["force"][::5], 5)])
     wording("\n".join(log.warnings))
 
 
-def test_a_signal_that_was_interpolated_is_told(tmp_path: Path, wording: Wording) -> None:
+def test_a_signal_that_was_interpolated_is_told(tmp_path: Path) -> None:
     instants = np.arange(len(M["force"]))
     slower = np.interp(instants, instants[::4], M["force"][::4])
     assert interpolated(slower) == 4
@@ -586,7 +586,7 @@ def test_velocity_against_position(tmp_path: Path, factor: float, said: str) -> 
     assert recognised(log.warnings, said)
 
 
-def test_velocity_of_another_body(tmp_path: Path, wording: Wording) -> None:
+def test_velocity_of_another_body(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     log = log_of(tmp_path, NAMES, [*columns()[:2], np.cumsum(rng.standard_normal(2000)), columns()[3]])
     wording("\n".join(log.warnings))
@@ -633,7 +633,7 @@ def test_friction_is_no_delay(tmp_path: Path) -> None:
     assert float(rest.split()[0]) == pytest.approx(4, abs=0.1)
 
 
-def test_channels_of_different_rates(tmp_path: Path, wording: Wording) -> None:
+def test_channels_of_different_rates(tmp_path: Path) -> None:
     fast = 0.25e-3 * np.arange(8000)
     groups = [
         (0.25, [("ActPos", "mm", 50 * np.sin(7 * fast))]),
@@ -647,7 +647,7 @@ def test_channels_of_different_rates(tmp_path: Path, wording: Wording) -> None:
     wording("\n".join(log.warnings))
 
 
-def test_no_common_span(refused: Refused) -> None:
+def test_no_common_span() -> None:
     t = 1e-3 * np.arange(100)
     with refused("log"):
         resample_tracks({"a": track("a", t, t), "b": track("b", t + 5, t)})
@@ -743,7 +743,7 @@ def test_what_is_said_now_silences_what_was_kept() -> None:
 @pytest.mark.parametrize(
     "text", ["rubbish", "[roles]\nstage = 'x'\n", "[roles]\nposition = 3\n", "nonsense = 1\n", "sample_time = 1\n"]
 )
-def test_a_broken_mapping(tmp_path: Path, text: str, refused: Refused) -> None:
+def test_a_broken_mapping(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.csv.friso.toml").write_text(text)
     with refused():
         mappings.load_mapping(tmp_path / "a.csv")
@@ -756,7 +756,7 @@ def test_a_broken_mapping(tmp_path: Path, text: str, refused: Refused) -> None:
         {"dt": "-1 ms"}, {"maps": ["position="]},
     ],
 )  # fmt: skip
-def test_wrong_options(options: dict, refused: Refused) -> None:
+def test_wrong_options(options: dict) -> None:
     with refused():
         from_options(**options)
 
@@ -766,7 +766,7 @@ def test_a_mapping_that_names_a_channel_that_is_gone(tmp_path: Path) -> None:
     assert '"gone"' in message(tmp_path, NAMES, columns(), from_options(["cart_position=gone"]))
 
 
-def test_the_unit_of_a_time_column_can_be_told(tmp_path: Path, wording: Wording) -> None:
+def test_the_unit_of_a_time_column_can_be_told(tmp_path: Path) -> None:
     log = log_of(tmp_path, ["time", *NAMES[1:]], columns(), from_options(units=["time=ms"]))
     assert log.sample_time == pytest.approx(1e-6)
     log = log_of(tmp_path, NAMES, columns(), from_options(units=["time=ms"]))  # over what the file says
@@ -774,7 +774,7 @@ def test_the_unit_of_a_time_column_can_be_told(tmp_path: Path, wording: Wording)
     wording("\n".join(log.read))
 
 
-def test_two_time_columns_without_units(tmp_path: Path, wording: Wording) -> None:
+def test_two_time_columns_without_units(tmp_path: Path) -> None:
     slow = 4.0 * np.arange(500)
     values = [M["time"] * 1e3, M["position"] * 1e3, slow, np.cos(slow)]
     names = ["t1", "position [mm]", "t2", "force [N]"]
@@ -790,7 +790,7 @@ def test_a_damaged_number(tmp_path: Path) -> None:
     assert "values up to 1e+197 m" in message(tmp_path, NAMES, values)
 
 
-def test_a_scale_without_a_channel(tmp_path: Path, wording: Wording) -> None:
+def test_a_scale_without_a_channel(tmp_path: Path) -> None:
     mapping = from_options(scales=["acceleration=9.81 m/s^2/V"])
     wording(message(tmp_path, NAMES, columns(), mapping))
 
@@ -801,7 +801,7 @@ def record(name: str) -> Path:
     return DATA / name
 
 
-def test_emps(wording: Wording) -> None:
+def test_emps() -> None:
     options = ["time=t", "reference=qg", "position=qm", "force=vir"]
     log = read_log(record("emps/DATA_EMPS.mat"), from_options(options, scales=["force=35.1507 N/V"]))
     assert log.time.size == 24841
@@ -823,7 +823,7 @@ def test_ku_leuven() -> None:
     assert np.abs(log["force"]).max() == pytest.approx(0.5, abs=1e-3)
 
 
-def test_tokyo_bench(wording: Wording) -> None:
+def test_tokyo_bench() -> None:
     path = record("utokyo_motorbench/MultisineTypeA.mat")
     options = from_options(["position=theta_mx", "force=iq_adx"], ["theta_mx=rad", "iq_adx=A"])
     with pytest.raises(InputError, match=r'--dt "0\.4 ms", if fs = 2500'):
@@ -835,7 +835,7 @@ def test_tokyo_bench(wording: Wording) -> None:
     wording("\n".join(log.read))
 
 
-def test_twincat_filled_with_the_previous_value(tmp_path: Path, wording: Wording) -> None:
+def test_twincat_filled_with_the_previous_value(tmp_path: Path) -> None:
     """Scope can repeat the samples of a slow group, stamp and value, to have all rows full."""
     again = np.repeat(np.arange(500), 4)
     slow = np.cos(4e-3 * np.arange(500))

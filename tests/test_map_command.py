@@ -16,7 +16,7 @@ import pytest
 import xarray as xr
 from filelock import FileLock
 from inside import friso_inside
-from refusals import Refused, Wording
+from refusals import refused
 from systems import posix
 
 import friso as friso_api
@@ -104,9 +104,7 @@ def test_a_finished_map_is_drawn_again_from_its_store_alone(mapped: tuple[Path, 
         ("--set", "controller.alpha=0.2"),
     ],
 )
-def test_a_store_takes_nothing_that_makes_another_study(
-    mapped: tuple[Path, dict], options: tuple[str, ...], refused: Refused
-) -> None:
+def test_a_store_takes_nothing_that_makes_another_study(mapped: tuple[Path, dict], options: tuple[str, ...]) -> None:
     done = friso_inside(mapped[0], "map", "a.zarr", *options)
     assert done.returncode == 2
     refused.says(done.stderr)
@@ -173,7 +171,7 @@ def _interruptible() -> None:
         (*SMALL, "--workers", "1", "--scheduler", "tcp://127.0.0.1:9"),
     ],
 )
-def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple, refused: Refused) -> None:
+def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple) -> None:
     before = RIG.read_bytes()
     done = friso_inside(tmp_path, "map", RIG, *arguments)
     assert done.returncode == 2
@@ -193,7 +191,7 @@ def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str,
     ]
 
 
-def test_an_invalid_cell_gives_its_reason(tmp_path: Path, wording: Wording) -> None:
+def test_an_invalid_cell_gives_its_reason(tmp_path: Path) -> None:
     axes = ("--x", "friction.coulomb=1 N, 4 N", "--out", "a.zarr", "--verify", "0")
     assert friso_inside(tmp_path, "map", RIG, *axes).returncode == 0
     done = friso_inside(tmp_path, "simulate", "--cell", "a.zarr", 1)
@@ -336,9 +334,7 @@ def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict],
     assert (tmp_path / "a.svg").read_bytes() != first
 
 
-def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(
-    mapped: tuple[Path, dict], tmp_path: Path, refused: Refused
-) -> None:
+def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     """Asked of the stage or of the store."""
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
     for arguments in (("map", "a.zarr"), ("map", RIG, *SMALL, "--out", "a.zarr")):

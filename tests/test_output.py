@@ -17,7 +17,7 @@ import pytest
 import typer
 from filelock import FileLock
 from inside import friso_inside
-from refusals import Refused
+from refusals import refused
 from systems import posix
 
 from friso.cli.app import command_line
@@ -212,9 +212,7 @@ def test_a_text_that_was_edited_is_not_replaced(tmp_path: Path) -> None:
         OutputFolder("identify", out, overwrite=False)
 
 
-def test_a_file_that_friso_has_not_written_stays(
-    tmp_path: Path, refused: Refused, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_file_that_friso_has_not_written_stays(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """A file of the user stays even in a folder that friso made, unless `overwrite` is set."""
     place(tmp_path / "out").write({"page.html": ""})
     (tmp_path / "out" / "figure.png").write_text("mine")
@@ -266,7 +264,7 @@ def test_overwriting_does_not_make_the_folder_friso_s(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_what_is_read_is_never_replaced(tmp_path: Path, overwrite: bool, refused: Refused) -> None:
+def test_what_is_read_is_never_replaced(tmp_path: Path, overwrite: bool) -> None:
     place(tmp_path / "out").write({"stage.toml": "read"})
     stage = tmp_path / "out" / "stage.toml"
     with refused():

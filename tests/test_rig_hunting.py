@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from patched import patched
-from refusals import Refused
+from refusals import refused
 
 from friso import load
 from friso.engine.arrays import Status
@@ -94,7 +94,7 @@ def test_a_larger_stage_moves_farther() -> None:
     assert distance(RIG.replace({"motion.acceleration_time": "0.1 s"})) == pytest.approx(1.0)
 
 
-def test_what_has_no_joint_or_goes_nowhere(refused: Refused) -> None:
+def test_what_has_no_joint_or_goes_nowhere() -> None:
     bare = RIG.replace({"joint": None, "parasitic": None})
     with refused("joint"):
         hunting.run_experiment(bare, 1, silent)

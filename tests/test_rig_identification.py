@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import Refused
+from refusals import refused
 
 import friso
 from friso.identification.experiments.stick_slip import static_from_stick_slip
@@ -118,7 +118,7 @@ def test_a_free_joint_is_stable_up_to_a_setting_and_not_beyond(built: Stage) -> 
     assert not stable[settings > highest].any()
 
 
-def test_an_experiment_on_the_joint_needs_one(built: Stage, refused: Refused) -> None:
+def test_an_experiment_on_the_joint_needs_one(built: Stage) -> None:
     rigid = built.replace({"joint": None, "parasitic": None})
     for item in (frf, stiffness, stiction, constant_speed):
         with refused():

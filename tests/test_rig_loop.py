@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import Wording
 from rig_machines import built, mean_level, sources, through_files
 
 from friso.identification.experiments.frequency import _of_stage_alone
@@ -50,7 +49,7 @@ def test_the_mass_line_of_a_free_joint_is_not_taken_for_the_whole_mass() -> None
         assert not _of_stage_alone(alone, guess.replace({"joint.locked": True}))
 
 
-def test_two_speeds_bound_friction_and_do_not_show_it(wording: Wording) -> None:
+def test_two_speeds_bound_friction_and_do_not_show_it() -> None:
     """With both speeds below the Stribeck velocity, the line through them starts above Coulomb friction and falls."""
     coulomb, rise, viscous, stribeck, sample_time = 1.0, 1.0, 10.0, 3e-3, 1e-3
     legs = []

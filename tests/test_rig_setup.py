@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from refusals import Refused, Wording
+from refusals import refused
 
 import friso
 from friso.identification.kind import as_set_up
@@ -22,7 +22,7 @@ def built() -> Stage:
     return friso.load(Path(__file__).parent.parent / "examples" / "thesis_drive.toml")
 
 
-def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path, refused: Refused) -> None:
+def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path) -> None:
     """For the analysis of that log alone: the stage file keeps its own stroke."""
     log, path = steps(built, 1), tmp_path / "steps.csv"
     write_csv(path, log.interval, log.logged, "")
@@ -40,7 +40,7 @@ def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path
         as_set_up(built, wrong.source)
 
 
-def test_friction_without_what_is_looked_for_is_refused(built: Stage, refused: Refused) -> None:
+def test_friction_without_what_is_looked_for_is_refused(built: Stage) -> None:
     bare = {f"friction.{key}": None for key in built.as_written()["friction"]}
     bare |= {"rail": None}
     none = built.replace({**bare, "friction.model": "none"})
@@ -51,7 +51,7 @@ def test_friction_without_what_is_looked_for_is_refused(built: Stage, refused: R
 
 
 @pytest.mark.thorough
-def test_a_loop_that_swings_between_its_limits_is_told(built: Stage, wording: Wording) -> None:
+def test_a_loop_that_swings_between_its_limits_is_told(built: Stage) -> None:
     """Logs that end at once show no passes: their page is written all the same."""
     outcome = constant_speed.run_experiment(built.replace({"controller.crossover": "500 Hz"}), 1, silent)
     assert all(log.failure for log in outcome.logs)

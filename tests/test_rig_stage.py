@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
 from friso.errors import InputError
@@ -142,7 +142,7 @@ def test_commented_lines_of_the_example_load() -> None:
     assert stage.flat()["drive.motor_constant_ratio"] == 0.68
 
 
-def test_uncertain_keys(built: Stage, refused: Refused) -> None:
+def test_uncertain_keys(built: Stage) -> None:
     stage = built.replace(
         {"drive.delay": "40 us .. 60 us", "rail.offset": "0.1 +/- 0.05", "cable.drag": "1 N*s/m +/- 5 %"}
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 from scipy.signal import welch
 from scipy.stats import norm
 
@@ -235,6 +235,6 @@ def test_a_floor_is_sampled_from_start_to_end(seed: int, steps: int, interval: f
     assert np.any(acceleration != floor_acceleration(floor, steps * interval, interval, seed + 1))
 
 
-def test_a_floor_faster_than_it_is_sampled(refused: Refused) -> None:
+def test_a_floor_faster_than_it_is_sampled() -> None:
     with refused("floor.frequency"):
         floor_acceleration(spectrum((1, 1e-4), (100, 1e-4)), 1.0, 0.01, 0)

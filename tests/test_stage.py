@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import Refused, Wording
+from refusals import refused
 from systems import posix
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
@@ -146,7 +146,7 @@ def test_units(text: str, unit: str, si: float) -> None:
     assert value.text == text
 
 
-def test_unit_factor_converts_arrays(refused: Refused) -> None:
+def test_unit_factor_converts_arrays() -> None:
     assert Quantity("m", positive, "1 mm").factor("mm") == 1e-3
     assert Quantity("Hz", positive, "8 Hz").factor("rad/s") == 1 / (2 * math.pi)
     with refused():
@@ -197,7 +197,7 @@ def test_byte_order_mark_and_windows_line_ends(tmp_path: Path, rig: Stage) -> No
     assert load(path) == rig
 
 
-def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage, refused: Refused) -> None:
+def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage) -> None:
     path = tmp_path / "rig.toml"
     path.write_text("precious", encoding="utf-8")
     with refused():
@@ -229,7 +229,7 @@ def test_save_replaces_nothing_that_is_read_only(tmp_path: Path, rig: Stage) -> 
     assert file.read_text() == "mine"
 
 
-def test_save_into_nowhere(tmp_path: Path, rig: Stage, refused: Refused) -> None:
+def test_save_into_nowhere(tmp_path: Path, rig: Stage) -> None:
     with refused():
         save(rig, tmp_path / "missing" / "rig.toml")
 
@@ -290,7 +290,7 @@ def test_parse_set(text: str, expected: tuple[str, object]) -> None:
     assert parse_set(text) == expected
 
 
-def test_swept_values_move_the_defaults_that_follow_them(rig: Stage, refused: Refused) -> None:
+def test_swept_values_move_the_defaults_that_follow_them(rig: Stage) -> None:
     cart = np.array([1.0, 2.0])
     stage = rig.replace({"controller.tuned_mass": None})
     np.testing.assert_array_equal(stage.flat({"masses.cart": cart})["controller.tuned_mass"], cart + 0.5)
@@ -299,7 +299,7 @@ def test_swept_values_move_the_defaults_that_follow_them(rig: Stage, refused: Re
         rig.flat({"controller.crossovr": cart})
 
 
-def test_violations_tell_cells_apart(rig: Stage, wording: Wording) -> None:
+def test_violations_tell_cells_apart(rig: Stage) -> None:
     assert violations(rig.flat()) == []
     swept = {
         "masses.cart": np.array([1.0, 0.0, 1.0, np.nan]),

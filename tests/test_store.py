@@ -24,7 +24,7 @@ import pytest
 import xarray as xr
 import zarr
 from filelock import FileLock
-from refusals import Refused
+from refusals import refused
 from systems import posix
 
 import friso as friso_api
@@ -177,7 +177,7 @@ def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
         {"refine": True},
     ],
 )
-def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change: dict, refused: Refused) -> None:
+def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change: dict) -> None:
     path = tmp_path / "a.zarr"
     with Store.opened(path, Request(rig, AXES).study()):
         pass
@@ -203,9 +203,7 @@ FOLLOW = {"friction.static": "3 * friction.coulomb", "friction.coulomb": "0.9 * 
         ({"axes": AXES, "links": FOLLOW}, {"axes": AXES, "links": dict(reversed(FOLLOW.items()))}),
     ],
 )
-def test_a_store_of_nearly_the_same_study_is_refused(
-    rig: Stage, tmp_path: Path, first: dict, second: dict, refused: Refused
-) -> None:
+def test_a_store_of_nearly_the_same_study_is_refused(rig: Stage, tmp_path: Path, first: dict, second: dict) -> None:
     """Studies with other sampled keys of equal values, fewer keys, or links in another order are refused."""
     with Store.opened(tmp_path / "a.zarr", Request(rig, **{"axes": {}, **first}).study()):
         pass
@@ -284,9 +282,7 @@ def test_answers_are_those_of_their_study_and_no_larger(
     keeping()
 
 
-def test_a_store_of_other_equations_is_refused(
-    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
-) -> None:
+def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("friso.studies.study.code_digest", lambda *folders: "another digest")
     with Store.opened(tmp_path / "a.zarr", Request(rig, AXES).study()):
         pass
@@ -295,7 +291,7 @@ def test_a_store_of_other_equations_is_refused(
         sweep(rig, AXES, store=tmp_path / "a.zarr")
 
 
-def test_anything_else_is_refused(rig: Stage, tmp_path: Path, refused: Refused) -> None:
+def test_anything_else_is_refused(rig: Stage, tmp_path: Path) -> None:
     folder, file = tmp_path / "folder", tmp_path / "file"
     folder.mkdir()
     (folder / "thesis.txt").write_text("precious")
@@ -325,7 +321,7 @@ with Store.opened(Path(sys.argv[2]), Request(friso.load(sys.argv[1]), {AXES!r}).
 """
 
 
-def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path, refused: Refused) -> None:
+def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path) -> None:
     script, path = tmp_path / "hold.py", tmp_path / "a.zarr"
     script.write_text(HOLD.replace("{AXES!r}", repr(AXES)))
     command = [sys.executable, str(script), str(EXAMPLES / "thesis_rig.toml"), str(path)]
@@ -339,9 +335,7 @@ def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path, refu
         pass
 
 
-def test_a_store_is_there_whole_or_not_at_all(
-    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
-) -> None:
+def test_a_store_is_there_whole_or_not_at_all(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -481,7 +475,7 @@ CUT = b"cut"
 
 @pytest.mark.parametrize("content", [CUT, b"", b"{}", b"[1]", b"null", b'{"metadata": 3}', b"\xff\x00", b"[" * 100_000])
 def test_metadata_of_any_content_are_written_anew_from_their_copy(
-    stored: Path, rig: Stage, content: bytes, refused: Refused, caplog: pytest.LogCaptureFixture
+    stored: Path, rig: Stage, content: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     """If the copy is damaged too, the store is refused."""
     runs, file = read_store(stored).load(), stored / ".zmetadata"
@@ -513,7 +507,7 @@ def test_what_another_process_notes_before_a_store_is_locked_stays(
         assert store.notes["metric"] == "peaks"
 
 
-def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Refused) -> None:
+def test_missing_metadata_and_damaged_axes_are_refused(stored: Path) -> None:
     flip(stored / "joint.stroke" / "0", 0.8)
     with refused(kind=StoreError):
         read_store(stored)
@@ -687,7 +681,7 @@ def test_metadata_of_an_equal_number_of_another_kind_are_damaged(stored: Path) -
     assert check_store(stored).files == [".zgroup"]
 
 
-def test_a_store_of_a_newer_friso_says_so(stored: Path, refused: Refused) -> None:
+def test_a_store_of_a_newer_friso_says_so(stored: Path) -> None:
     document = json.loads((stored / ".zmetadata").read_text())
     document["friso"]["format"] += 1
     document["metadata"][".zattrs"]["friso"] = "9.9.9"
@@ -821,7 +815,7 @@ def test_blocks_that_are_not_done_are_read_as_empty(stored: Path) -> None:
     assert peaks[-1].notnull().all()
 
 
-def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path, refused: Refused) -> None:
+def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path) -> None:
     axes = {"friction.static": "2 N..3 N:5", "friction.stribeck_velocity": "1 mm/s..2 mm/s:5"}
     with Store.opened(tmp_path / "a.zarr", Request(rig, axes).study()):
         pass

@@ -8,7 +8,7 @@ import xarray as xr
 from beyond_flip import CREEPING
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 
 import friso
 from friso.engine.batch import run_chunks
@@ -232,7 +232,7 @@ def test_results_do_not_depend_on_threads(rig: Stage) -> None:
         {"crossover": "1 Hz..4 Hz:3"},
     ],
 )
-def test_wrong_axes_are_refused(rig: Stage, axes: dict, refused: Refused) -> None:
+def test_wrong_axes_are_refused(rig: Stage, axes: dict) -> None:
     with refused():
         sweep(rig, axes)
 
@@ -250,7 +250,7 @@ def test_wrong_axes_are_refused(rig: Stage, axes: dict, refused: Refused) -> Non
         {"masses.cart": "mass", "controller.crossover": "8"},
     ],
 )
-def test_wrong_links_are_refused(rig: Stage, links: dict, refused: Refused) -> None:
+def test_wrong_links_are_refused(rig: Stage, links: dict) -> None:
     with refused():
         sweep(rig, {"mass": ["1 kg", "2 kg"], "controller.crossover": ["8 Hz"]}, links=links)
 
@@ -268,12 +268,12 @@ def test_wrong_links_are_refused(rig: Stage, links: dict, refused: Refused) -> N
         ({"joint.stroke": "0 m..1 mm", "controller.alpha": [0.1, 0.2]}, 8),
     ],
 )
-def test_wrong_samples_are_refused(rig: Stage, samples: tuple, refused: Refused) -> None:
+def test_wrong_samples_are_refused(rig: Stage, samples: tuple) -> None:
     with refused():
         sweep(rig, {}, Samples(*samples))
 
 
-def test_an_unknown_metric_is_refused(rig: Stage, refused: Refused) -> None:
+def test_an_unknown_metric_is_refused(rig: Stage) -> None:
     with refused("metrics"):
         sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
 

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from refusals import Wording
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
@@ -318,7 +317,7 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
 
 
 @pytest.mark.inner
-def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, wording: Wording) -> None:
+def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) -> None:
     """All motions shrink in proportion to the backlash, so no small share of it ends them."""
     result = feeding(backlash_alone)
     assert result is not None
@@ -341,7 +340,7 @@ def test_what_feeds_it_is_computed(share: float, certain: bool) -> None:
 
 
 @pytest.mark.inner
-def test_what_feeds_it_is_told(wording: Wording) -> None:
+def test_what_feeds_it_is_told() -> None:
     keys = dry_friction(machine().flat())
     assert {"friction.static", "motor_friction.bristle_stiffness", "friction.bristle_damping"} <= {*keys}
     assert "friction.viscous" not in keys

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 from scipy.ndimage import binary_fill_holes, distance_transform_edt, label
 
 import friso
@@ -115,7 +115,7 @@ def test_inferred_outcomes_are_checked_apart(rig: Stage) -> None:
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1])
-def test_a_share_that_is_none_is_refused(rig: Stage, share: float, refused: Refused) -> None:
+def test_a_share_that_is_none_is_refused(rig: Stage, share: float) -> None:
     with refused("verify"):
         sweep(rig, {"controller.crossover": ["8 Hz"]}, verify=share)
 
@@ -201,7 +201,7 @@ def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
     assert not (boundary(a) & ~boundary(b)).any()  # the boundary that is found is a true one
 
 
-def test_what_cannot_be_refined_is_refused(rig: Stage, refused: Refused) -> None:
+def test_what_cannot_be_refined_is_refused(rig: Stage) -> None:
     for axes in ({"joint.locked": [True, False]}, {}):
         samples = None if axes else friso.Samples({"joint.stroke": "0 m..1 mm"}, 8)
         with refused("--refine"):

@@ -10,7 +10,7 @@ from warnings import catch_warnings
 
 import numpy as np
 import pytest
-from refusals import Refused, Wording
+from refusals import refused
 from scipy.optimize import brentq
 from variants import maxwell, release, van_dijk
 from variants import stage as variant
@@ -678,7 +678,7 @@ def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Sta
     assert pairs([closest, isolator], goal)
 
 
-def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, capsys: pytest.CaptureFixture[str]) -> None:
     assert tuning.interrupted
     assert [result.certainty for result in tuning.outcomes] == ["works", "unsure"]
     first = answer(tuning)[0]
@@ -707,7 +707,7 @@ def test_a_search_that_is_cut_says_so_and_not_that_nothing_works(
             assert outcome.certainty == certainty
 
 
-def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice, wording: Wording) -> None:
+def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice) -> None:
     (outcome,) = (one for one in tuning.outcomes if one.remedy.name == "gains")
     points = tuning.outcomes[0].points  # of another remedy
     cut = replace(outcome, stage=None, measured=None, interrupted=False, points=points, cut=True)
@@ -1069,7 +1069,7 @@ def test_a_way_that_the_app_takes_over_keeps_the_machine_as_built(
 
 
 @pytest.mark.parametrize("margin", ["1.2", "0", "a half", "nan"])
-def test_a_margin_is_between_0_and_1(rigid: Stage, margin: str, refused: Refused) -> None:
+def test_a_margin_is_between_0_and_1(rigid: Stage, margin: str) -> None:
     with refused("margin"):
         friso.tune(rigid, margin=margin)
 
@@ -1313,7 +1313,7 @@ def test_that_there_is_no_window_is_said() -> None:
     assert window_lines(tuning)[0].startswith("No window is given for gains")
 
 
-def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -> None:
+def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     """At 8 Hz one isolator settles the stage; at 1 Hz none of those tried does."""
     tried, none = suggestion(rigid), suggestion(rigid.replace({"controller.crossover": "1 Hz"}))
     assert tried is not None

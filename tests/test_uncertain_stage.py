@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused, Wording
+from refusals import refused
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
 from friso.interface.inputs import read_stage
@@ -118,20 +118,20 @@ def test_value_survives_pickling_and_set(rig: Stage) -> None:
         ("controller.alpha", "0.1"),
     ],
 )
-def test_refused(rig: Stage, key: str, text: str, refused: Refused) -> None:
+def test_refused(rig: Stage, key: str, text: str) -> None:
     with refused() as caught:
         rig.replace({key: text})
     assert key in caught.value.key
 
 
-def test_a_number_of_leaves_is_certain(refused: Refused) -> None:
+def test_a_number_of_leaves_is_certain() -> None:
     leaves = load(EXAMPLE.parent / "thesis_leaves.toml")
     for text in ("2 +/- 1", "2 .. 4"):
         with refused("flexure.leaves"):
             leaves.replace({"flexure.leaves": text})
 
 
-def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
+def test_specifications_take_no_uncertain_value() -> None:
     """A specification states one value or an allowed range, not the uncertainty of a machine."""
     from friso.design_method.spec import SpecMachine
 
@@ -140,7 +140,7 @@ def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
 
 
 def test_single_valued_commands_say_that_centres_are_used(
-    rig: Stage, tmp_path: Path, caplog: pytest.LogCaptureFixture, wording: Wording
+    rig: Stage, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "a.toml"
     save(uncertain(rig, coulomb="1 N +/- 5 %", static="3 N +/- 5 %", viscous="0 N*s/m .. 1 N*s/m"), path)
@@ -162,7 +162,7 @@ def pair(value: float, keys: tuple[str, ...] = (COULOMB, VISCOUS)) -> Correlatio
     return Correlations(keys, np.array([[1, value], [value, 1]]))
 
 
-def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path, refused: Refused) -> None:
+def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
     stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m")
     path = correlations_file(tmp_path / "identified.toml")
     assert path.name == "identified.correlations.toml"
@@ -197,7 +197,7 @@ def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path, refused: 
         "",
     ],
 )  # fmt: skip
-def test_correlations_refused(rig: Stage, tmp_path: Path, text: str, refused: Refused) -> None:
+def test_correlations_refused(rig: Stage, tmp_path: Path, text: str) -> None:
     stage, path = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0 N*s/m .. 1 N*s/m"), tmp_path / "c.toml"
     path.write_text(text)
     with refused() as caught:
@@ -205,7 +205,7 @@ def test_correlations_refused(rig: Stage, tmp_path: Path, text: str, refused: Re
     assert str(path) in str(caught.value)
 
 
-def test_correlations_of_certain_keys_are_not_written(rig: Stage, refused: Refused) -> None:
+def test_correlations_of_certain_keys_are_not_written(rig: Stage) -> None:
     with refused("keys"):
         correlations_text(pair(0.5), uncertain(rig, coulomb="1 N +/- 0.1 N"))
 
@@ -266,7 +266,7 @@ def test_draws_that_break_a_rule_are_left_out_and_told(rig: Stage) -> None:
     assert count / (count + 1000) == pytest.approx(0.5 / 1.2, rel=0.05)
 
 
-def test_nothing_to_draw(rig: Stage, refused: Refused) -> None:
+def test_nothing_to_draw(rig: Stage) -> None:
     with refused():
         draw(rig, Correlations(), 10, seed=0)
 

@@ -13,7 +13,7 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import refused
 from snapshots import Snapshots
 from variants import VARIANTS
 
@@ -140,7 +140,7 @@ def test_equal_groups_equal_multiplier_with_a_free_joint() -> None:
     assert scaled == pytest.approx(plain, rel=1e-3)
 
 
-def test_groups_of_another_controller_or_friction_are_refused(refused: Refused) -> None:
+def test_groups_of_another_controller_or_friction_are_refused() -> None:
     for name in ("rigid, LuGre 3, P", "rigid, Stribeck 3"):
         with refused("stage"):
             values_of(VARIANTS[name].flat())

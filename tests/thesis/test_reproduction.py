@@ -18,7 +18,7 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Page
 from patched import patched
-from refusals import Refused
+from refusals import refused
 from rig_evidence import HUNTS, grid, loops, moves, rail_runs, standstill, traces
 from rig_evidence import cycles as rail_cycles
 from snapshots import Snapshots
@@ -892,7 +892,7 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     [{"names": ["paths"]}, {"points": 2}, {"points": 10**6}, {"draws": -1}, {"only": ["F99"]}],
     ids=["study", "few points", "many points", "draws", "claim"],
 )
-def test_wrong_orders_are_refused(orders: dict[str, Any], refused: Refused) -> None:
+def test_wrong_orders_are_refused(orders: dict[str, Any]) -> None:
     with refused():
         reproduce(**orders)
 

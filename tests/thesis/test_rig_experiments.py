@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from patched import patched
-from refusals import Refused
+from refusals import refused
 
 from friso import load
 from friso.progress import silent
@@ -16,7 +16,7 @@ from friso_thesis.studies.rig import in_position, measured_cycles, stroke_crosso
 RIG = load(Path(__file__).parents[2] / "examples" / "thesis_drive.toml")
 
 
-def test_what_has_no_joint(refused: Refused) -> None:
+def test_what_has_no_joint() -> None:
     bare = RIG.replace({"joint": None, "parasitic": None})
     for experiment in (stroke_crossover, measured_cycles, in_position):
         with refused("joint"):
