@@ -1,8 +1,7 @@
 """Time parameter studies at scale.
 
-Run by `python -m benchmarks.maps [--only maps|large|growth|overhead|peer]`. Parts are all of the thesis's maps; a study
-of 10^6 runs; the cost per run from 10^3 to 10^6 runs; and the cells of the maps by SciPy's Radau with compiled
-functions on a process pool, extrapolated from a sample.
+Run by `python -m benchmarks.maps [--only maps|large|growth|overhead]`. Parts are all of the thesis's maps; a study of
+10^6 runs; the cost per run from 10^3 to 10^6 runs; and what a block costs besides its runs.
 """
 
 from __future__ import annotations
@@ -11,21 +10,16 @@ import argparse
 import re
 import statistics
 import tempfile
-import time
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.compiled import compile_equations
-from benchmarks.peers import peers, piecewise
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
-from benchmarks.rigs import rig_of
 from friso.platform.system import usable_cores
 from friso.stage import Stage
 from friso.studies.axes import Samples
-from friso.studies.execute import Crew, local_crew, processes
+from friso.studies.execute import local_crew, processes
 from friso.studies.study import Request, Study
 from friso.studies.sweep import run_in_memory, run_in_store
 from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
@@ -141,87 +135,18 @@ def run_overhead(blocks: int) -> list[Goal]:
     return []
 
 
-def run_peer(cells_per_map: int) -> list[Goal]:
-    """Run a sample of all maps' cells by SciPy's Radau on a process pool, and extrapolate."""
-    rtol = RTOLS[0]
-    jobs = [job for study in thesis_studies(rtol) for job in _sampled(study, cells_per_map)]
-    with ProcessPoolExecutor() as pool:
-        list(pool.map(_by_radau, jobs[:: len(jobs) // 4]))
-        start = time.perf_counter()
-        compile_seconds = sum(pool.map(_by_radau, jobs))
-        wall = time.perf_counter() - start
-    workers = _processors()
-    cells = sum(study.cells for study in thesis_studies(rtol))
-    extrapolated = (wall - compile_seconds / workers) / len(jobs) * cells
-    with local_crew() as crew:
-        by_friso = _by_friso(crew, rtol)
-    print(
-        f"\nSciPy Radau, compiled functions, {workers} processes, rtol {rtol:g}: {len(jobs)} of {cells} cells in ",
-        end="",
-    )
-    print(
-        f"{wall:.1f} s ({compile_seconds / workers:.1f} s of it compiling); all cells, extrapolated: "
-        f"{extrapolated:.0f} s"
-    )
-    return [
-        Goal(
-            "all ten maps against SciPy Radau",
-            "-",
-            f"{by_friso:.2f} s against {extrapolated:.0f} s: {extrapolated / by_friso:.0f}x",
-            None,
-        )
-    ]
-
-
-def _by_friso(crew: Crew, rtol: float) -> float:
-    studies = thesis_studies(rtol)
-    run_in_memory(studies, crew)
-    return min(clock(lambda: run_in_memory(studies, crew)) for _ in range(3))
-
-
-def _sampled(study: Study, count: int) -> list[tuple[Stage, float]]:
-    """Return stages of some valid cells."""
-    cells: list[tuple[Stage, float]] = []
-    for number in np.random.default_rng(0).permutation(study.cells):
-        try:
-            cells.append((study.cell_stage(np.unravel_index(number, study.shape)), study.rtol))  # type: ignore[arg-type]
-        except ValueError:
-            continue
-        if len(cells) == count:
-            break
-    return cells
-
-
-def _by_radau(job: tuple[Stage, float]) -> float:
-    """Run one cell by Radau.
-
-    Returns the compilation time [s] too, which a real study would share among its cells.
-    """
-    stage, rtol = job
-    rig = rig_of(stage)
-    start = time.perf_counter()
-    compiled = compile_equations(rig)
-    compiled.rate(0.0, np.zeros(len(rig.scales)), rig.pieces)
-    compiled.jacobian(0.0, np.zeros(len(rig.scales)), rig.pieces)
-    seconds = time.perf_counter() - start
-    piecewise(peers()["SciPy Radau"], rig, compiled, rtol, sampled=False)
-    return seconds
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", choices=("maps", "large", "growth", "overhead", "peer"))
+    parser.add_argument("--only", choices=("maps", "large", "growth", "overhead"))
     parser.add_argument("--runs", type=int, default=1_000_000, help="runs of the large study")
     parser.add_argument("--rtol", type=float, default=1e-4, help="tolerance of the large studies")
     parser.add_argument("--repetitions", type=int, default=5)
-    parser.add_argument("--sample", type=int, default=6, help="cells per map that SciPy runs")
     options = parser.parse_args()
     sections: dict[str, Any] = {
         "maps": lambda: run_maps(options.repetitions),
         "large": lambda: run_large(options.runs, options.rtol),
         "growth": lambda: run_growth(options.runs, options.rtol, options.repetitions),
         "overhead": lambda: run_overhead(200),
-        "peer": lambda: run_peer(options.sample),
     }
     goals = [goal for name, run in sections.items() if options.only in (None, name) for goal in run()]
     print_goals(goals, "Goals of issue 3, section 6")

@@ -1,6 +1,6 @@
 """Measure what lesser processors cost: `python -m benchmarks.processors`.
 
-It runs the two maps of the prototype, on one core, with code for each processor that this machine can imitate, in
+It runs two maps of the thesis rig, on one core, with code for each processor that this machine can imitate, in
 turns. Times are ratios to this machine's own; the fraction of runs with equal outcome is printed as well.
 """
 
@@ -16,13 +16,26 @@ import time
 
 import numpy as np
 
+import friso
 from benchmarks.report import print_table
-from benchmarks.rigs import rig
-from benchmarks.two_maps import both_maps, friso_map
 from friso.engine.processor import PROCESSOR_VARIABLE, processor
+from friso.studies.execute import local_crew
+from friso.studies.study import Request, Study
+from friso.studies.sweep import run_in_memory
 
 LEVELS = {"": "this machine", "x86-64-v4": "AVX-512", "x86-64-v3": "AVX2", "x86-64-v2": "SSE4.2", "x86-64": "SSE2"}
 """Processors by LLVM's name, most able first, and their usual names."""
+
+
+def maps(rtol: float) -> dict[str, Study]:
+    """Return two maps of the thesis rig over crossover: of the cart's mass, joint locked, and of stroke, joint free."""
+    stage = friso.example("thesis_rig")
+    locked = {"controller.crossover": "1 Hz..40 Hz:41", "masses.cart": "0.1 kg..5 kg:41"}
+    free = {"controller.crossover": "1 Hz..16 Hz:41", "joint.stroke": "1 um..1 mm:41"}
+    return {
+        "locked, crossover x mass": Request(stage.replace({"joint.locked": True}), locked).study(rtol=rtol),
+        "free, crossover x stroke": Request(stage, free).study(rtol=rtol),
+    }
 
 
 def measure(rtol: float, repetitions: int) -> dict[str, list[float | str]]:
@@ -30,16 +43,18 @@ def measure(rtol: float, repetitions: int) -> dict[str, list[float | str]]:
 
     This runs in the present process.
     """
-    maps: dict[str, list[float | str]] = {}
-    for case in both_maps(rig(True), rig(False)):
-        times, peaks = [], np.zeros(0)
-        for _ in range(repetitions + 1):  # the first run warms up
-            start = time.process_time()
-            peaks, _ = friso_map(case, rtol)
-            times.append(time.process_time() - start)
-        swings = np.packbits(peaks > 0).tobytes()
-        maps[case.name] = [min(times[1:]), base64.b64encode(swings).decode("ascii")]
-    return maps
+    result: dict[str, list[float | str]] = {}
+    with local_crew(1) as crew:
+        for name, study in maps(rtol).items():
+            times, peaks = [], np.zeros(0)
+            for _ in range(repetitions + 1):  # the first run warms up
+                start = time.process_time()
+                (data,) = run_in_memory([study], crew)
+                peaks = np.asarray(data["peaks"]).ravel()
+                times.append(time.process_time() - start)
+            swings = np.packbits(peaks > 0).tobytes()
+            result[name] = [min(times[1:]), base64.b64encode(swings).decode("ascii")]
+    return result
 
 
 def measured_on(name: str, rtol: float, repetitions: int) -> dict[str, tuple[float, np.ndarray]]:
