@@ -29,7 +29,7 @@ LEVELS = {"": "this machine", "x86-64-v4": "AVX-512", "x86-64-v3": "AVX2", "x86-
 
 def maps(rtol: float) -> dict[str, Study]:
     """Return two maps of the thesis rig over crossover: of the cart's mass, joint locked, and of stroke, joint free."""
-    stage = friso.example("thesis_rig")
+    stage = friso.load(friso.example("thesis_rig"))
     locked = {"controller.crossover": "1 Hz..40 Hz:41", "masses.cart": "0.1 kg..5 kg:41"}
     free = {"controller.crossover": "1 Hz..16 Hz:41", "joint.stroke": "1 um..1 mm:41"}
     return {
