@@ -75,7 +75,6 @@ from friso_thesis.studies.thesis.judges.rig_hunting import judged_move
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
 from friso_thesis.studies.thesis.kept import SOURCES, Kept, kept_findings, put_together, taken_apart
 from friso_thesis.studies.thesis.laws import conclusions_by_law
-from friso_thesis.studies.thesis.linear import NEEDS
 from friso_thesis.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
 from friso_thesis.studies.thesis.plausible import PARTS, _in_space, plausible
 from friso_thesis.studies.thesis.reading import OTHERWISE, OWN, others_of, read_as, reading, words_read
@@ -86,7 +85,13 @@ from friso_thesis.studies.thesis.verdicts import not_covered, verdict
 
 ROOT = Path(__file__).parents[2]
 POINTS = 21
-REPRODUCE = import_module("friso_thesis.studies.thesis.reproduce")
+
+
+def module(name: str) -> Any:
+    return import_module(f"friso_thesis.studies.thesis.{name}")
+
+
+REPRODUCE = module("reproduce")
 
 pytestmark = pytest.mark.xdist_group("reproduction")
 
@@ -103,36 +108,6 @@ TABLE_3 = {
     "isolator-crossover-soft": {"controller.crossover": (1, 16), "joint.stroke": (0, 1e-3)},
 }
 """Typed from the thesis's Table 3, in SI units (crossovers in Hz)."""
-
-LINEAR = {"E1", "F7", "F8", "F22", "F23"}
-"""Claims that linear analysis decides: their judges are tried in test_linear_claims.py."""
-
-LEAVES, RULES = {"S35"}, {"D1"}
-"""Claims on the leaf springs, and on the rules of design: tried in test_design_claims.py."""
-
-IDENTIFIED = {"F17", "F18", "F19", "F20", "F21"}
-"""Claims on the identification of the rig: tried in test_identify_experiments.py."""
-
-
-FURTHER = {"S323", "S341", "S342", "S352", "S41", "F25O", "F25P", "S5"} | {
-    "S323C",
-    "E6",
-    "S33",
-    "S341S",
-    "S341W",
-    "S341A",
-    "S342F",
-    "S41M",
-    "S41G",
-    "S41A",
-    "S421",
-    "F25R",
-    "S5P",
-}
-"""Claims that were found by reading on: tried in test_thesis_arguments.py and test_design_claims.py."""
-
-BUILT = {"F24", "F25", "F26", "F27", "F28"}
-"""Claims on the rig as built: tried in test_rig_hunting.py."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -160,7 +135,7 @@ def thorough_study() -> Reproduction:
     """
     with patched(
         {
-            import_module("friso_thesis.studies.thesis.plausible"): {"MAP_POINTS": 5, "ANALYSED_EVERY": 9},
+            module("plausible"): {"MAP_POINTS": 5, "ANALYSED_EVERY": 9},
             REPRODUCE: {"JUDGED_POINTS": 5},
         }
     ):
@@ -170,70 +145,45 @@ def thorough_study() -> Reproduction:
 # --- the data ---------------------------------------------------------------------------------------------------------
 
 
-def test_the_studies_have_the_ranges_of_table_3() -> None:
-    assert {
-        name: {span.key: (span.low, span.high) for span in study.spans} for name, study in STUDIES.items()
-    } == TABLE_3
-    logarithmic = {name for name, study in STUDIES.items() if all(span.log for span in study.spans)}
-    assert logarithmic == {"isolator-damping"}
-    assert not any(span.log for name in STUDIES.keys() - logarithmic for span in STUDIES[name].spans)
-
-
-def test_stiffness_and_lock_of_the_studies() -> None:
-    stiffness = {name: study.stage().flat()["joint.stiffness"] for name, study in STUDIES.items()}
-    assert {name for name, value in stiffness.items() if value == 1e3} == {"isolator-crossover-soft"}
-    locked = {name for name, study in STUDIES.items() if study.stage().flat()["joint.locked"]}
+def test_the_studies_are_those_of_table_3() -> None:
+    """Ranges, scales, stiffness and lock; the marker is the rig."""
+    ranges = {name: {span.key: (span.low, span.high) for span in study.spans} for name, study in STUDIES.items()}
+    assert ranges == TABLE_3
+    stages = {name: study.stage().flat() for name, study in STUDIES.items()}
+    assert {name for name, flat in stages.items() if flat["joint.stiffness"] == 1e3} == {"isolator-crossover-soft"}
+    locked = {name for name, flat in stages.items() if flat["joint.locked"]}
     assert locked == {"path", "system", "friction", "control"}
+    for name, study in STUDIES.items():
+        assert {span.log for span in study.spans} == {name == "isolator-damping"}
+        assert study.marker.keys() == ranges[name].keys()
+        flat = {key: {**stages[name], "mass": 1.7}[key] for key in study.marker}
+        assert study.marker == pytest.approx(flat, rel=1e-12)
 
 
-def test_the_markers_are_the_rig() -> None:
-    for study in STUDIES.values():
-        flat = {**study.stage().flat(), "mass": 1.7}
-        assert set(study.marker) == {span.key for span in study.spans}
-        for key, value in study.marker.items():
-            assert flat[key] == pytest.approx(value, rel=1e-12)
-
-
-def test_the_packaged_rig_is_the_example() -> None:
-    assert thesis_rig() == friso.load(ROOT / "examples" / "thesis_rig.toml")
+def test_the_packaged_rigs_are_the_examples() -> None:
+    """The real rig has the rails of `friso rig`, so their shares are those on the page."""
     packaged = files("friso_thesis.studies.thesis").joinpath("thesis_rig.toml").read_text(encoding="utf-8")
     assert packaged == (ROOT / "examples" / "thesis_rig.toml").read_text(encoding="utf-8")
-
-
-def test_the_rig_as_built_is_the_example() -> None:
-    """The real rig has the rails of `friso rig`, so their shares are those on the page."""
+    assert thesis_rig() == friso.loads(packaged)
     assert rig_with_drive(thesis_rig()).flat() == friso.load(ROOT / "examples" / "thesis_drive.toml").flat()
 
 
+def still_judged(still: Any) -> Finding:
+    evidence = Evidence({}, {}, identified=cast(Any, SimpleNamespace(standstill=still)))
+    return registered()["F28"].judge(evidence)
+
+
 def test_the_noise_of_fig_28_is_varied() -> None:
-    finding = registered()["F28"].judge(
-        Evidence({}, {}, identified=cast(Any, SimpleNamespace(standstill=standstill(1e-8, 1e-7))))
-    )
+    """The ratio is 10 with every noise, unless the noise decides on it."""
+    small = standstill(1e-8, 1e-7)
+    finding = still_judged(small)
     assert not finding.parts[0].holds
     assert "with 10 times the noise it is met" in finding.parts[0].beyond
     assert finding.table is not None
     assert len(finding.table.rows) == 3
-    assert not finding.parts[1].undecided  # the ratio is 10 with every noise
-
-
-def test_noise_that_decides_on_the_ratio_of_fig_28_leaves_it_open() -> None:
-    varied = replace(standstill(1e-8, 1e-7), louder={1.0: (1e-8, 3e-8), 10.0: (1e-7, 6e-7)})
-    finding = registered()["F28"].judge(Evidence({}, {}, identified=cast(Any, SimpleNamespace(standstill=varied))))
-    assert "3, 6" in finding.parts[1].undecided
-
-
-def test_every_claim_is_in_the_table() -> None:
-    source = ROOT.parent / "shared" / "claims.md"
-    if not source.exists():
-        pytest.skip("the list of claims is not at hand")
-    rows = [line.strip().strip("|").split("|") for line in source.read_text(encoding="utf-8").splitlines()]
-    printed = [[cell.strip() for cell in row] for row in rows if len(row) == 3][2:]
-    listed = [claim for claim in claims() if claim.listed]
-    assert [claim.id for claim in listed] == [row[0] for row in printed]
-    own_words = {"E1", "F26"}  # of which the list says what to check, and the page what the thesis says
-    for claim, (name, _, text) in zip(listed, printed, strict=True):
-        assert (claim.text == text) == (name not in own_words)
-    assert all(claim.where and claim.place for claim in claims())
+    assert not finding.parts[1].undecided
+    varied = replace(small, louder={1.0: (1e-8, 3e-8), 10.0: (1e-7, 6e-7)})
+    assert "3, 6" in still_judged(varied).parts[1].undecided
 
 
 def test_the_thesis_is_quoted_word_for_word() -> None:
@@ -248,13 +198,6 @@ def test_the_thesis_is_quoted_word_for_word() -> None:
         assert claim.quotes
         for quote in claim.quotes:
             assert quote in text, claim.id
-
-
-def test_what_simulation_alone_decides_has_a_judge() -> None:
-    needed = {"F5", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B"}
-    assert needed | LINEAR | LEAVES | RULES | IDENTIFIED | BUILT | FURTHER == registered().keys()
-    expected = STUDIES.keys() | RESPONSES.keys() | NEEDS.keys() | EXPERIMENTS.keys()
-    assert all(entry.needs <= expected for entry in registered().values())
 
 
 @pytest.mark.parametrize("value", OPEN, ids=lambda v: v.name)
@@ -373,68 +316,55 @@ def crossover_pair(stiff: float, soft: float, name: str = "isolator-crossover") 
 
 F15B_MAPS = "isolator-friction", "friction"
 
-HOLDS: Mapping[str, tuple[dict[str, xr.Dataset], dict[str, Response]]] = {
+Case = tuple[dict[str, xr.Dataset], dict[str, Response]]
+
+
+def on(name: str, count: Callable[[np.ndarray, np.ndarray], Any], **cells: Response) -> Case:
+    """Evidence of one map."""
+    return {name: made(name, count)}, cells
+
+
+def of_friction(free: Callable[[np.ndarray, np.ndarray], Any], locked: Callable[[np.ndarray, np.ndarray], Any]) -> Case:
+    """Evidence of both maps of friction."""
+    return {name: made(name, friction_map(count)) for name, count in zip(F15B_MAPS, (free, locked), strict=True)}, {}
+
+
+def wide_gap(static: np.ndarray, coulomb: np.ndarray) -> Any:
+    return 6 * (static - coulomb > 1)
+
+
+def checkered(a: np.ndarray, t: np.ndarray) -> Any:
+    cells = (np.round(a / 7.5) + np.round(t / 7.5e-3)).astype(int)
+    return 6 * ((a * t > 0) & ((a * t > 3) | (cells % 2 == 0)))
+
+
+HOLDS: Mapping[str, Case] = {
     "F5": ({}, {"locked": cell()}),
-    "F11A": (
-        {
-            "path": made(
-                "path",
-                lambda a, t: (
-                    6
-                    * ((a * t > 0) & ((a * t > 3) | ((np.round(a / 7.5) + np.round(t / 7.5e-3)).astype(int) % 2 == 0)))
-                ),
-            )
-        },
-        {},
-    ),
-    "F11B": ({"system": made("system", lambda f, m: 4 * (f < 20 / np.sqrt(m / 0.1) + 2))}, {}),
-    "F12A": (
-        {"friction": made("friction", friction_map(lambda s, c: np.where(s - c > 0.9, np.round(3 * (s - c)), 0)))},
-        {},
-    ),
-    "F12B": ({"control": made("control", lambda a, b: np.round(40 * a + 12 / b))}, {}),
+    "F11A": on("path", checkered),
+    "F11B": on("system", lambda f, m: 4 * (f < 20 / np.sqrt(m / 0.1) + 2)),
+    "F12A": on("friction", friction_map(lambda s, c: np.where(s - c > 0.9, np.round(3 * (s - c)), 0))),
+    "F12B": on("control", lambda a, b: np.round(40 * a + 12 / b)),
     "F13": ({}, {WIDE: sticks(0.6, 0.5), NARROW: sticks(0.9, 0.7)}),
-    "F14A": (
-        {"isolator-stiffness": made("isolator-stiffness", lambda k, s: 6 * ((k * s > 5) | (k > 13e3) | (s == 0)))},
-        {"locked": cell()},
-    ),
-    "F14B": (
-        {"isolator-damping": made("isolator-damping", lambda d, s: 6 * (s < np.where(d > 10, 1e-4, 3e-5)))},
-        {"locked": cell()},
-    ),
-    "F15A": ({"isolator-masses": made("isolator-masses", lambda c, s: 3 * ((c < 0.6) & (s < 0.15)))}, {}),
-    "F15B": (
-        {
-            "isolator-friction": made("isolator-friction", friction_map(lambda s, c: 0 * s * c)),
-            "friction": made("friction", friction_map(lambda s, c: 6 * (s - c > 1))),
-        },
-        {},
-    ),
+    "F14A": on("isolator-stiffness", lambda k, s: 6 * ((k * s > 5) | (k > 13e3) | (s == 0)), locked=cell()),
+    "F14B": on("isolator-damping", lambda d, s: 6 * (s < np.where(d > 10, 1e-4, 3e-5)), locked=cell()),
+    "F15A": on("isolator-masses", lambda c, s: 3 * ((c < 0.6) & (s < 0.15))),
+    "F15B": of_friction(lambda s, c: 0 * s * c, wide_gap),
     "F16A": (crossover_pair(6, 5), {}),
     "F16B": (crossover_pair(6, 4.5), {}),
 }
 
-FAILS: Mapping[str, tuple[dict[str, xr.Dataset], dict[str, Response]]] = {
+FAILS: Mapping[str, Case] = {
     "F5": ({}, {"locked": cell(0, 1e-9, np.nan)}),
-    "F11A": ({"path": made("path", lambda a, t: 6 * ((a < 40) & (t < 0.05)))}, {}),
-    "F11B": ({"system": made("system", lambda f, m: 4 * (f < 5 + 7 * m))}, {}),
-    "F12A": (
-        {"friction": made("friction", friction_map(lambda s, c: np.where(s > 0.2, np.round(20 - 3 * (s - c)), 0)))},
-        {},
-    ),
-    "F12B": ({"control": made("control", lambda a, b: np.where(a < 0.2, np.round(10 - 20 * a + b), 0))}, {}),
+    "F11A": on("path", lambda a, t: 6 * ((a < 40) & (t < 0.05))),
+    "F11B": on("system", lambda f, m: 4 * (f < 5 + 7 * m)),
+    "F12A": on("friction", friction_map(lambda s, c: np.where(s > 0.2, np.round(20 - 3 * (s - c)), 0))),
+    "F12B": on("control", lambda a, b: np.where(a < 0.2, np.round(10 - 20 * a + b), 0)),
     "F13": ({}, {WIDE: sticks(0.9, 0.7), NARROW: sticks(0.6, 0.5)}),
-    "F14A": (
-        {"isolator-stiffness": made("isolator-stiffness", lambda k, s: 2 * (k > 20e6 * s))},
-        {"locked": cell()},
-    ),
-    "F14B": ({"isolator-damping": made("isolator-damping", lambda d, s: 6 * (s < 1e-3))}, {"locked": cell()}),
-    "F15A": ({"isolator-masses": made("isolator-masses", lambda c, s: 3 * (c / s > 4))}, {}),
-    "F15B": (
-        {name: made(name, friction_map(lambda s, c: 6 * (s - c > 1))) for name in ("isolator-friction", "friction")},
-        {},
-    ),
-    "F16A": ({"isolator-crossover": made("isolator-crossover", lambda f, s: 3 * (f < 20 * (1 - s / 1.2e-3)))}, {}),
+    "F14A": on("isolator-stiffness", lambda k, s: 2 * (k > 20e6 * s), locked=cell()),
+    "F14B": on("isolator-damping", lambda d, s: 6 * (s < 1e-3), locked=cell()),
+    "F15A": on("isolator-masses", lambda c, s: 3 * (c / s > 4)),
+    "F15B": of_friction(wide_gap, wide_gap),
+    "F16A": on("isolator-crossover", lambda f, s: 3 * (f < 20 * (1 - s / 1.2e-3))),
     "F16B": (crossover_pair(6, 7.5), {}),
 }
 
@@ -538,10 +468,6 @@ def test_the_long_strokes_are_those_of_the_reading() -> None:
     assert few.pattern == registered()["F16A"].judge(evidence).pattern
 
 
-def test_every_judge_of_maps_is_tried_both_ways() -> None:
-    assert HOLDS.keys() == FAILS.keys() == registered().keys() - LINEAR - LEAVES - RULES - IDENTIFIED - BUILT - FURTHER
-
-
 # --- verdicts ---------------------------------------------------------------------------------------------------------
 
 
@@ -549,53 +475,54 @@ def finding(*holds: bool) -> Finding:
     return Finding(tuple(Part(f"criterion {i}", hold, f"number {i}") for i, hold in enumerate(holds)))
 
 
-def test_judgements_of_parts() -> None:
-    assert [finding(*item).judgement for item in ((True, True), (True, False), (False, False))] == [
-        "holds",
-        "holds in part",
-        "differs",
-    ]
+YES, NO = Part("b", True, "2"), Part("c", False, "3")
+OPEN_PART = Part("a", True, "1", undecided=BESIDE)
+OWN_PART = Part("friso finds what it entered", True, "1", self_test=True)
+BEYOND = Part("beyond", False, "1", beyond="Simulation cannot decide this. More.")
 
 
-def test_a_criterion_beside_its_threshold_leaves_open_what_it_could_turn() -> None:
-    beside_threshold, yes, no = Part("a", True, "1", undecided=BESIDE), Part("b", True, "2"), Part("c", False, "3")
-    assert Finding((beside_threshold, yes)).judgement == "cannot be decided"
-    assert Finding((beside_threshold, no)).judgement == "cannot be decided"
-    assert Finding((beside_threshold, yes, no)).judgement == "holds in part"
-    assert Finding((yes, no)).judgement == "holds in part"
+@pytest.mark.parametrize(
+    ("parts", "judgement"),
+    [
+        ((YES, YES), "holds"),
+        ((YES, NO), "holds in part"),
+        ((NO, NO), "differs"),
+        ((OPEN_PART, YES), "cannot be decided"),
+        ((OPEN_PART, NO), "cannot be decided"),
+        ((OPEN_PART, YES, NO), "holds in part"),
+        ((BEYOND,), "cannot be decided"),
+        ((BEYOND, YES), "holds"),
+        ((NO, OWN_PART), "differs"),
+        ((YES, replace(OWN_PART, holds=False)), "holds"),
+    ],
+)
+def test_judgements_of_parts(parts: tuple[Part, ...], judgement: str) -> None:
+    """What a criterion beside its threshold could turn is open; parts beyond simulation and self-tests do not count."""
+    assert Finding(parts).judgement == judgement
 
 
-def test_a_claim_that_no_draw_decides_does_not_hold() -> None:
-    judged = [(draw(k), Finding((Part("a", True, "1", undecided=BESIDE),))) for k in range(16)]
-    (claim, *_) = claims()
-    holds, fails = (
-        Finding((Part("a", True, "1"),)),
-        Finding((Part("a", True, "1", undecided=BESIDE), Part("b", False, "2"))),
-    )
-    space = _in_space(registered()["S41"], judged, {})
-    assert verdict(claim, "", holds, space=space).judgement == "cannot be decided"
-    some = _in_space(registered()["S41"], [(draw(k), holds) for k in range(16)], {})
-    assert verdict(claim, "", fails, space=some).judgement == "depends"
+def test_draws_that_are_open_decide_nothing() -> None:
+    """A claim that no draw decides does not hold; a draw in which no criterion fails is undecided if one is open."""
 
+    def space_of(*draws: Finding) -> Any:
+        return _in_space(registered()["S41"], [(draw(k), one) for k, one in enumerate(draws)], {})
 
-def test_a_draw_without_a_failing_criterion_is_undecided_if_one_is_open() -> None:
-    tried = [[Part("a", holds, "1", undecided=open_)] for holds, open_ in ((True, ""), (True, BESIDE), (False, ""))]
-    tried += [[Part("a", False, "1"), Part("b", True, "2", undecided=BESIDE)]]
-    judged = [(draw(k), Finding(tuple(parts))) for k, parts in enumerate(tried)]
-    space = _in_space(registered()["S41"], judged[:3], {})
+    holds, fails = Finding((YES,)), Finding((OPEN_PART, NO))
+    undecided = space_of(*[Finding((OPEN_PART,))] * 16)
+    assert verdict(claims()[0], "", holds, space=undecided).judgement == "cannot be decided"
+    assert verdict(claims()[0], "", fails, space=space_of(*[holds] * 16)).judgement == "depends"
+    space = space_of(holds, Finding((OPEN_PART,)), Finding((NO,)))
     assert (space.count, space.undecided, space.misses) == (1, 1, 1)
-    assert _in_space(registered()["S41"], judged[3:], {}).misses == 1
+    assert space_of(Finding((NO, OPEN_PART))).misses == 1
 
 
-def test_an_undecided_part_counts_for_nothing_and_says_why() -> None:
-    beyond = Part("beyond", False, "1", beyond="Simulation cannot decide this. More.")
-    alone, beside_another = Finding((beyond,)), Finding((beyond, Part("met", True, "2")))
-    assert (alone.judgement, beside_another.judgement) == ("cannot be decided", "holds")
+def test_an_undecided_part_says_why() -> None:
+    beside_another = Finding((BEYOND, YES))
     assert beside_another.pattern == (None, True)
     item = verdict(claims()[0], "1", beside_another)
     assert (item.judgement, item.reason) == ("holds", "")
     assert reasons(item) == ["Criterion 1: Simulation cannot decide this."]
-    assert ("Reason", beyond.beyond) in details(item)
+    assert ("Reason", BEYOND.beyond) in details(item)
 
 
 def test_a_number_beside_its_threshold_is_undecided() -> None:
@@ -614,27 +541,12 @@ def test_the_count_judges_and_what_attracts_stands_beside() -> None:
 
 def test_reasons_say_to_which_criteria_they_belong() -> None:
     why = "Friction hardly moves the line. Cables may."
-    parts = (
-        Part("a", False, "1", why),
-        Part("b", True, "2"),
-        Part("c", False, "3", why),
-        Part("d", False, "4", "Other."),
-    )
-    finding = Finding(parts)
-    assert reasons(verdict(claims()[0], "1", finding)) == [
-        "Criteria 1 and 3: Friction hardly moves the line.",
-        "Criterion 4: Other.",
-    ]
-    alone = Finding(parts[:1])
-    item = verdict(claims()[0], "1", alone)
-    assert reasons(item) == ["Friction hardly moves the line."]
-    assert ("Reason", why) in details(item)
-
-
-def test_a_self_test_counts_for_nothing() -> None:
-    own = Part("friso finds what it entered", True, "1", self_test=True)
-    assert Finding((Part("claim", False, "2"), own)).judgement == "differs"
-    assert Finding((Part("claim", True, "2"), replace(own, holds=False))).judgement == "holds"
+    parts = (replace(NO, why=why), YES, replace(NO, why=why), replace(NO, why="Other."))
+    item = verdict(claims()[0], "1", Finding(parts))
+    assert reasons(item) == ["Criteria 1 and 3: Friction hardly moves the line.", "Criterion 4: Other."]
+    alone = verdict(claims()[0], "1", Finding(parts[:1]))
+    assert reasons(alone) == ["Friction hardly moves the line."]
+    assert ("Reason", why) in details(alone)
 
 
 def test_draws_decide_between_holds_depends_and_differs(thorough_study: Reproduction) -> None:
@@ -708,26 +620,24 @@ def test_trends_are_judged_over_all_cells_too() -> None:
 
 def test_the_locked_limit_is_that_of_the_mass_of_the_abstract() -> None:
     """D1: 15 Hz belongs to 2.5 kg, not to the 1.7 kg weighed."""
-    runs = made("system", lambda f, m: 4 * (f < 27 - 6.9 * m), 81)
-    assert design_rules.locked_limit(Evidence({"system": runs}, {}), 1.7) == pytest.approx(15.3, abs=0.5)
-    assert design_rules.locked_limit(Evidence({"system": runs}, {}), 2.5) == pytest.approx(9.75, abs=0.5)
+    runs = {"system": made("system", lambda f, m: 4 * (f < 27 - 6.9 * m), 81)}
+    limits = [design_rules.locked_limit(Evidence(runs, {}), mass) for mass in (1.7, 2.5)]
+    assert limits == pytest.approx([15.3, 9.75], abs=0.5)
 
 
 def test_paths_longer_than_the_rig_do_not_decide_alone() -> None:
-    """F11A: a block at rest among the paths that fit 160 mm is reported."""
-    part = registered()["F11A"].judge(Evidence({"path": made("path", lambda a, t: 6 * (a * t**2 > 0.16))}, {})).parts[1]
-    assert not part.holds
-    assert "% of the paths fit" in part.number
+    """F11A: a block at rest among the paths that fit 160 mm is reported; with as long at constant speed as
+    accelerating, fewer fit."""
 
+    def part(count: Callable[[np.ndarray, np.ndarray], Any], **changes: float) -> Part:
+        rig = thesis_rig().replace({f"motion.{key}": value for key, value in changes.items()})
+        return registered()["F11A"].judge(Evidence(*on("path", count), rig=rig)).parts[1]
 
-def test_a_path_at_constant_speed_is_longer() -> None:
-    """F11A: with as long at constant speed as accelerating, half as many paths fit."""
-    path = {"path": made("path", lambda a, t: 6 + 0 * a * t)}
-    rig = thesis_rig().replace({"motion.cruise_ratio": 1.0})
-    shares = [
-        registered()["F11A"].judge(Evidence(path, {}, rig=stage)).parts[1].number for stage in (thesis_rig(), rig)
-    ]
-    assert float(shares[0].split(" %")[0]) > float(shares[1].split(" %")[0])
+    block = part(lambda a, t: 6 * (a * t**2 > 0.16))
+    assert not block.holds
+    assert "% of the paths fit" in block.number
+    shares = [part(lambda a, t: 6 + 0 * a * t, **more).number.split(" %")[0] for more in ({}, {"cruise_ratio": 1.0})]
+    assert float(shares[0]) > float(shares[1])
 
 
 def test_the_rig_moves_as_prescribed_whatever_is_drawn() -> None:
@@ -738,24 +648,17 @@ def test_the_rig_moves_as_prescribed_whatever_is_drawn() -> None:
         assert machine.flat()["motion.acceleration"] == 100
 
 
-def test_the_conclusions_under_each_law_are_of_the_claims_asked_for() -> None:
+def test_claims_asked_for_have_a_page_and_conclusions_of_their_own() -> None:
     """Under the thesis's own law alone: the others take long."""
-    asked = reproduce(only=["E1", "S35"], points=3, with_cycles=False, draws=0)
-    with patched(
-        {import_module("friso_thesis.studies.thesis.laws"): {"kept_laws": lambda rig, elements: ((None,), {})}}
-    ):
-        by_law = conclusions_by_law(asked)
-    assert [item.claim.id for item in by_law.conclusions] == ["E1"]
-
-
-def test_claims_asked_for_have_a_page_of_their_own() -> None:
-    """The page has all claims asked for. The whole page: `test_document_and_page_have_every_claim`."""
     asked = reproduce(only=["E1", "S35"], points=3, with_cycles=False, draws=0)
     judged = {entry["id"] for entry in reproduce_document(asked)["claims"] if entry["parts"]}
     assert judged == {"E1", "S35"}
     page = str(reproduce_files(asked)["reproduction.html"])
     assert [claim for claim in judged if f'id="claim-{claim}"' not in page] == []
     assert "default-src 'none'" in page
+    with patched({module("laws"): {"kept_laws": lambda rig, elements: ((None,), {})}}):
+        by_law = conclusions_by_law(asked)
+    assert [item.claim.id for item in by_law.conclusions] == ["E1"]
 
 
 def test_one_peak_moves_everywhere() -> None:
@@ -768,21 +671,14 @@ def test_every_open_question_has_a_command_and_its_file() -> None:
     for question in QUESTIONS:
         program, name, *others = question.command.split()
         assert re.search(r"\d", question.answer())
-        assert program == "friso"
-        assert name in COMMANDS
+        assert (program, name in COMMANDS, (ROOT / others[-1]).exists()) == ("friso", True, True)
         assert others[0] in RIG_EXPERIMENTS or name != "rig"
-        assert (ROOT / others[-1]).exists()
 
 
 def test_the_gains_of_the_design_method_are_those_of_the_stage() -> None:
     """Eq. 8 by hand: k_p of 1.7 kg at 8 Hz, alpha 0.1, beta 2."""
     omega = 2 * np.pi * 8
     assert rig_gains(1.7)[0] == pytest.approx(1.5 * 1.7 * omega**2 / 10**0.5)
-
-
-def test_the_marker_is_told_as_friso_s(thorough_study: Reproduction) -> None:
-    figures = reproduction_figures(thorough_study)
-    assert all("friso's evaluation point" in figures[number].caption for number in ("11", "12", "14", "15", "16"))
 
 
 def test_values_that_do_not_enter_are_not_ranked() -> None:
@@ -824,31 +720,19 @@ def test_zero_rows_have_their_meaning() -> None:
     assert set(none.outcome.values) == {"swings"}
 
 
+def runs_of(peaks: list[float], sizes: list[float], words: list[str]) -> xr.Dataset:
+    return by_peak_count(xr.Dataset({"peaks": ("x", peaks), "peak_to_peak": ("x", sizes), "outcome": ("x", words)}))
+
+
 def test_lasting_hunting() -> None:
-    runs = xr.Dataset(
-        {
-            "peaks": ("x", [5.0, 3.0, 0.0, np.nan]),
-            "peak_to_peak": ("x", [1e-3, 1e-9, 1e-3, np.nan]),
-            "outcome": ("x", ["swings", "rests", "swings", "invalid"]),
-        }
-    )
-    assert by_peak_count(runs).keeps_moving.values.tolist() == [True, True, False, False]
+    words = ["swings", "rests", "swings", "invalid"]
+    runs = runs_of([5.0, 3.0, 0.0, np.nan], [1e-3, 1e-9, 1e-3, np.nan], words)
+    assert runs.keeps_moving.values.tolist() == [True, True, False, False]
 
 
 def test_runs_read_by_what_attracts() -> None:
-    """A cell with an uncertain attractor is left out.
-
-    The frequency of a cycle is known if a move ended in it.
-    """
-    runs = by_peak_count(
-        xr.Dataset(
-            {
-                "peaks": ("x", [5.0, 3.0, 0.0, 2.0]),
-                "peak_to_peak": ("x", [1e-3] * 4),
-                "outcome": ("x", ["swings", "rests", "rests", "swings"]),
-            }
-        )
-    )
+    """A cell with an uncertain attractor is left out; the frequency of a cycle is known if a move ended in it."""
+    runs = runs_of([5.0, 3.0, 0.0, 2.0], [1e-3] * 4, ["swings", "rests", "rests", "swings"])
     flags = np.array([True, False, True, True]), np.array([True, True, True, False])
     read = by_attraction(runs, *flags, np.full(4, np.inf))
     assert read.keeps_moving.values.tolist() == [True, False, True, False]
@@ -878,11 +762,11 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
         ["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False, draws=0
     )
     judged = {item.claim.id for item in reproduction.verdicts if item.finding}
-    of_maps = {"F25O", "F25P", "F25R", "S341", "S342F", "S5", "S5P"}
-    assert judged == {"F5", "F12B", "F13"} | (FURTHER - of_maps) | LINEAR | LEAVES | IDENTIFIED | BUILT
-    assert {entry.reason for entry in reproduction.verdicts if entry.claim.id == "F11A"} == {
-        "not computed in this run: path"
-    }
+    missing = STUDIES.keys() - {"control"}
+    assert judged == {claim for claim, entry in registered().items() if not entry.needs & missing}
+    assert judged >= {"F5", "F12B", "F13", "E1", "S35", "F17", "F24"}
+    (reason,) = {entry.reason for entry in reproduction.verdicts if entry.claim.id == "F11A"}
+    assert reason == "not computed in this run: path"
     assert [step[0] for step in steps] == sorted(step[0] for step in steps)
     assert steps[-1][0] == steps[-1][1]
 
@@ -906,9 +790,7 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         if label.startswith("draw 1"):
             raise KeyboardInterrupt
 
-    with patched(
-        {import_module("friso_thesis.studies.thesis.plausible"): {"MAP_POINTS": 3}, REPRODUCE: {"JUDGED_POINTS": 3}}
-    ):
+    with patched({module("plausible"): {"MAP_POINTS": 3}, REPRODUCE: {"JUDGED_POINTS": 3}}):
         with pytest.raises(KeyboardInterrupt):
             reproduce(**orders, kept=kept, progress=stop)
         before = {file: file.stat().st_mtime_ns for file in (tmp_path / "kept").iterdir()}
@@ -945,26 +827,20 @@ def test_few_points_are_shown_and_not_judged_on() -> None:
     assert (first["points"], first["points_judged"], second["points_judged"]) == (3, 7, 7)
 
 
-def test_experiments_are_kept_whole(tmp_path: Path) -> None:
-    """Every kind of result is read back as it was written, and a damaged one is computed again."""
-    kept, experiment = Kept(tmp_path), Experiments(thesis_rig())
+def test_results_are_kept_whole(tmp_path: Path) -> None:
+    """Every kind of result is read back as it was written: words in arrays of objects, as runs have them, as texts."""
+    kept, experiment, runs = Kept(tmp_path), Experiments(thesis_rig()), rail_runs([3, 0])
+    kept.result(("runs",), RailRuns, lambda: replace(runs, outcome=runs.outcome.astype(object)))
+    assert_same(kept.result(("runs",), RailRuns, lambda: pytest.fail("they were kept")), runs)
     for name in (*EXPERIMENTS, TRACES):
         kind, result = get_type_hints(Experiments)[name], getattr(experiment, name)
         kept.result((name,), kind, lambda made=result: made)
         assert_same(kept.result((name,), kind, lambda: pytest.fail("it was kept")), result)
-        if name == GRID:
-            arrays = taken_apart(result)
-            for wrong in ({**arrays, "tree": np.array("[1]")}, {"tree": arrays["tree"]}, {"tree": np.array("[")}):
-                with pytest.raises((ValueError, TypeError, KeyError)):
-                    put_together(kind, wrong)
-    assert kept.count == len(EXPERIMENTS) + 1
-
-
-def test_outcomes_of_runs_are_kept(tmp_path: Path) -> None:
-    """Words in arrays of objects, as runs have them, come back as texts: nothing is run again."""
-    kept, runs = Kept(tmp_path), rail_runs([3, 0])
-    kept.result(("runs",), RailRuns, lambda: replace(runs, outcome=runs.outcome.astype(object)))
-    assert_same(kept.result(("runs",), RailRuns, lambda: pytest.fail("they were kept")), runs)
+    arrays, kind = taken_apart(getattr(experiment, GRID)), get_type_hints(Experiments)[GRID]
+    for wrong in ({**arrays, "tree": np.array("[1]")}, {"tree": arrays["tree"]}, {"tree": np.array("[")}):
+        with pytest.raises((ValueError, TypeError, KeyError)):
+            put_together(kind, wrong)
+    assert kept.count == len(EXPERIMENTS) + 2
 
 
 def assert_same(again: Any, made: Any) -> None:
@@ -1002,7 +878,7 @@ def test_a_draw_that_decides_nothing_says_why() -> None:
     def stopped(*_: Any) -> Any:
         raise ValueError("the loop stops")
 
-    with patched({import_module("friso_thesis.studies.thesis.plausible"): {"MAP_POINTS": 3, "counted": stopped}}):
+    with patched({module("plausible"): {"MAP_POINTS": 3, "counted": stopped}}):
         space = plausible({"F15B": registered()["F15B"]}, 1).claims["F15B"]
     assert (space.undecided, space.count, space.failures) == (1, 0, {0: "ValueError: the loop stops"})
     undecided: Any = SimpleNamespace(finding=None, space=space, reason="", turned={}, attracts=None)
@@ -1086,59 +962,22 @@ def test_the_summary_has_every_text_whole_on_one_sheet() -> None:
 
 
 def test_fig_14b_at_both_tolerances(thorough_study: Reproduction) -> None:
+    """A count that is unknown at both does not differ."""
     assert [runs.attrs["rtol"] for runs in thorough_study.tolerances.values()] == [1e-4, 1e-8]
     loose, tight = thorough_study.tolerances.values()
     assert thorough_study.changed[0] == pytest.approx(float((loose.keeps_moving != tight.keeps_moving).mean()))
     assert thorough_study.changed[1] == pytest.approx(float((loose["count"] != tight["count"]).mean()))
-
-
-def test_a_count_unknown_at_both_tolerances_does_not_differ(thorough_study: Reproduction) -> None:
     loose = made("isolator-damping", lambda d, s: np.where(s < 1e-4, -1, 2 * (s < 1e-3)), 5)
-    tight = loose.copy()
     assert np.isnan(loose["count"]).any()
-    assert _changed({1e-4: loose, 1e-8: tight}) == (0.0, 0.0)
+    assert _changed({1e-4: loose, 1e-8: loose.copy()}) == (0.0, 0.0)
     other = loose.assign(count=loose["count"].fillna(1.0))
     assert _changed({1e-4: loose, 1e-8: other})[1] == pytest.approx(float(np.isnan(loose["count"]).mean()))
-    document = reproduce_document(replace(thorough_study, tolerances={1e-4: loose, 1e-8: tight}))
+    document = reproduce_document(replace(thorough_study, tolerances={1e-4: loose, 1e-8: loose.copy()}))
     assert document["figure_14b"]["rtol"] == [1e-8, 1e-4]
 
 
-@pytest.mark.parametrize(("ink", "paper"), [("#222222", "#ffffff"), ("#e8e8e8", "#16181b")], ids=["light", "dark"])
-def test_the_word_of_agreement_stands_out_from_the_page(ink: str, paper: str) -> None:
-    """Coloured words have the contrast that WCAG 2 asks of text, 4.5, in either scheme of page.html."""
-    skeleton, own = (ROOT / package / "shown" / "templates" for package in ("friso", "friso_thesis"))
-    of_all = "".join(re.findall(r":root \{[^}]*\}", (skeleton / "page.html").read_text("utf-8")))
-    assert {ink.replace("#222222", "#222"), paper.replace("#ffffff", "#fff")} <= {*re.findall(r"#\w+", of_all)}
-    style = (own / "reproduce.html").read_text("utf-8")
-    (share,) = re.findall(r"\.judgement \{ color: color-mix\(in srgb, var\(--case\) (\d+)%, var\(--ink\)\)", style)
-    for colour in COLOURS.values():
-        mixed = (int(share) * rgb(colour) + (100 - int(share)) * rgb(ink)) / 100
-        bright, dark = sorted((luminance(mixed), luminance(rgb(paper))), reverse=True)
-        assert (bright + 0.05) / (dark + 0.05) >= 4.5
-
-
-def rgb(colour: str) -> np.ndarray:
-    return np.array([int(colour[place : place + 2], 16) for place in (1, 3, 5)])
-
-
-def luminance(colour: np.ndarray) -> float:
-    shares = colour / 255
-    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
-
-
-def test_titles_say_what_is_drawn_whatever_was_found(thorough_study: Reproduction) -> None:
-    still = {
-        name: Response(cell(0, 0.0, np.nan).cell, response.trace) for name, response in thorough_study.responses.items()
-    }
-    for number, figure in reproduction_figures(replace(thorough_study, responses=still)).items():
-        assert "hunt" not in figure.title, number
-        assert "symmetric" not in figure.caption, number
-
-
 def test_a_new_judge_needs_no_change_of_the_page(thorough_study: Reproduction, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The way in for later work: a decorated function, and its finding stands in page and document, escaped."""
-    assert "F28" in registered()
+    """The finding of a decorated function stands in page and document, escaped."""
     monkeypatch.delitem(_JUDGES, "F28")
     try:
 
@@ -1154,7 +993,6 @@ def test_a_new_judge_needs_no_change_of_the_page(thorough_study: Reproduction, m
     (entry,) = (claim for claim in reproduce_document(reproduction)["claims"] if claim["id"] == "F28")
     assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
     page = reproduce_html(replace(thorough_study, verdicts=reproduction.verdicts))
-    assert "Figure 28" in page
     linked = [int(number) for number in re.findall(r'<a href="#section-\d+">(\d+)</a>', page)]
     assert 28 in linked
     assert linked == sorted(linked)
@@ -1174,7 +1012,7 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     """Crossover and mass, locked: the flip of the rig's 1.7 kg lies at 9.75 Hz, on the drawn curve as in the check; the
     cells compared add up; the page shows curve and table."""
     study = STUDIES["system"]
-    with patched({import_module("friso_thesis.studies.thesis.cycles"): {"CURVE_NODES": 5}}):
+    with patched({module("cycles"): {"CURVE_NODES": 5}}):
         cycles_ = map_cycles(
             study,
             thorough_study.maps["system"],
@@ -1201,10 +1039,8 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
 
 
 def test_what_is_shortened_ends_with_a_statement() -> None:
-    long = (
-        "the contact of cart and stage would, with the stiffness that Sec. 3.2.3 gives for limiters, not for bearings"
-        * 2
-    )
+    long = "the contact of cart and stage would, with the stiffness that limiters have " * 3
+    long = long.strip()
     assert short(f"{long}. The next one. Assumed: nothing") == long
     assert short("one; two. Three. Assumed: nothing") == "one; two. Three"
     assert short(f"one. Two; {long}") == "one. Two"
