@@ -190,26 +190,37 @@ def test_no_interval_is_made_up(tmp_path: Path, line: str) -> None:
     assert all(channel.time is None for channel in read_table(path).channels)
 
 
+@pytest.mark.parametrize("name", ["pos_s", "acc_rms", "x_ref", "ms", "pos_in", "pos_min", "mm/s", "on/off", "[m]"])
+def test_a_name_without_a_unit_stays_whole(name: str) -> None:
+    assert split_heading(name) == (name, "")
+
+
 @pytest.mark.parametrize(
-    ("name", "unit"),
+    ("heading", "name", "unit"),
     [
-        ("tempo_ms", "ms"),
-        ("vel_mm_s", "mm/s"),
-        ("acc_m_s2", "m/s2"),
-        ("torque_Nm", "Nm"),
-        ("pos_s", ""),
-        ("acc_rms", ""),
-        ("x_ref", ""),
-        ("ms", ""),
-        ("força_N", "N"),
-        ("time_s", "s"),
-        ("pos_in", ""),
-        ("pos_min", ""),
+        ("tempo_ms", "tempo_ms", "ms"),
+        ("vel_mm_s", "vel_mm_s", "mm/s"),
+        ("acc_m_s2", "acc_m_s2", "m/s2"),
+        ("torque_Nm", "torque_Nm", "Nm"),
+        ("força_N", "força_N", "N"),
+        ("time_s", "time_s", "s"),
+        ("enc1 (mm)", "enc1", "mm"),
+        ("x / nm", "x", "nm"),
+        ("v in mm/s", "v", "mm/s"),
+        ("v/(mm/s)", "v", "mm/s"),
+        ("Weg s/mm", "Weg s", "mm"),
+        ("x [flurbs]", "x", "flurbs"),
+        ("test space (1)", "test space (1)", ""),
+        ("omega rad/s", "omega", "rad/s"),
+        ("vel_mm/s", "vel", "mm/s"),
+        ("Stiffness N/m", "Stiffness", "N/m"),
+        ("Damping N*s/mm", "Damping N*s/mm", ""),
+        ("Gain A/V", "Gain A/V", ""),
     ],
 )
-def test_units_at_the_end_of_a_name(name: str, unit: str) -> None:
-    """The name stays as it stands in the file."""
-    assert split_heading(name) == (name, unit)
+def test_units_in_or_behind_a_name(heading: str, name: str, unit: str) -> None:
+    """A unit within the name stays there; a stroke within a unit is not the one before a unit."""
+    assert split_heading(heading) == (name, unit)
 
 
 def test_one_column_with_a_decimal_comma(tmp_path: Path) -> None:
