@@ -1,7 +1,7 @@
 """`friso tune`: machines, remedies, searches and outcomes, with tiny budgets."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +22,6 @@ from friso.app import questions
 from friso.cli.asking import Shown, show
 from friso.design_method.prepare import isolated
 from friso.engine.allowance import allowance
-from friso.engine.arrays import STATISTICS, Results
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.engine.simulate import simulate
@@ -30,7 +29,6 @@ from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.equations.motion import size
 from friso.equations.settings import settings_named
 from friso.equations.structure import shared_structure
-from friso.errors import InputError
 from friso.frequency.crossover import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth, settled_margin
 from friso.frequency.family import controller_response
 from friso.hunting import Ensemble, check_given, find_cycles, find_margin
@@ -39,16 +37,13 @@ from friso.hunting.measures import measured_run
 from friso.progress import Progress
 from friso.questions.check.isolator_words import isolator_sentence
 from friso.questions.tune.document import tune_document
-from friso.questions.tune.figures import _sensitivity, drawn_stages, tune_figures
+from friso.questions.tune.figures import drawn_stages, tune_figures
 from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.page import tune_files
 from friso.questions.tune.present_words import DOUBTS, as_it_is
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.sensitivity_words import ranked_sentences
 from friso.questions.tune.words import (
-    _no_relaxation,
-    _reasons,
-    _without_friction,
     answer,
     assumptions,
     changes,
@@ -57,28 +52,30 @@ from friso.questions.tune.words import (
     rows,
     size_words,
     slowest_time,
+    why_unmet,
     window_lines,
     window_words,
 )
 from friso.remedies import method
 from friso.remedies import search as search_module
+from friso.remedies import sensitivities as sensitivities_module
 from friso.remedies import verified as verified_module
 from friso.remedies.catalogue import BANDWIDTH, Remedy, of_key, remedies, suggestion
 from friso.remedies.least import LEAST, ChangeSize, candidates, change_costs, change_size, least_changes, least_remedy
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
-from friso.remedies.method import Advice, _not_seen, _Session, pairs, tune
+from friso.remedies.method import Advice, pairs, tune
 from friso.remedies.relax import _tolerances, relaxations
-from friso.remedies.search import Budget, Search, TriedPoints, _evolve
-from friso.remedies.sensitivities import Sensitivities, _is_smooth, _of_settling, sensitivity
+from friso.remedies.search import Budget, Search, TriedPoints
+from friso.remedies.sensitivities import Sensitivities, sensitivity
 from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.verified import (
     NO_VARIABLES,
     Performance,
     RemedyOutcome,
-    _stiffness,
     confirmed,
     missed_parts,
+    moving,
     unsettled_parts,
 )
 from friso.remedies.window import VariableWindow, windows
@@ -89,12 +86,41 @@ from friso.stage.correlations import Correlations
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AS_IS = partial(Remedy.settled_on, "")
+ONE_POINT = np.zeros((1, 0))
+MOVE_RTOL = RemedySettings.current().move_rtol
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6, further=74)
 
 
 def unmet_goals(confirmation: Any, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """Return all parts of the goal that a stage misses or may miss."""
     return (*unsettled_parts(confirmation, measured, goal), *missed_parts(measured, goal))
+
+
+def points_of(shares: Any, **columns: Any) -> TriedPoints:
+    """Return settings that were tried, with 1 in all columns that are not stated."""
+    shares = np.array(shares, float).reshape(len(shares), -1)
+    names = [column.name for column in fields(TriedPoints)][1:]
+    return TriedPoints(shares, *(np.array(columns.get(name, np.ones(len(shares)))) for name in names))
+
+
+def search_of(remedy: Remedy, goal: Goal, machines: Fleet, *points: TriedPoints, **behaviour: Any) -> Search:
+    """Return a search that has tried some points, and whose methods may behave otherwise."""
+    search = Search(remedy, goal, machines, machines, remedy.stage, TINY, lambda label: None, [*points])
+    vars(search).update(behaviour)
+    return search
+
+
+def session_of(tuning: Advice, *outcomes: RemedyOutcome, **parts: Any) -> Any:
+    """Return a search for remedies of a stage in the middle of its work."""
+    made: dict[str, Any] = {"stage": tuning.stage, "drive": tuning.stage, "goal": tuning.goal, "budget": TINY}
+    made |= dict.fromkeys(("machines", "fresh", "unseen", "further"), tuning.machines)
+    made |= {"report": lambda *label: None, **parts}
+    return method._Session(**made, outcomes=[*outcomes])
+
+
+def every(batch: np.ndarray) -> np.ndarray:
+    """Return one for each of the points."""
+    return np.ones(len(batch))
 
 
 @pytest.fixture(scope="module")
@@ -120,21 +146,26 @@ def tuning(rigid: Stage, goal: Goal) -> Advice:
 
 
 @pytest.fixture(scope="module")
+def works(tuning: Advice) -> SimpleNamespace:
+    """The remedy that works, with its measured stage."""
+    (outcome,) = tuning.working
+    assert outcome.stage is not None
+    assert outcome.measured is not None
+    return SimpleNamespace(outcome=outcome, stage=outcome.stage, measured=outcome.measured)
+
+
+@pytest.fixture(scope="module")
 def machines(rigid: Stage) -> Fleet:
     return draw_fleet(rigid, Correlations(), 5, 1)
 
 
-def test_the_first_machine_is_that_of_the_file(rigid: Stage, machines: Fleet) -> None:
-    flat, own = machines.laid_over(rigid, {}, 1), rigid.flat()
+def test_settings_are_laid_over_machines_of_which_the_first_is_that_of_the_file(rigid: Stage, machines: Fleet) -> None:
+    flat, own = machines.laid_over(rigid, {"controller.crossover": np.array([8.0, 16.0])}, 2), rigid.flat()
     assert all(flat[key][0] == own[key] for key in [*machines.ratios, "motion.acceleration_time"] if key in own)
     assert np.ptp(flat["friction.static"]) > 0
-
-
-def test_settings_are_laid_over_machines_one_after_the_other(rigid: Stage, machines: Fleet) -> None:
-    flat = machines.laid_over(rigid, {"controller.crossover": np.array([8.0, 16.0])}, 2)
     assert flat["controller.crossover"].tolist() == [8.0] * 5 + [16.0] * 5
     assert flat["friction.static"][:5].tolist() == flat["friction.static"][5:].tolist()
-    assert set(flat["controller.tuned_mass"]) == {rigid.flat()["controller.tuned_mass"]}
+    assert set(flat["controller.tuned_mass"]) == {own["controller.tuned_mass"]}
 
 
 def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> None:
@@ -158,11 +189,9 @@ def moved_there(stage: Stage, within: float) -> float:
     return float(outside[-1] - 2 * flat["motion.acceleration_time"])
 
 
-def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
+def test_moves_and_margin_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
     fast = rigid.replace({"controller.crossover": "20 Hz"})
-    moves = moves_of_points(
-        Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal, rtol=RemedySettings.current().move_rtol
-    )
+    moves = moves_of_points(AS_IS(fast), ONE_POINT, machines, goal, rtol=MOVE_RTOL)
     alone = measured_run(fast)
     there = moved_there(fast, goal.within)
     assert moves.settling[0, 0] == pytest.approx(max(alone.in_the_end[0][0], there), abs=2e-4)
@@ -171,11 +200,8 @@ def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet
     assert there > alone.in_the_end[0][0]
     assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)
     limited = fast.replace({"controller.force_limit": "60 N"})
-    assert moves_of_points(Remedy.settled_on("", limited), np.zeros((1, 0)), machines, goal).force.max() == 60.0
-
-
-def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Fleet) -> None:
-    margin = modulus_margins(Remedy.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
+    assert moves_of_points(AS_IS(limited), ONE_POINT, machines, goal).force.max() == 60.0
+    margin = modulus_margins(AS_IS(rigid), ONE_POINT, machines, rigid)[0, 0]
     assert margin == pytest.approx(settled_margin(rigid.flat()), rel=0.02)
 
 
@@ -185,7 +211,7 @@ def test_what_attracts_is_looked_for_down_to_the_distance(rigid: Stage, machines
     near, far = (rigid.replace({"controller.crossover": f"{hertz} Hz"}) for hertz in (11, 14))
     one = machines.take(np.array([0]))
     limited = far.replace({"controller.force_limit": "500 kN", "controller.anti_windup": "none"})
-    results = [attraction(Remedy.settled_on("", stage), np.zeros((1, 0)), one, goal) for stage in (near, far, limited)]
+    results = [attraction(AS_IS(stage), ONE_POINT, one, goal) for stage in (near, far, limited)]
     assert [result.clear[0, 0] for result in results] == [False, True, True]
     assert [result.surely_clear[0, 0] for result in results] == [False, True, False]
 
@@ -202,7 +228,7 @@ def test_ways_are_what_may_be_changed(rigid: Stage) -> None:
     assert names["controller"][:2] == ["bandwidth", "gains"]
 
 
-def test_friction_of_any_law_counts() -> None:
+def test_friction_of_any_law_counts(tuning: Advice) -> None:
     """Friction counts under a law from outside friso, and on a motor alone, where it holds no cart at a joint."""
     own = variant(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk("12 Hz"))
     assert breakaway(own.flat()) == least_breakaway(own.flat()) == pytest.approx(2.82)
@@ -218,8 +244,11 @@ def test_friction_of_any_law_counts() -> None:
     assert "integral limit" in names
     assert "isolator" not in names
     assert breakaway(free.flat()) == sliding(free.flat()) + at_motor - free.flat()["motor_friction.coulomb"] == at_motor
-    assert len([*_without_friction(free.flat(), Goal())]) == 1
-    assert not [*_without_friction(screw.flat(), Goal())]
+    no_isolator = [
+        any("No isolator was tried" in line for line in assumptions(replace(tuning, stage=stage, goal=Goal())))
+        for stage in (free, screw)
+    ]
+    assert no_isolator == [True, False]
 
 
 def test_the_weaker_direction_breaks_away_first() -> None:
@@ -233,7 +262,7 @@ GOALS = {"all": Goal(), "controller": Goal(joint=False), "joint": Goal(controlle
 
 def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal, machines: Fleet) -> None:
     """Settings above it cost more than any below that meet the goal; the limit itself is tried."""
-    search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
+    search = search_of(remedies(rigid, goal)[0], goal, machines)
     search.optimise()
     points = search.points
     above = points.bandwidth > 25.0
@@ -254,25 +283,18 @@ def test_bandwidth_and_margin_are_those_of_the_gains_at_standstill_too(
     rigid: Stage, machines: Fleet, factor: float
 ) -> None:
     """Within its window the loop has other gains: the larger bandwidth and the smaller margin of both count."""
-    gains = {"kind": "pid", "kp": 2e4, "ki": 1e5, "kd": 500.0, "tau": 5e-4, "derivative_on": "error"}
 
     def made(times: float, **more: Any) -> Stage:
-        scaled = {
-            key: value * (times if key in ("kp", "ki", "kd") else 1) for key, value in gains.items() if key != "kind"
-        }
-        text = {"kp": "N/m", "ki": "N/(m*s)", "kd": "N*s/m", "tau": "s"}
-        table = {key: f"{value!r} {text[key]}" if key in text else value for key, value in scaled.items()}
-        return rigid.replace({"controller": {"kind": "pid", **table, **more}})
+        scaled = {"kp": f"{2e4 * times} N/m", "ki": f"{1e5 * times} N/(m*s)", "kd": f"{500 * times} N*s/m"}
+        table = {"kind": "pid", **scaled, "tau": "0.5 ms", "derivative_on": "error", **more}
+        return rigid.replace({"controller": table})
 
     switched = made(1, standstill_window="100 um", standstill_factor=factor)
     plain, inside = made(1), made(factor)
     larger = max(loop_bandwidth(plain), loop_bandwidth(inside))
     assert loop_bandwidth(switched) == pytest.approx(larger, rel=1e-6)
     assert loop_bandwidths(switched, {}, 1)[0] == pytest.approx(larger, rel=2e-3)
-    own, *both = (
-        modulus_margins(Remedy.settled_on("", one), np.zeros((1, 0)), machines, one)
-        for one in (switched, plain, inside)
-    )
+    own, *both = (modulus_margins(AS_IS(one), ONE_POINT, machines, one) for one in (switched, plain, inside))
     assert own == pytest.approx(np.minimum(*both))
     assert np.abs(both[0] - both[1]).min() > 1e-3
     measured, *others = (performance_of(one, machines, Goal(settle=1e-9), one) for one in (switched, plain, inside))
@@ -349,23 +371,25 @@ def test_a_search_tries_the_bandwidth_at_its_limit(free: bool, machines: Fleet) 
     rig = load(EXAMPLES / "thesis_rig.toml").replace({"parasitic": None, "joint.locked": not free})
     stage = Stage(**{**rig.as_written(), "controller": {"kind": "adrc", "bandwidth": "3 Hz"}})
     goal = Goal(bandwidth_limit=40.0)
-    search = Search(remedies(stage, goal)[0], goal, machines, machines, stage, TINY, lambda label: None)
-    (share,) = search._at_the_limit(np.linspace(0, 1, 20))
-    assert loop_bandwidth(search.remedy.tuned(np.array([share]))) == pytest.approx(40.0, rel=3e-3)
+    tried: list[np.ndarray] = []
 
+    def measured(batch: np.ndarray, *how: Any) -> TriedPoints:
+        tried.append(batch)
+        return points_of(batch)
 
-@pytest.mark.parametrize("kind", [*CONTROLLERS])
-def test_bandwidths_of_many_points_are_those_of_each(rigid: Stage, kind: str) -> None:
-    stage = Stage(**{**rigid.as_written(), "controller": CONTROLLERS[kind]})
-    gain = stage.flat()["controller.kp"] * np.array([0.7, 1.0, 2.0])
-    alone = [loop_bandwidth(stage.with_numbers({"controller.kp": float(value)})) for value in gain]
-    assert loop_bandwidths(stage, {"controller.kp": gain}, 3) == pytest.approx(alone, rel=1e-3)
+    search = search_of(remedies(stage, goal)[0], goal, machines, measured=measured)
+    search.optimise()
+    bandwidths = [loop_bandwidth(search.remedy.tuned(share)) for share in tried[0]]
+    assert min(np.abs(np.array(bandwidths) / 40 - 1)) < 3e-3
 
 
 @pytest.mark.parametrize("kind", [*CONTROLLERS])
 def test_other_structures_are_stages(rigid: Stage, kind: str) -> None:
     """Each structure differs from the present one, and the thesis's rules have the gains of Eq. 7."""
     stage = Stage(**{**rigid.as_written(), "controller": CONTROLLERS[kind]})
+    gain = stage.flat()["controller.kp"] * np.array([0.7, 1.0, 2.0])
+    alone = [loop_bandwidth(stage.with_numbers({"controller.kp": float(value)})) for value in gain]
+    assert loop_bandwidths(stage, {"controller.kp": gain}, 3) == pytest.approx(alone, rel=1e-3)
     listed = controller_of(stage.flat()).structures(stage.flat())
     tried = [remedy for remedy in remedies(stage, Goal(joint=False)) if remedy.name in listed]
     assert [remedy.name for remedy in tried] == [*listed]
@@ -413,23 +437,23 @@ def test_the_least_change_leaves_keys_as_they_are(rigid: Stage) -> None:
     ],
 )
 def test_the_least_change_is_sought_among_the_fewest_keys(
-    rigid: Stage, goal: Goal, monkeypatch: pytest.MonkeyPatch, less: dict[str, Any], sought: list[str]
+    rigid: Stage, tuning: Advice, monkeypatch: pytest.MonkeyPatch, less: dict[str, Any], sought: list[str]
 ) -> None:
     """A bandwidth tuned for speed, ten times the present one, is no least change before a smaller one was sought."""
-    unused: Any = None
-    session = method._Session(rigid, rigid, goal, unused, unused, unused, unused, TINY, unused)
-    faster = {"controller.crossover": "80 Hz"}
-    for name, settings in (("bandwidth", faster), ("gains", {**faster, "controller.beta": 1.5})):
-        session.outcomes.append(working(Remedy.settled_on(name, rigid), rigid.replace(settings)))
-    asked = []
+    faster, asked = {"controller.crossover": "80 Hz"}, []
+    session = session_of(
+        tuning,
+        working(Remedy.settled_on("bandwidth", rigid), rigid.replace(faster)),
+        working(Remedy.settled_on("gains", rigid), rigid.replace({**faster, "controller.beta": 1.5})),
+        stage=rigid,
+    )
 
-    def tried(of_session: method._Session, outcome: RemedyOutcome) -> bool:
+    def tried(outcome: RemedyOutcome) -> bool:
         asked.append(outcome.remedy.name)
-        tuned = rigid.replace(less)
-        of_session.outcomes.append(working(Remedy.settled_on("less", tuned), tuned))
+        session.outcomes.append(working(AS_IS(rigid.replace(less)), rigid.replace(less)))
         return True
 
-    monkeypatch.setattr(method._Session, "_tries_less_than", tried)
+    monkeypatch.setattr(session, "_tries_less_than", tried)
     session.tries_less()
     session.tries_less()
     assert asked == sought
@@ -459,38 +483,27 @@ def changed(before: Stage, after: Stage) -> list[str]:
     return [key for key in new if key in old and new[key] != old[key]]
 
 
-def test_the_answer_does_not_hunt(tuning: Advice) -> None:
+def test_the_answer_does_not_hunt(tuning: Advice, works: Any) -> None:
     """The answer's verdicts say so, and so does `friso check`; the edge is at least a fifth of the bandwidth away."""
-    (result,) = tuning.working
-    confirmation = result.confirmation
-    assert result.stage is not None
-    assert confirmation is not None
-    assert confirmation.stage == result.stage
+    assert tuning.needed
+    assert tuning.case.verdict == "hunts"
+    confirmation = works.outcome.confirmation
+    assert confirmation.stage == works.stage
     assert (confirmation.verdict, confirmation.certain, confirmation.doubts) == ("settles", True, ())
-    case = check_given(result.stage)
+    case = check_given(works.stage)
     edge = case.judgement.margin
     assert (case.verdict, case.judgement.hunting.certain) == ("settles", True)
     assert edge is not None
     assert edge.factor * tuning.goal.distance < 1
-    assert settled_margin(result.stage.flat()) >= tuning.goal.margin
-
-
-def test_the_stage_as_it_is_does_not_meet_the_goal(tuning: Advice) -> None:
-    assert tuning.needed
-    assert tuning.case.verdict == "hunts"
+    assert settled_margin(works.stage.flat()) >= tuning.goal.margin
 
 
 def test_what_does_not_change_is_as_before(tuning: Advice) -> None:
-    present, goal = tuning.present, tuning.goal
-    same = price(present, tuning, buys_joint=False)
-    assert f"a modulus margin of {present.least_margin(goal):.2f} as before" in same
-    assert f"the same force ({with_unit(present.force(goal), 'N')})" in same
-    assert "the same stiffness against a load" in same
-    assert "1 times" not in same
+    present = tuning.present
+    assert price(present, tuning, buys_joint=False).count("same") == 2
+    assert f"{present.least_margin(tuning.goal):.2f} as before" in price(present, tuning, buys_joint=False)
     of_none = replace(tuning, present=replace(present, stiffness=0.0))
-    assert f"a stiffness against a load before the integral acts of {with_unit(present.stiffness, 'N/m')}" in price(
-        present, of_none, buys_joint=False
-    )
+    assert f"acts of {with_unit(present.stiffness, 'N/m')}" in price(present, of_none, buys_joint=False)
 
 
 def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
@@ -501,32 +514,44 @@ def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
     behind a motor's encoder the transmission does.
     """
     cascade, screw = load(EXAMPLES / "twincat_cascade.toml"), load(EXAMPLES / "ball_screw_axis.toml")
+
+    def stiffness(stage: Stage) -> float:
+        return moving(stage, draw_fleet(stage, Correlations(), 1, 1), Goal(), stage).stiffness
+
     for stage in (rigid, cascade):
-        flat = stage.flat()
-        softest = np.abs(controller_response(flat, np.geomspace(0.1, 1e3, 500))).min()
-        assert _stiffness(flat) == pytest.approx(softest, rel=0.05)
-    own = _stiffness(rigid.flat())
-    assert _stiffness(isolated(rigid).flat()) == pytest.approx(own)
+        softest = np.abs(controller_response(stage.flat(), np.geomspace(0.1, 1e3, 500))).min()
+        assert stiffness(stage) == pytest.approx(softest, rel=0.05)
+    own = stiffness(rigid)
+    assert stiffness(isolated(rigid)) == pytest.approx(own)
     at_rest = rigid.replace({"controller.standstill_window": "1 um", "controller.standstill_factor": 3.0})
-    assert _stiffness(at_rest.flat()) == pytest.approx(3 * own)
+    assert stiffness(at_rest) == pytest.approx(3 * own)
     behind = screw.replace({"encoder.position": "motor"})
-    assert 1 / _stiffness(behind.flat()) == pytest.approx(1 / 220e3 + 1 / 35e6)
+    assert 1 / stiffness(behind) == pytest.approx(1 / 220e3 + 1 / 35e6)
 
 
-def test_it_is_said_for_what_the_drive_of_the_file_counts(tuning: Advice) -> None:
-    drive = "The [drive] of the file counts for the margin alone"
-    assert not any(drive in line for line in answer(replace(tuning, as_built={"drive": {"encoder_noise": "1 nm"}})))
-    assert any(drive in line for line in answer(replace(tuning, as_built={"drive": {"delay": "50 us"}})))
+@pytest.mark.parametrize(("drive", "counts"), [({"encoder_noise": "1 nm"}, False), ({"delay": "50 us"}, True)])
+def test_it_is_said_for_what_the_drive_of_the_file_counts(tuning: Advice, drive: dict, counts: bool) -> None:
+    lines = answer(replace(tuning, as_built={"drive": drive}))
+    assert any("counts for the margin alone" in line for line in lines) == counts
 
 
-def test_it_is_said_where_the_search_for_a_smaller_change_was_given_up(tuning: Advice) -> None:
-    """With elements of friction, a change of three keys was stated as the least change."""
-    ended = replace(tuning, interrupted=False, outcomes=tuning.working)
-    assert answer(ended)[0].startswith("The least change that works: set")
-    less = replace(tuning.working[0].remedy, name=f"gains{LEAST}")
-    given_up = RemedyOutcome(less, None, None, None, (), points=tuning.working[0].points, cut=True)
-    first = answer(replace(ended, outcomes=(*tuning.working, given_up)))[0]
-    assert first.startswith("The least change that works (the search for a smaller one was given up")
+def test_what_was_not_sought_to_its_end_is_not_called_the_least_change(tuning: Advice, works: Any) -> None:
+    """A crossover of 200 Hz that settles soonest was called that, and with elements of friction a change of three
+    keys."""
+
+    def first(advice: Advice) -> str:
+        return next(line for line in answer(advice) if "set controller" in line)
+
+    less = replace(works.outcome.remedy, name=f"gains{LEAST}")
+    sought = replace(works.outcome, remedy=less)
+    given_up = RemedyOutcome(less, None, None, None, (), points=works.outcome.points, cut=True)
+    ended, soonest = replace(tuning, interrupted=False, outcomes=tuning.working), replace(tuning, least_sought=False)
+    assert tuning.interrupted
+    assert first(tuning).startswith("The least change so far that works")
+    assert "is not the least change" in first(soonest)
+    assert first(replace(soonest, outcomes=(*tuning.outcomes, sought))).startswith("The least change so far")
+    assert first(ended).startswith("The least change that works: set")
+    assert "a smaller one was given up" in first(replace(ended, outcomes=(*tuning.working, given_up)))
 
 
 def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning: Advice) -> None:
@@ -534,18 +559,20 @@ def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning
     dithered = rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}})
     outcome = RemedyOutcome(Remedy.settled_on("dither", dithered), dithered, tuning.present, None, ("hunting",))
     advice = replace(tuning, outcomes=(*tuning.outcomes, outcome))
-    assert failing(advice)[-1] == (
-        "dither: not sure to work: its dither keeps the stage moving, so that no cycle can verify it."
-    )
+    assert failing(advice)[-1].startswith("dither: not sure to work: its dither")
     name, (works, share, *_) = rows(advice)[-1]
     assert (name, works, share) == ("dither", "not sure", NOTHING)
+    other = RemedyOutcome(AS_IS(rigid), None, None, None, (), points=points_of([[0.5]]))
+    for outcomes, not_sought in (((outcome,), True), ((outcome, other), False)):
+        lines = answer(replace(tuning, outcomes=outcomes, interrupted=False))
+        assert any("were not sought" in line for line in lines) == not_sought
 
 
 def test_looking_further_ends_where_it_takes_too_much_work(
     rigid: Stage, machines: Fleet, goal: Goal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Surveys of a ball screw took minutes per batch of points. The points looked at so far are used."""
-    search = Search(AS_IS(rigid), goal, machines, machines, rigid, TINY, lambda label: None)
+    search = search_of(AS_IS(rigid), goal, machines)
 
     def points() -> Iterator[np.ndarray]:
         while True:
@@ -583,24 +610,17 @@ def test_machines_are_left_out_once_too_many_are_attracted(rigid: Stage, monkeyp
     assert measured.moves.settling.shape == measured.attraction.clear.shape == (1, 10)
 
 
-def test_the_answer_names_what_to_change(tuning: Advice) -> None:
-    stage = tuning.working[0].stage
-    assert stage is not None
-    (change,) = changes(tuning.stage, stage)
+def test_the_answer_names_what_to_change(tuning: Advice, works: Any) -> None:
+    """With k_p = m omega^2 sqrt(alpha) of van Dijk's rules, at the crossover that works."""
+    (change,) = changes(tuning.stage, works.stage)
     assert change.startswith("controller.crossover = ")
     assert change in answer(tuning)[1]
-    assert tuning.size(tuning.working[0]).keys == 1
+    assert tuning.size(works.outcome).keys == 1
     assert len(rows(tuning)) == 3
     assert [line.split(":")[0] for line in failing(tuning)] == ["gains"]
     locked = load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True})
     assert changes(locked, locked.replace({"joint.locked": False})) == ["joint.locked = false (was true)"]
-
-
-def test_gains_are_told_in_the_terms_of_drives(tuning: Advice) -> None:
-    """k_p = m omega^2 sqrt(alpha) of van Dijk's rules, at the crossover that was found."""
-    (result,) = tuning.working
-    assert result.stage is not None
-    flat = result.stage.flat()
+    flat = works.stage.flat()
     gain = flat["controller.tuned_mass"] * (2 * np.pi * flat["controller.crossover"]) ** 2 * 0.1**0.5
     assert f"k_p = {float(f'{gain:.4g}'):.10g} N/m" in gain_lines(tuning)[0]
 
@@ -618,11 +638,6 @@ def test_the_answer_as_files(tuning: Advice, undrawn: None) -> None:
     assert high is None  # of few machines
 
 
-def test_its_figures_can_be_drawn(tuning: Advice) -> None:
-    for figure in tune_figures(tuning):
-        assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
-
-
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
     """Settings with which only some moves settle are none either: 11.5 Hz is too close to the edge of 9.75 Hz."""
     near = rigid.replace({"controller.crossover": "11.5 Hz"})
@@ -630,7 +645,7 @@ def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning:
     assert {"distance", "hunting"} <= {*unmet_goals(confirmation, measured, goal)}
     assert confirmation.verdict == "settles"
     assert confirmed(rigid.replace({"controller.crossover": "9 Hz"}), goal).doubts == ("verdict", "distance")
-    assert confirmed(rigid.replace({"controller.crossover": "8 Hz"}), goal).doubts == ("verdict", "distance", "window")
+    assert confirmed(rigid, goal).doubts == ("verdict", "distance", "window")
 
 
 def test_the_distance_from_hunting_is_that_from_its_edge(rigid: Stage, goal: Goal) -> None:
@@ -674,15 +689,13 @@ def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Sta
     closest = RemedyOutcome(limit, None, None, None, (), (), points)
     assert [pair.name for pair in pairs([closest], goal)] == ["integral limit, and bandwidth"]
     assert not pairs([closest, working(Remedy.settled_on("bandwidth", rigid), rigid)], goal)
-    isolator = working(Remedy.settled_on("isolator", rigid, buys_joint=True), rigid)
-    assert pairs([closest, isolator], goal)
+    assert pairs([closest, working(Remedy.settled_on("isolator", rigid, buys_joint=True), rigid)], goal)
 
 
 def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, capsys: pytest.CaptureFixture[str]) -> None:
     assert tuning.interrupted
     assert [result.certainty for result in tuning.outcomes] == ["works", "unsure"]
     first = answer(tuning)[0]
-    wording(first)
     before: list[str] = []
 
     def write(progress: Progress) -> list[Path]:
@@ -694,68 +707,82 @@ def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, capsys: pytest.CaptureFix
     assert " ".join(before[0].split()).startswith(" ".join(first.split()))
 
 
+@pytest.mark.parametrize(("work", "certainty"), [(RemedySettings().search_work, "does not work"), (1e5, "given up")])
 def test_a_search_that_is_cut_says_so_and_not_that_nothing_works(
-    rigid: Stage, machines: Fleet, monkeypatch: pytest.MonkeyPatch
+    rigid: Stage, machines: Fleet, tuning: Advice, work: float, certainty: str
 ) -> None:
     goal = Goal(margin=0.9, joint=False)
-    for work, certainty in ((RemedySettings().search_work, "does not work"), (1e5, "given up")):
-        with RemedySettings(search_work=work).in_use():
-            search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
-            search.optimise()
-            tried = search.points if search.tried else None
-            outcome = RemedyOutcome(search.remedy, None, None, None, (), (), tried, cut=search.cut)
-            assert outcome.certainty == certainty
+    with RemedySettings(search_work=work).in_use():
+        search = search_of(remedies(rigid, goal)[0], goal, machines)
+        search.optimise()
+    tried = search.points if search.tried else tuning.outcomes[0].points
+    outcome = RemedyOutcome(search.remedy, None, None, None, (), (), tried, cut=search.cut)
+    assert outcome.certainty == certainty
+    (line,) = failing(replace(tuning, goal=goal, outcomes=(outcome,)))
+    assert certainty in line
+    assert ("others may work" in line) == search.cut
 
 
-def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice) -> None:
-    (outcome,) = (one for one in tuning.outcomes if one.remedy.name == "gains")
-    points = tuning.outcomes[0].points  # of another remedy
-    cut = replace(outcome, stage=None, measured=None, interrupted=False, points=points, cut=True)
-    wording("\n".join(failing(replace(tuning, outcomes=(cut,)))))
-
-
-def test_settings_that_were_not_looked_at_leave_it_open(tuning: Advice) -> None:
+def test_settings_that_were_not_looked_at_leave_it_open(tuning: Advice, works: Any) -> None:
     """Some gains met the goal on the machines of the search, but only one of 59 had been surveyed.
 
-    "Does not work" was said, although settings that are 13 % faster work.
+    "Does not work" was said, although settings that are 13 % faster work; also of the bandwidth, where another
+    remedy had a bandwidth that works.
     """
-    met, missed = TriedPoints(np.zeros((2, 1)), *np.ones((9, 2))), TriedPoints(np.zeros((2, 1)), *np.zeros((9, 2)))
     outcome = RemedyOutcome(Remedy("gains", tuning.stage, ()), None, None, None, ())
-    some, none = (failing(replace(tuning, outcomes=(replace(outcome, points=points),)))[0] for points in (met, missed))
+    some, none = (
+        failing(replace(tuning, outcomes=(replace(outcome, points=points),)))[0]
+        for points in (points_of([[0.0]] * 2), points_of([[0.0]] * 2, margin=np.zeros(2)))
+    )
     assert some.startswith("gains: none was found")
     assert none.startswith("gains: does not work")
-
-
-def test_what_another_option_found_is_not_said_not_to_work(tuning: Advice) -> None:
-    """A bandwidth that works, found by the search for the least change, where that for the fastest found none."""
-    works = next(outcome for outcome in tuning.working if outcome.stage is not None)
-    assert [variable.name for variable in works.remedy.variables] == [BANDWIDTH]
-    missed = replace(works, stage=None, measured=None)
-    least = replace(works, remedy=replace(works.remedy, name="gains: the least change"))
+    missed = replace(works.outcome, stage=None, measured=None)
+    least = replace(works.outcome, remedy=replace(works.outcome.remedy, name="gains: the least change"))
+    assert [variable.name for variable in missed.remedy.variables] == [BANDWIDTH]
     assert "none was found" in failing(replace(tuning, outcomes=(missed,)))[0]
     (line,) = failing(replace(tuning, outcomes=(missed, least)))
     assert "none was found" not in line
     assert "does not work" not in line
 
 
-def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:
-    """For a modulus margin of 0.9, the answer is to relax the margin."""
-    goal = Goal(margin=0.9, bandwidth_limit=25.0, joint=False)
-    search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
+def relaxed_for(goal: Goal, rigid: Stage, machines: Fleet, *others: Remedy) -> tuple[Search, Any]:
+    """Return a search over the bandwidth, and the relaxations of a goal for it and other remedies."""
+    search = search_of(remedies(rigid, goal)[0], goal, machines)
     search.optimise()
+    outcomes = [RemedyOutcome(one, None, None, None, (), (), search.points) for one in (search.remedy, *others)]
+    return search, relaxations(outcomes, goal, machines)
+
+
+def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:
+    """For a modulus margin of 0.9 it is the margin, and no limit of the bandwidth beyond reason: 1630 Hz were said to
+    help where 30 Hz were stated."""
+    search, (relaxed,) = relaxed_for(Goal(margin=0.9, bandwidth_limit=25.0, joint=False), rigid, machines)
     assert not [*search.surveyed()]
-    (relaxed,) = relaxations([RemedyOutcome(search.remedy, None, None, None, (), (), search.points)], goal, machines)
     (margin,) = relaxed.relaxations
     assert (margin.key, margin.value) == ("margin", 0.9)
     assert margin.needed < 0.9
     assert relaxed.factor == pytest.approx(0.9 / margin.needed)
     strict = Goal(settle=1e-3, force_limit=1.0, bandwidth_limit=10.0, joint=False)
-    dithered = Remedy.settled_on("", rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}}))
-    outcomes = [RemedyOutcome(remedy, None, None, None, (), (), search.points) for remedy in (search.remedy, dithered)]
-    (three,) = relaxations(outcomes, strict, machines)
+    dithered = AS_IS(rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}}))
+    search, (three,) = relaxed_for(strict, rigid, machines, dithered)
     assert {part.key for part in three.relaxations} == {"settle", "force_limit", "bandwidth_limit"}
     assert all(f"{part.needed:.3g}" == f"{part.needed:.6g}" for part in three.relaxations)
     assert three.remedy is search.remedy
+    assert not relaxed_for(Goal(bandwidth_limit=1.0, joint=False), rigid, machines)[1]
+
+
+def test_relaxations_left_for_want_of_work_are_told(rigid: Stage, tuning: Advice, machines: Fleet) -> None:
+    """With elements of friction, relaxations took half of all work."""
+    goal = Goal(settle=0.02)
+    search, several = relaxed_for(goal, rigid, machines)
+    assert several
+    outcome = RemedyOutcome(search.remedy, None, None, None, (), (), search.points)
+    with allowance(1.0):
+        assert relaxations([outcome], goal, machines) == ()
+    cut = replace(tuning, outcomes=(), interrupted=False, relaxed_all=False)
+    for tried, said in ((False, True), (True, False)):
+        lines = answer(replace(cut, relaxed_all=tried))
+        assert any("Not all relaxations of the goal were tried" in line for line in lines) == said
 
 
 def test_a_tolerance_is_relaxed_no_more_than_needed(rigid: Stage, machines: Fleet) -> None:
@@ -786,65 +813,38 @@ def test_a_share_that_few_machines_leave_open_is_measured_on_more(rigid: Stage) 
     assert not further.further.any()  # it hunts
 
 
-def test_what_was_tuned_for_speed_is_not_called_the_least_change(tuning: Advice) -> None:
-    """The least factor on the bandwidth, sought first, is; a crossover of 200 Hz that settles soonest was as well."""
-    assert tuning.interrupted
-
-    def first(advice: Advice) -> str:
-        return next(line for line in answer(advice) if "set controller" in line)
-
-    assert first(tuning).startswith("The least change so far that works")
-    tuned = replace(tuning, least_sought=False)
-    assert first(tuned).startswith("This works, but was tuned to settle soonest and is not the least change")
-    (works,) = tuning.working
-    less = replace(works, remedy=replace(works.remedy, name=f"gains{LEAST}"))
-    sought = replace(tuned, outcomes=(*tuning.outcomes, less))
-    assert any(line.startswith("The least change so far that works") for line in answer(sought))
-
-
-def test_no_limit_of_the_bandwidth_is_relaxed_beyond_reason(rigid: Stage, machines: Fleet) -> None:
-    """A bandwidth limit of 1630 Hz was said to help where 30 Hz were stated."""
-    goal = Goal(bandwidth_limit=1.0, joint=False)
-    search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
-    search.optimise()
-    assert not relaxations([RemedyOutcome(search.remedy, None, None, None, (), (), search.points)], goal, machines)
-
-
-def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
-    """The present stage is measured on the same machines as the remedy that works."""
-    seed = tuning.seed + RemedySettings.current().unseen_seed
-    unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, seed, tuning.goal.moves)
-    assert (
-        tuning.present.moves.force
-        == moves_of_points(
-            AS_IS(tuning.stage), NO_VARIABLES, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol
-        ).force
-    ).all()
-    (works,) = tuning.working
-    assert works.measured is not None
-    assert works.stage is not None
-    on_the_same = moves_of_points(
-        AS_IS(works.stage), NO_VARIABLES, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol
+def test_what_changes_nothing_costs_nothing(tuning: Advice, works: Any) -> None:
+    """The present stage is measured on the same machines as the remedy that works, none of which is its own."""
+    seed, moves = tuning.seed + RemedySettings.current().unseen_seed, tuning.goal.moves
+    unseen = draw_fleet(tuning.stage, Correlations(), TINY.fresh + 1, seed, moves).take(np.arange(1, TINY.fresh + 1))
+    before, after = (
+        moves_of_points(AS_IS(stage), NO_VARIABLES, unseen, tuning.goal, rtol=MOVE_RTOL)
+        for stage in (tuning.stage, works.stage)
     )
-    assert np.array_equal(works.measured.moves.settling, on_the_same.settling)
+    assert np.array_equal(tuning.present.moves.force, before.force)
+    assert np.array_equal(works.measured.moves.settling, after.settling)
+    assert (tuning.machines.sizes < tuning.machines.moves.largest).all()
 
 
 @pytest.mark.parametrize(("crossover", "taken"), [("20 Hz", True), ("30 Hz", False)])
 def test_the_least_change_of_few_keys_is_sought_among_these_alone(
-    tuning: Advice, monkeypatch: pytest.MonkeyPatch, crossover: str, taken: bool
+    tuning: Advice, works: Any, monkeypatch: pytest.MonkeyPatch, crossover: str, taken: bool
 ) -> None:
     """A search among three keys left one of them unchanged.
 
     A change of one of the others alone is taken if it is smaller.
     """
-    (works,) = tuning.working
-    alpha = {"controller.alpha": 0.09}
     three = Remedy("gains: the least change", tuning.stage, (of_key("controller.crossover", 1, 50, 8),) * 3)
-    of_three = replace(works, remedy=three, stage=tuning.stage.replace({"controller.crossover": "25 Hz", **alpha}))
-    alone = replace(of_three, stage=tuning.stage.replace({"controller.crossover": crossover, **alpha}))
+    of_three, alone = (
+        replace(
+            works.outcome,
+            remedy=three,
+            stage=tuning.stage.replace({"controller.crossover": hertz, "controller.alpha": 0.09}),
+        )
+        for hertz in ("25 Hz", crossover)
+    )
     coming = [of_three, alone]
-    made: Any = [tuning.stage, *[None] * 8]
-    session = _Session(*made, outcomes=[replace(works, stage=tuning.stage.replace({"controller.crossover": "40 Hz"}))])
+    session = session_of(tuning, replace(works.outcome, stage=tuning.stage.replace({"controller.crossover": "40 Hz"})))
     monkeypatch.setattr(session, "_tries_less_than", lambda outcome: session.outcomes.append(coming.pop(0)) or True)
     session.tries_less()
     assert not coming
@@ -853,17 +853,15 @@ def test_the_least_change_of_few_keys_is_sought_among_these_alone(
 
 
 def test_ranges_are_sought_by_the_search_of_their_own_remedy(
-    machines: Fleet, tuning: Advice, monkeypatch: pytest.MonkeyPatch
+    tuning: Advice, works: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two remedies had one name: a later search for fewer keys ended without a smaller change."""
-    (works,) = tuning.working
     keys = of_key("controller.crossover", 1, 50, 8), of_key("controller.alpha", 0.05, 0.5, 0.1)
     two, one = (Remedy("gains: the least change", tuning.stage, keys[:count]) for count in (2, 1))
-    made: Any = [tuning.stage, tuning.stage, tuning.goal, *[machines] * 4, TINY, method._Report(lambda *_: None, 1)]
-    session = _Session(*made)
+    session = session_of(tuning, report=method._Report(lambda *_: None, 1))
     for remedy in (two, one):
         session._begun(remedy, 1)
-    session.outcomes = [replace(works, remedy=two, shares=np.full(2, 0.5), windows=())]
+    session.outcomes = [replace(works.outcome, remedy=two, shares=np.full(2, 0.5), windows=())]
     asked: list[Remedy] = []
     monkeypatch.setattr(method, "windows", lambda search, shares: asked.append(search.remedy) or ())
     session.adds_windows()
@@ -887,8 +885,7 @@ def test_no_other_point_is_verified_once_one_took_too_long(
 
     Machines with elements of friction took as long without a check.
     """
-    made: Any = [rigid, rigid, tuning.goal, *[None] * 4, TINY, lambda label: None]
-    session = _Session(*made, outcomes=[tuning.outcomes[0]])
+    session = session_of(tuning, tuning.outcomes[0])
     unsure = RemedyOutcome(AS_IS(rigid), rigid, tuning.present, confirmed(rigid, tuning.goal), (doubt,))
     measured: list[Moves] = []
 
@@ -898,8 +895,7 @@ def test_no_other_point_is_verified_once_one_took_too_long(
 
     monkeypatch.setattr(session, "_verified", verify)
     with RemedySettings(verifying_work=work).in_use():
-        search = Search(AS_IS(rigid), tuning.goal, machines, machines, rigid, TINY, lambda label: None)
-        session._ended(search, iter([np.zeros(0)] * 9))
+        session._ended(search_of(AS_IS(rigid), tuning.goal, machines), iter([np.zeros(0)] * 9))
         assert len(measured) == verified
         assert session.outcomes == [unsure]
 
@@ -929,23 +925,40 @@ def test_moves_fill_their_range_evenly_and_are_what_the_stage_makes(rigid: Stage
 ACCELERATIONS = {"lowest_acceleration": "1 m/s^2", "highest_acceleration": "10 m/s^2"}
 
 
-@pytest.mark.parametrize(
-    ("table", "named"),
-    [
-        ({"smallest": "10 mm", "largest": "1 mm"}, "largest"),
-        ({"smallest": "1 mm", "largest": "2 mm", "lowest_acceleration": "1 m/s^2"}, "highest_acceleration"),
-        ({"smallest": "0 mm", "largest": "2 mm"}, "smallest"),
-    ],
-)
-def test_moves_that_are_no_range_are_refused(rigid: Stage, table: dict[str, str], named: str) -> None:
-    with pytest.raises(InputError) as raised:
-        rigid.replace({"moves": table})
-    assert raised.value.key == f"moves.{named}"
+STEP = {"kind": "step", "size": "2 mm", "duration": "4 s"}
+RELEASE = {"kind": "release", "displacement": "2 mm", "duration": "4 s"}
+REFUSED: list[tuple[str | None, Callable[[Stage], object]]] = [
+    ("moves.largest", lambda rig: rig.replace({"moves": {"smallest": "10 mm", "largest": "1 mm"}})),
+    ("moves.smallest", lambda rig: rig.replace({"moves": {"smallest": "0 mm", "largest": "2 mm"}})),
+    (
+        "moves.highest_acceleration",
+        lambda rig: rig.replace({"moves": {"smallest": "1 mm", "largest": "2 mm", "lowest_acceleration": "1 m/s^2"}}),
+    ),
+    (None, lambda rig: tune(rig, Goal(moves=MoveRange(1e-3, 1e4)), budget=TINY)),
+    (None, lambda rig: tune(rig.replace({"motion": {"kind": "hold", "duration": "1 s"}}))),
+    (None, lambda rig: tune(rig.replace({"motion": {"kind": "ramp", "velocity": "1 mm/s", "duration": "1 s"}}))),
+    *(
+        ("margin", lambda rig, margin=margin: friso.tune(rig, margin=margin))
+        for margin in ("1.2", "0", "a half", "nan")
+    ),
+    ("within", lambda rig: sensitivity(rig, within=0.0)),
+    ("keys", lambda rig: sensitivity(rig, ["friction.statik"])),
+    ("keys", lambda rig: sensitivity(rig.with_numbers({"friction.viscous": 0.0}), ["friction.viscous"])),
+    (
+        "keys",
+        lambda rig: sensitivity(load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True}), ["joint.stroke"]),
+    ),
+    ("keys", lambda rig: sensitivity(rig.replace({"motion": STEP}), ["motion.size"], within=1e-6)),
+    ("keys", lambda rig: sensitivity(rig.replace({"motion": RELEASE}), ["motion.duration"], within=1e-6)),
+]
 
 
-def test_a_largest_move_that_the_motion_has_no_time_for_is_refused(rigid: Stage) -> None:
-    with pytest.raises(InputError, match="a largest move of"):
-        tune(rigid, Goal(moves=MoveRange(1e-3, 1e4)), budget=TINY)
+@pytest.mark.parametrize(("key", "asked"), REFUSED)
+def test_what_cannot_be_searched_or_differentiated_is_refused(
+    rigid: Stage, key: str | None, asked: Callable[[Stage], object]
+) -> None:
+    with refused(key):
+        asked(rigid)
 
 
 @pytest.mark.parametrize(
@@ -977,30 +990,28 @@ def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: A
     assert between == (None if held is None else pytest.approx(expected))
 
 
-def test_settings_for_large_moves_alone_are_told_as_that(tuning: Advice) -> None:
-    """Such settings are neither refused nor praised: they are no least change, and their file states their purpose."""
-    (works,) = tuning.working
-    large = replace(works, moves_from=2e-3)
+def test_settings_for_large_moves_alone_are_told_as_that(tuning: Advice, works: Any) -> None:
+    """Such settings are neither refused nor praised: they are no least change, and their file states their purpose.
+
+    They are those that serve the smallest of these moves.
+    """
+    large = replace(works.outcome, moves_from=2e-3)
     advice = replace(tuning, outcomes=(large,), interrupted=False)
     assert (large.certainty, advice.working, advice.least) == ("large moves", (), None)
     assert any(line.startswith("For moves of 2.00 mm and more alone: set") for line in answer(advice))
     files = tune_files(advice)
     assert "tuned-bandwidth-for-large-moves.toml" in files
     assert files["tuned.toml"] is None
-    assert TuneAnswer(advice, stage=advice.stage).failure.endswith("for large ones alone some do")
-
-
-def test_points_that_serve_large_moves_are_found_by_the_smallest_of_these(machines: Fleet, rigid: Stage) -> None:
+    assert "for large ones alone" in str(TuneAnswer(advice, stage=advice.stage).failure)
     inf = np.inf
-    columns: dict[str, Any] = {"settling": [inf] * 3 + [1.0], "looser": [1.0] * 4, "slower": [inf] * 4}
-    columns |= {"force": [1.0] * 4, "margin": [0.6, 0.6, 0.4, 0.6], "bandwidth": [8.0] * 4, "nearness": [0.5] * 4}
-    columns |= {"whole": [True] * 4, "moves_from": [2e-3, 1e-3, 1e-4, inf]}
-    points = TriedPoints(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
+    points = points_of(
+        [0.0] * 4,
+        settling=[inf, inf, inf, 1.0],
+        slower=[inf] * 4,
+        margin=[0.6, 0.6, 0.4, 0.6],
+        moves_from=[2e-3, 1e-3, 1e-4, inf],
+    )
     assert points.for_large_moves(Goal(), 0.09).tolist() == [1, 0]
-
-
-def test_machines_not_seen_are_drawn_alone(rigid: Stage) -> None:
-    assert (_not_seen(rigid, Correlations(), 6, 1, MoveRange(1e-5, 0.09)).sizes < 0.09).all()
 
 
 DRIVE = {"sample_time": "1 ms", "delay": "3 ms", "current_bandwidth": "40 Hz .. 400 Hz"}
@@ -1018,9 +1029,8 @@ def test_what_is_uncertain_of_the_drive_is_the_same_on_all_machines_and_says_so(
 def test_sensitivities_and_gains_are_those_behind_the_drive_as_built(tuning: Advice) -> None:
     stage = tuning.stage.replace({"drive": {**DRIVE, "current_bandwidth": "200 Hz", "travel_per_turn": "10 mm"}})
     advice = replace(tuning, as_built={"drive": stage.as_written()["drive"]})
-    lines = drawn_stages(advice)
-    panel = _sensitivity(advice, lines)
-    for (own, _, _), series in zip(lines, panel.series, strict=False):
+    (figure,) = tune_figures(advice)
+    for (own, _, _), series in zip(drawn_stages(advice), figure.panels[2].series, strict=False):
         alone = draw_fleet(own, Correlations(), 1, 1)
         margin = modulus_margins(AS_IS(own), NO_VARIABLES, alone, stage)[0, 0]
         assert 1 / np.nanmax(series.y) == pytest.approx(margin, rel=2e-3)
@@ -1028,30 +1038,28 @@ def test_sensitivities_and_gains_are_those_behind_the_drive_as_built(tuning: Adv
     assert "bandwidth" in gains
 
 
-def test_what_decides_is_drawn_and_named(tuning: Advice) -> None:
+def test_what_decides_is_drawn_and_named(tuning: Advice, works: Any) -> None:
     """Nine lines were drawn over each other, and what the window is of was called a number."""
-    (works,) = tuning.working
-    assert works.stage is not None
-    assert works.measured is not None
-    later = replace(works.measured, moves=replace(works.measured.moves, settling=works.measured.moves.settling + 1))
-    way = partial(replace, works.remedy)
+    moves = works.measured.moves
+    later = replace(works.measured, moves=replace(moves, settling=moves.settling + 1))
+    way = partial(replace, works.outcome.remedy)
     larger = tuning.stage.replace({"controller.crossover": "60 Hz", "controller.beta": 3})
     outcomes = [
-        works,
-        replace(works, remedy=way(name="slow and large"), stage=larger, measured=later),
-        replace(works, remedy=way(name="isolator", buys_joint=True), measured=later),
-        replace(works, remedy=way(name="isolator and gains", buys_joint=True), stage=larger),
+        works.outcome,
+        replace(works.outcome, remedy=way(name="slow and large"), stage=larger, measured=later),
+        replace(works.outcome, remedy=way(name="isolator", buys_joint=True), measured=later),
+        replace(works.outcome, remedy=way(name="isolator and gains", buys_joint=True), stage=larger),
     ]
     advice = replace(tuning, outcomes=tuple(outcomes), goal=replace(tuning.goal, margin=0.6))
-    labels = ["as it is", works.remedy.name, "isolator", "isolator and gains"]
+    labels = ["as it is", works.outcome.remedy.name, "isolator", "isolator and gains"]
     (figure,) = tune_figures(advice)
     response, settling, loops, window = figure.panels
     for panel in (response, settling, loops):
         assert [series.label for series in panel.series][:4] == labels
-    assert loops.series[-1].label == "margin of 0.6"
     assert loops.series[-1].y[0] == pytest.approx(1 / 0.6)
-    assert window.y.words == tuple(part.name.removeprefix("controller.") for part in works.windows)
+    assert window.y.words == tuple(part.name.removeprefix("controller.") for part in works.outcome.windows)
     assert response.x.limits == (0.0, pytest.approx(3 * later.slowest(tuning.goal)))
+    assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
 
 
 def test_a_way_that_the_app_takes_over_keeps_the_machine_as_built(
@@ -1068,12 +1076,6 @@ def test_a_way_that_the_app_takes_over_keeps_the_machine_as_built(
         assert "3 ms" in way["toml"]
 
 
-@pytest.mark.parametrize("margin", ["1.2", "0", "a half", "nan"])
-def test_a_margin_is_between_0_and_1(rigid: Stage, margin: str) -> None:
-    with refused("margin"):
-        friso.tune(rigid, margin=margin)
-
-
 LIMITER = {"limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
 
 DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
@@ -1081,28 +1083,25 @@ DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
 
 def test_a_force_that_is_not_finite_warns_of_nothing() -> None:
     """With a force limit below 1 N the library's overflow warning appeared on the user's screen."""
-    column = np.ones(1)
-    points = TriedPoints(
-        np.zeros((1, 1)), column, column, column, np.array([np.inf]), column, column, column, column, column
-    )
     with catch_warnings(action="error"):
-        assert np.isfinite(points.cost(Goal(force_limit=0.2))).all()
+        assert np.isfinite(points_of([0.0], force=[np.inf]).cost(Goal(force_limit=0.2))).all()
 
 
-def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
+def test_reasons_say_nothing_of_settings_that_were_left_out_before(tuning: Advice) -> None:
     """One setting settles without the margin, the other has the margin and does not settle."""
-    columns: dict[str, Any] = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
-    columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2, "nearness": [1.0, 0.0]}
-    columns |= {"whole": [True, True], "moves_from": [np.inf] * 2}
-    points = TriedPoints(np.zeros((2, 1)), *(np.array(column) for column in columns.values()))
-    outcome: Any = SimpleNamespace(cut=False)
-    both, one = (next(_reasons(some, outcome, Goal())) for some in (points, points.take(np.array([1]))))
-    assert "0.5" in both
-    assert "0.5" not in one
-    outcome.attracted, kept = 24, TriedPoints(np.zeros((2, 1)), *np.ones((9, 2)))
-    assert "2 settings tried 2 meet the rest" in next(_reasons(kept, outcome, Goal()))
-    outcome.cut, outcome.attracted = True, 0  # none was surveyed: nothing is said of these
-    assert "none surely meets it" not in next(_reasons(kept, outcome, Goal()))
+    late = {name: [1.0, np.inf] for name in ("settling", "looser", "slower", "moves_from")}
+    points = points_of([0.0] * 2, **late, margin=[0.4, 0.6], nearness=[1.0, 0.0])
+
+    def reason(some: TriedPoints, **parts: Any) -> str:
+        outcome = RemedyOutcome(AS_IS(tuning.stage), None, None, None, (), points=some, **parts)
+        return why_unmet(outcome, replace(tuning, goal=Goal()))
+
+    assert "0.5" in reason(points)
+    assert "0.5" not in reason(points.take(np.array([1])))
+    kept = points_of([0.0] * 2)
+    assert "2 settings tried 2 meet the rest" in reason(kept, attracted=24)
+    assert "none surely meets it" in reason(kept, attracted=24)
+    assert "none surely meets it" not in reason(kept, cut=True)  # none was surveyed: nothing is said of these
 
 
 @pytest.mark.parametrize("first", np.arange(0, 0.95, 0.08))
@@ -1112,8 +1111,6 @@ def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machine
     Next to settings with a limit cycle none is surveyed.
     """
     shares = np.linspace(0, 1, 60)
-    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((8, 60)))
-    search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
     attracted: list[float] = []
 
     def clear(batch: np.ndarray) -> np.ndarray:
@@ -1121,10 +1118,8 @@ def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machine
         attracted.extend(batch[~inside, 0])
         return inside
 
-    search.clear = clear  # pyright: ignore[reportAttributeAccessIssue]
-    search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
-    search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
-    assert [*search.surveyed()]
+    looks = {"clear": clear, "share": every, "_closer": lambda point, wanted: []}
+    assert [*search_of(AS_IS(rigid), Goal(), machines, points_of(shares, settling=1 + shares), **looks).surveyed()]
     assert np.diff(np.sort(attracted)).min() > 0.03
 
 
@@ -1134,11 +1129,9 @@ def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_
     """The settings that settle soonest lie at the edge of the margin: 92 % of fresh machines met the goal with them,
     98 % with a crossover lower by 4 %, and the remedy was said not to be sure."""
     shares = np.linspace(0, 1, 201)
-    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((8, 201)))
-    search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
-    search.clear = lambda batch: np.ones(len(batch), bool)  # pyright: ignore[reportAttributeAccessIssue]
-    search.share = lambda batch: 0.92 + 0.5 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
-    search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
+    looks = {"clear": lambda batch: np.ones(len(batch), bool), "_closer": lambda point, wanted: []}
+    looks["share"] = lambda batch: 0.92 + 0.5 * batch[:, 0]
+    search = search_of(AS_IS(rigid), Goal(), machines, points_of(shares, settling=1 + shares), **looks)
     enough = (Goal().surely(machines.count) - 0.92) / 0.5  # not reached by the first of those that are looked at
     assert enough <= next(search.surveyed())[0] < enough + 0.1
 
@@ -1148,18 +1141,14 @@ def test_points_next_to_one_beyond_the_edge_of_what_works_are_tried(machines: Fl
 
     A brute-force search found one that settles in 89 % of its time.
     """
-    shares = np.array([0.0, 0.02, 0.04, 0.5, 0.6])
 
-    def measured(points: np.ndarray) -> TriedPoints:
-        return TriedPoints(points, 1 + points[:, 0], *np.ones((8, len(points))))
+    def measured(points: np.ndarray, *how: Any) -> TriedPoints:
+        return points_of(points, settling=1 + points[:, 0])
 
     remedy = Remedy("", rigid, (of_key("controller.crossover", 1, 50, 8),))
-    tried = [measured(shares[:, None])]
-    search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None, tried)
-    search.measured = lambda batch, *_: measured(batch)  # pyright: ignore[reportAttributeAccessIssue]
-    search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
-    search.clear = lambda batch: batch[:, 0] > 0.46  # pyright: ignore[reportAttributeAccessIssue]
-    first, *others = [float(point[0]) for point in search.surveyed()]
+    tried = measured(np.array([[0.0], [0.02], [0.04], [0.5], [0.6]]))
+    looks = {"measured": measured, "share": every, "clear": lambda batch: batch[:, 0] > 0.46}
+    first, *others = [float(point[0]) for point in search_of(remedy, Goal(), machines, tried, **looks).surveyed()]
     assert 0.46 < first < 0.47
     assert sorted([first, *others]) == [first, *others]
     assert 0.5 in others
@@ -1170,16 +1159,11 @@ def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_al
 ) -> None:
     """Along the least change of an axis, and from it to the tuned settings, something attracted some machine: its least
     change was given up."""
-    remedy = Remedy(
-        "gains", rigid.replace({"controller.crossover": "40 Hz"}), (of_key("controller.crossover", 10, 160, 10),)
-    )
-    shares = np.linspace(0.02, 1, 50)
-    points = TriedPoints(shares[:, None], *np.ones((9, 50)))
-    search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
-    search.measured = lambda batch, *_: TriedPoints(batch, *np.ones((9, len(batch))))  # pyright: ignore[reportAttributeAccessIssue]
-    search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
-    search.clear = lambda batch: batch[:, 0] > 0.6  # pyright: ignore[reportAttributeAccessIssue]
-    search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
+    stage = rigid.replace({"controller.crossover": "40 Hz"})
+    remedy = Remedy("gains", stage, (of_key("controller.crossover", 10, 160, 10),))
+    looks = {"measured": lambda batch, *_: points_of(batch), "share": every, "_closer": lambda point, wanted: []}
+    looks["clear"] = lambda batch: batch[:, 0] > 0.6
+    search = search_of(remedy, Goal(), machines, points_of(np.linspace(0.02, 1, 50)), **looks)
     assert 0.6 < next(candidates(search))[0] < 0.7
 
 
@@ -1213,8 +1197,8 @@ def test_the_least_change_that_meets_the_goal_on_fresh_machines_is_taken(rigid: 
 
 def test_a_change_of_one_key_is_less_than_any_of_two(machines: Fleet, rigid: Stage) -> None:
     """A change of one key is searched first, to a few per cent; if it works, nothing else is tried."""
-    numbers = {"controller.crossover": "20 Hz", "controller.alpha": 0.2}
-    remedy = least_remedy(rigid, rigid.replace(numbers), Remedy.settled_on("gains", rigid.replace(numbers)))
+    tuned = rigid.replace({"controller.crossover": "20 Hz", "controller.alpha": 0.2})
+    remedy = least_remedy(rigid, tuned, Remedy.settled_on("gains", tuned))
     assert remedy is not None
     faster = [variable.name for variable in remedy.variables].index("controller.crossover")
     tried: list[np.ndarray] = []
@@ -1222,24 +1206,24 @@ def test_a_change_of_one_key_is_less_than_any_of_two(machines: Fleet, rigid: Sta
     def measured(points: np.ndarray, *_: object, **named: object) -> TriedPoints:
         tried.extend(points)
         meets = remedy.variables[faster].at(points[:, faster]) > 13.0
-        one, settling = np.ones(len(points)), np.where(meets, 1.0, np.inf)
-        return TriedPoints(points, settling, one, one, one, one, one, one, one > 0, one)
+        return points_of(points, settling=np.where(meets, 1.0, np.inf), whole=np.ones(len(points), bool))
 
-    search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None)
-    search.measured = measured  # pyright: ignore[reportAttributeAccessIssue]
-    search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
-    search.clear = lambda batch: np.ones(len(batch), bool)  # pyright: ignore[reportAttributeAccessIssue]
-    least = next(least_changes(search))
+    looks = {"measured": measured, "share": every, "clear": lambda batch: np.ones(len(batch), bool)}
+    least = next(least_changes(search_of(remedy, Goal(), machines, **looks)))
     assert changed(rigid, remedy.tuned(least)) == ["controller.crossover"]
     assert 13.0 < remedy.tuned(least).flat()["controller.crossover"] < 13.3
     assert len(tried) < 80
+    cut = search_of(remedy, Goal(), machines)
+    with RemedySettings(search_work=1.0).in_use():  # which ends before the first point
+        assert [*least_changes(cut)] == []
+    assert cut.cut
+    assert len(cut.points.shares) == 0
 
 
 def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet) -> None:
     """Held by its friction, it is in position once the reference is back: that was the fastest remedy of an axis."""
     weak = {"kind": "pid", "kp": "1 N/m", "ki": "0 N/(m*s)", "kd": "1 N*s/m", "derivative_on": "measurement"}
-    stuck = Remedy.settled_on("", rigid.replace({"controller": weak}))
-    moves = moves_of_points(stuck, np.zeros((1, 0)), machines, Goal())
+    moves = moves_of_points(AS_IS(rigid.replace({"controller": weak})), ONE_POINT, machines, Goal())
     assert not np.isfinite(moves.looser).any()
 
 
@@ -1307,12 +1291,6 @@ def test_every_range_told_contains_its_value_and_lies_in_its_search_range(rigid:
                     assert window.value == pytest.approx(flat[window.name], rel=1e-3)
 
 
-def test_that_there_is_no_window_is_said() -> None:
-    least = SimpleNamespace(remedy=SimpleNamespace(name="gains", variables=(1,)), windows=())
-    tuning: Any = SimpleNamespace(least=least)
-    assert window_lines(tuning)[0].startswith("No window is given for gains")
-
-
 def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     """At 8 Hz one isolator settles the stage; at 1 Hz none of those tried does."""
     tried, none = suggestion(rigid), suggestion(rigid.replace({"controller.crossover": "1 Hz"}))
@@ -1321,8 +1299,8 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     flat = tried.stage.flat()
     assert (tried.settles, none.settles) == (True, False)
     assert flat["joint.stiffness"] * flat["joint.stroke"] < flat["friction.static"]
-    wording(isolator_sentence(tried))
-    wording(isolator_sentence(none))
+    assert with_unit(flat["joint.stiffness"], "N/m") in isolator_sentence(tried)
+    assert isolator_sentence(tried) != isolator_sentence(none)
     assert suggestion(load(EXAMPLES / "thesis_rig.toml")) is None
 
 
@@ -1347,20 +1325,20 @@ def test_a_cycle_s_derivatives_are_those_of_finite_differences(
 ) -> None:
     """Both agree to 1e-6; the reference closes cycles of slightly changed stages, through kinks and sticking."""
     flat = {**rigid.flat(), **as_tuned(rigid.flat())}
-    nearby = Ensemble.held({**flat, name: flat[name] * (1 + STEP * np.array([-2, -1, 1, 2]))}, 4)
+    nearby = Ensemble.held({**flat, name: flat[name] * (1 + SHARE * np.array([-2, -1, 1, 2]))}, 4)
     cycles = find_cycles(nearby, rtol=1e-11)
     exact, k = sensitivities.cycle, KEYS.index(name)
     assert exact is not None
     for values, by in ((cycles.amplitude, exact.amplitude_by[k]), (cycles.period, exact.period_by[k])):
-        difference = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * STEP)
+        difference = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * SHARE)
         size = exact.amplitude if values is cycles.amplitude else exact.period
         assert difference / size == pytest.approx(by * flat[name] / size, rel=1e-6, abs=1e-6)
 
 
-STEP = 2e-3
+SHARE = 2e-3
 
 
-def test_the_edge_s_derivative_is_that_of_edges_nearby(rigid: Stage, sensitivities: Sensitivities) -> None:
+def test_derivatives_of_edge_and_margin_are_those_of_stages_nearby(rigid: Stage, sensitivities: Sensitivities) -> None:
     assert sensitivities.edge is not None
     static = rigid.flat()["friction.static"]
     edges = [
@@ -1370,9 +1348,6 @@ def test_the_edge_s_derivative_is_that_of_edges_nearby(rigid: Stage, sensitiviti
     assert (high - low) / (0.02 * static) == pytest.approx(sensitivities.edge.by[0], rel=0.02)
     assert sensitivities.ranked()[0][0] in KEYS
     assert KEYS[0] in ranked_sentences(sensitivities)[0]
-
-
-def test_a_margin_s_derivative_is_that_of_margins_nearby(rigid: Stage, sensitivities: Sensitivities) -> None:
     flat, name = rigid.flat(), "controller.alpha"
     assert sensitivities.margin is not None
     low, high = (settled_margin({**flat, name: flat[name] * (1 + change)}) for change in (-1e-3, 1e-3))
@@ -1380,92 +1355,56 @@ def test_a_margin_s_derivative_is_that_of_margins_nearby(rigid: Stage, sensitivi
     assert (high - low) / (2e-3 * flat[name]) == pytest.approx(exact, rel=1e-4)
 
 
-def test_a_settling_time_s_derivative_is_that_of_finite_differences(rigid: Stage) -> None:
+@pytest.mark.parametrize(("motion", "more"), [(None, ()), (RELEASE, ("motion.displacement",))])
+def test_a_settling_time_s_derivative_is_that_of_finite_differences(rigid: Stage, motion: Any, more: Any) -> None:
     """Both agree to 1e-6 of the time, for a move and a release, whose start depends on keys.
 
-    Jumps are as far away as stated.
+    Jumps are as far away as stated. A stage that hunts has no settling time.
     """
-    released = {"motion": {"kind": "release", "displacement": "2 mm", "duration": "4 s"}}
-    for stage in (rigid, rigid.replace(released)):
-        settles = stage.replace({"controller.crossover": "20 Hz"})
-        exact = sensitivity(settles, KEYS, edge=find_margin(rigid, True), within=1e-6).settling
-        assert exact is not None
-        assert exact.jump > 1e-3
-        flat = {**settles.flat(), **as_tuned(settles.flat())}
-        for name in ("friction.bristle_stiffness", "masses.cart"):
-            times = settling_times({**flat, name: flat[name] * (1 + 1e-4 * np.array([-2, -1, 1, 2]))})
-            difference = (times[0] - 8 * times[1] + 8 * times[2] - times[3]) / 12e-4
-            assert difference / exact.time == pytest.approx(
-                exact.by[KEYS.index(name)] * flat[name] / exact.time, abs=1e-6
-            )
-    with pytest.raises(InputError, match="within"):
-        sensitivity(rigid, within=0.0)
+    settles = rigid.replace({"controller.crossover": "20 Hz", **({"motion": motion} if motion else {})})
+    names = ("friction.bristle_stiffness", "masses.cart", *more)
+    edge = find_margin(rigid, True)
+    exact = sensitivity(settles, names, edge=edge, within=1e-6).settling
+    assert exact is not None
+    assert exact.jump > 1e-3
+    flat = {**settles.flat(), **as_tuned(settles.flat())}
+    for name, by in zip(names, exact.by, strict=True):
+        times = settling_times({**flat, name: flat[name] * (1 + 1e-4 * np.array([-2, -1, 1, 2]))})
+        difference = (times[0] - 8 * times[1] + 8 * times[2] - times[3]) / 12e-4
+        assert difference / exact.time == pytest.approx(by * flat[name] / exact.time, abs=1e-6)
+    assert sensitivity(rigid, names[:1], edge=edge, within=1e-6).settling is None
 
 
-@pytest.fixture(scope="module")
-def stepping(rigid: Stage) -> dict[str, Any]:
-    """The rig's flat keys at 20 Hz, where it settles after a step."""
-    step = {"motion": {"kind": "step", "size": "2 mm", "duration": "4 s"}, "controller.crossover": "20 Hz"}
-    stage = rigid.replace(step)
-    return {**stage.flat(), **as_tuned(stage.flat())}
-
-
-def test_a_settling_time_jumps_with_the_band_where_it_is_said_to(stepping: dict[str, Any]) -> None:
+def test_a_settling_time_jumps_with_the_band_where_it_is_said_to(rigid: Stage) -> None:
     """The move ends elsewhere than it began: the turning point that is named is one of the deviation."""
-    exact = _of_settling(stepping, KEYS[:1], 1e-6)
+    stage = rigid.replace({"motion": STEP, "controller.crossover": "20 Hz"})
+    flat = {**stage.flat(), **as_tuned(stage.flat())}
+    exact = sensitivity(stage, KEYS[:1], edge=find_margin(rigid, True), within=1e-6).settling
     assert exact is not None
     wide = 1e-6 * (1 + exact.jump)
-    (before,), (after,) = (settling_times(stepping, 1, wide * (1 + side)) for side in (-1e-6, 1e-6))
+    (before,), (after,) = (settling_times(flat, 1, wide * (1 + side)) for side in (-1e-6, 1e-6))
     assert before - after > 0.01
 
 
-def test_a_settling_time_may_be_off_by_a_share_of_itself(stepping: dict[str, Any]) -> None:
-    """However long before the move the run began: here as long as if it had taken ten times as long."""
-    exact = _of_settling(stepping, KEYS[:1], 1e-6)
+def test_a_settling_time_may_be_off_by_a_share_of_itself(rigid: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A derivative that does not predict how the time changes is none."""
+    stage, edge = rigid.replace({"motion": STEP, "controller.crossover": "20 Hz"}), find_margin(rigid, True)
+    exact = sensitivity(stage, KEYS[:1], edge=edge, within=1e-6).settling
     assert exact is not None
-    slack, column = exact.time / 10 / stepping[KEYS[0]], STATISTICS.index("inner_exit")
-    follows = [
-        _is_smooth(
-            stepping,
-            KEYS[:1],
-            column,
-            exact.time,
-            exact.time / 10,
-            exact.by + off * RemedySettings.current().smooth_share * slack,
-            1e-6,
-        )
-        for off in (0.5, 2.0)
-    ]
-    assert follows == [True, False]
+    slack = RemedySettings.current().smooth_share * exact.time / stage.flat()[KEYS[0]]
+    flow = sensitivities_module.flow_derivatives
 
+    def shifted(off: float) -> Any:
+        def derivatives(stages: Ensemble, *how: Any) -> Any:
+            end, by_states, by_keys = flow(stages, *how)
+            by_keys[stages.kernel.position] += off * slack * end[stages.kernel.velocity]
+            return end, by_states, by_keys
 
-def test_turns_of_a_stage_that_does_not_settle_are_not_asked_for(rigid: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    swings: list[float] = []
-    run = Ensemble.run
+        return derivatives
 
-    def noted(*args: Any, least_swing: float = np.inf, **options: Any) -> Results:
-        swings.append(least_swing)
-        return run(*args, least_swing=least_swing, **options)
-
-    monkeypatch.setattr(Ensemble, "run", noted)
-    assert _of_settling(rigid.flat(), KEYS[:1], 1e-6) is None
-    assert swings == [np.inf]
-
-
-def test_the_motion_is_taken_as_it_is(rigid: Stage) -> None:
-    """A settling time has no derivatives to the reference, but one to where a release begins."""
-    for kind, key in (("step", "size"), ("release", "duration")):
-        length = {"step": "size", "release": "displacement"}[kind]
-        stage = rigid.replace({"motion": {"kind": kind, length: "2 mm", "duration": "4 s"}})
-        with pytest.raises(InputError, match=f"motion.{key}"):
-            sensitivity(stage, [f"motion.{key}"], within=1e-6)
-    settles = stage.replace({"controller.crossover": "20 Hz"})
-    released = sensitivity(settles, ["motion.displacement"], within=1e-6).settling
-    assert released is not None
-    flat = {**settles.flat(), **as_tuned(settles.flat())}
-    displaced = flat["motion.displacement"] * (1 + 1e-4 * np.array([-2, -1, 1, 2]))
-    times = settling_times({**flat, "motion.displacement": displaced})
-    assert (times[2] - times[1]) / (2e-4 * flat["motion.displacement"]) == pytest.approx(released.by[0], rel=1e-4)
+    for off, follows in ((0.5, True), (2.0, False)):
+        monkeypatch.setattr(sensitivities_module, "flow_derivatives", shifted(off))
+        assert (sensitivity(stage, KEYS[:1], edge=edge, within=1e-6).settling is not None) == follows
 
 
 def settling_times(flat: dict[str, Any], stages: int = 4, within: float = 1e-6) -> np.ndarray:
@@ -1473,21 +1412,6 @@ def settling_times(flat: dict[str, Any], stages: int = 4, within: float = 1e-6) 
     options = RunOptions(rtol=1e-11, bands=(within, within))
     (runs,) = run_chunks(kernel(shared_structure(flat)), flat, stages, options)
     return settling_of_runs(flat, runs, "inner")
-
-
-def test_an_unknown_key_has_no_derivative(rigid: Stage) -> None:
-    with pytest.raises(InputError):
-        sensitivity(rigid, ["friction.statik"])
-
-
-def test_a_key_that_cannot_be_changed_by_a_share_has_no_derivative(rigid: Stage) -> None:
-    """One key is 0; the other selects the equations and does not appear in them."""
-    still = rigid.with_numbers({"friction.viscous": 0.0})
-    with pytest.raises(InputError, match="viscous = 0"):
-        sensitivity(still, ["friction.static", "friction.viscous"])
-    locked = load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True})
-    with pytest.raises(InputError, match="stroke"):
-        sensitivity(locked, ["joint.stroke"])
 
 
 def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: Any) -> tuple[Any, Performance]:
@@ -1514,33 +1438,19 @@ def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     assert unmet_goals(*made_up(400, **some), FORCE_LIMITED) == ()
     assert unmet_goals(*made_up(400, **many), FORCE_LIMITED) == ("together",)  # by chance
     assert unmet_goals(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
-
-
-@pytest.mark.parametrize(("alpha", "end"), [(0.1, "lower"), (0.2, ""), (0.299, "upper")])
-def test_a_number_at_the_end_of_its_window_is_told_as_that(rigid: Stage, alpha: float, end: str) -> None:
-    window = VariableWindow("controller.alpha", 0.1, alpha, 0.3, False, False)
-    words = window_words(window, SimpleNamespace(stage=rigid))  # pyright: ignore[reportArgumentType]
-    assert (f"set at its {end} end" in words) == bool(end)
-    assert ("set at its" in words) == bool(end)
-
-
-def test_without_a_survey_nobody_knows_how_many_machines_meet_the_goal() -> None:
-    """38 of 40 meet the rest, and all of these may hunt."""
     surveyed = made_up(settling=range(2))[1]
-    unknown = replace(surveyed, is_surveyed=False).share(Goal())
+    unknown = replace(surveyed, is_surveyed=False).share(Goal())  # all that meet the rest may hunt
     assert np.isnan(unknown.probability)
     assert (unknown.low, unknown.high) == (0.0, surveyed.share(Goal()).high)
 
 
-def test_a_search_whose_work_ends_before_its_first_point_finds_nothing(rigid: Stage, machines: Fleet) -> None:
-    tuned = rigid.replace({"controller.crossover": "20 Hz", "controller.alpha": 0.2})
-    remedy = least_remedy(rigid, tuned, Remedy.settled_on("gains", tuned))
-    assert remedy is not None
-    search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None)
-    with RemedySettings(search_work=1.0).in_use():
-        assert [*least_changes(search)] == []
-    assert search.cut
-    assert len(search.points.shares) == 0
+@pytest.mark.parametrize(("alpha", "end"), [(0.1, "set at its lower end"), (0.2, ""), (0.299, "set at its upper end")])
+def test_a_number_at_the_end_of_its_window_is_told_as_that(tuning: Advice, works: Any, alpha: float, end: str) -> None:
+    window = VariableWindow("controller.alpha", 0.1, alpha, 0.3, False, False)
+    words = window_words(window, works.outcome)
+    assert end in words
+    assert ("set at its" in words) == bool(end)
+    assert "No window" in window_lines(replace(tuning, outcomes=(replace(works.outcome, windows=()),)))[0]
 
 
 def test_a_time_that_may_be_never_has_its_lower_end() -> None:
@@ -1549,21 +1459,18 @@ def test_a_time_that_may_be_never_has_its_lower_end() -> None:
     assert words == ["100 ms", "100 ms (100 ms or longer)", "100 ms or longer, possibly never", "never"]
 
 
-def test_sizes_tell_of_how_many_keys_a_factor_is() -> None:
+@pytest.mark.parametrize(
+    ("keys", "scaled", "words"),
+    [
+        (1, 1, "1 key of the controller, by a factor of 4"),
+        (2, 2, "2 keys of the controller, by a factor of 2 each on average"),
+        (3, 1, "3 keys of the controller, one of them by a factor of 4"),
+        (3, 2, "3 keys of the controller, 2 of them by a factor of 2 on average"),
+    ],
+)
+def test_sizes_tell_of_how_many_keys_a_factor_is(keys: int, scaled: int, words: str) -> None:
     """Keys that come or go have none."""
-    words = [size_words(ChangeSize(False, keys, 4.0, scaled)) for keys, scaled in ((1, 1), (2, 2), (3, 1), (3, 2))]
-    assert words == [
-        "1 key of the controller, by a factor of 4",
-        "2 keys of the controller, by a factor of 2 each on average",
-        "3 keys of the controller, one of them by a factor of 4",
-        "3 keys of the controller, 2 of them by a factor of 2 on average",
-    ]
-
-
-def test_relaxations_that_were_not_sought_are_told_as_that() -> None:
-    dithered, other = (SimpleNamespace(remedy=SimpleNamespace(verifiable=verifiable)) for verifiable in (False, True))
-    lines = [_no_relaxation(cast("Any", SimpleNamespace(outcomes=some))) for some in ([dithered], [dithered, other])]
-    assert ["not sought" in text for text in lines] == [True, False]
+    assert size_words(ChangeSize(False, keys, 4.0, scaled)) == words
 
 
 def test_a_stage_of_which_it_is_not_known_what_attracts_it_is_a_doubt(rigid: Stage, goal: Goal) -> None:
@@ -1574,21 +1481,21 @@ def test_a_stage_of_which_it_is_not_known_what_attracts_it_is_a_doubt(rigid: Sta
     assert {"given up", "together"} <= DOUBTS.keys()
 
 
-def test_what_works_alone_is_not_tried_together(rigid: Stage, tuning: Advice) -> None:
+def test_what_works_alone_is_not_tried_together(tuning: Advice, works: Any) -> None:
     """Gains and isolator each worked, and both together took a quarter of all work to settle no sooner."""
-    listed = {remedy.name: remedy for remedy in remedies(rigid, Goal())}
-    made: Any = [rigid, rigid, tuning.goal, *[None] * 4, TINY, lambda label: None]
-    (works,) = tuning.working
+    listed = {remedy.name: remedy for remedy in remedies(tuning.stage, Goal())}
 
-    def left_out(*alone: str) -> bool:
-        outcomes = [replace(works, remedy=listed[name]) for name in alone]
-        return _Session(*made, outcomes=outcomes)._combines(listed["isolator and gains"])
+    def alone(*names: str) -> list[RemedyOutcome]:
+        return [replace(works.outcome, remedy=listed[name]) for name in names]
 
-    assert left_out("gains", "isolator")
-    assert not left_out("isolator")
-    assert not left_out("gains", "integral limit")
-    both = tuple(replace(works, remedy=listed[name]) for name in ("gains", "isolator"))
-    lines = assumptions(replace(tuning, outcomes=both))
+    for names, left_out in (
+        (("gains", "isolator"), True),
+        (("isolator",), False),
+        (("gains", "integral limit"), False),
+    ):
+        session = session_of(tuning, *alone(*names))
+        assert session._combines(listed["isolator and gains"]) == left_out
+    lines = assumptions(replace(tuning, outcomes=tuple(alone("gains", "isolator"))))
     assert any("not tried together, as each works alone" in line for line in lines)
 
 
@@ -1597,27 +1504,26 @@ def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) ->
     assert as_it_is(tuning) in answer(tuning)
     assert as_it_is(tuning).startswith("As it is: a limit cycle, and ")
     quiet = check_given(tuning.stage.replace({"controller.crossover": "12 Hz"}))
+    hunting = replace(quiet.judgement.hunting, certain=False)
+    doubtful = replace(quiet, judgement=replace(quiet.judgement, hunting=hunting))
 
-    def says(*unmet: str, within: float | None = None, case: Any = quiet, **failing: Any) -> str:
-        goal, present = replace(FORCE_LIMITED, settle=within), made_up(50, **failing)[1]
+    def says(*unmet: str, within: float | None = None, case: Any = quiet, drawn: Any = None, **failing: Any) -> str:
+        present, goal = made_up(50, **failing)[1], replace(FORCE_LIMITED, settle=within)
+        present = replace(present, moves_drawn=drawn or present.moves_drawn)
         return as_it_is(replace(tuning, case=case, goal=goal, present=present, unmet=unmet))
 
-    late = says("settling", within=2.0, settling=range(6))
-    assert late == "As it is: no limit cycle, but 12 % of 50 moves do not settle within 2.00 s."
-    assert "before the return or the end of the run" in says("settling", settling=range(6))
+    late, missed = says("settling", within=2.0, settling=range(6)), says("settling", settling=range(6))
+    assert "no limit cycle, but 12 % of 50 moves do not settle within 2.00 s" in late
+    assert "before the return or the end of the run" in missed
     two = says("margin", "force", margin=range(5), force=range(10, 20))
     assert "10 % of 50 machines have less modulus margin than 0.5 and 20 % of 50 moves take more force than 10" in two
     attracted = says("hunting", settling=range(10), hunting=range(5, 20))
     assert "25 % of the machines that meet the rest hunt or may hunt" in attracted
     assert "6 % of 50 machines and moves miss one part" in says("together", margin=range(3))
-    drawn = replace(made_up(50, settling=range(6))[1], moves_drawn=MoveRange(1e-3, 5e-3, (1.0, 3.0)))
-    sized = as_it_is(replace(tuning, case=quiet, goal=FORCE_LIMITED, present=drawn, unmet=("settling",)))
+    sized = says("settling", settling=range(6), drawn=MoveRange(1e-3, 5e-3, (1.0, 3.0)))
     assert "12 % of 50 moves of 1.00 to 5.00 mm with 1.00 to 3.00 m/s² do not settle" in sized
-    assert says("distance") == f"As it is: no limit cycle, but {DOUBTS['distance']}."
-    doubtful = replace(
-        quiet, judgement=replace(quiet.judgement, hunting=replace(quiet.judgement.hunting, certain=False))
-    )
-    assert says("certain", case=doubtful).startswith("As it is: perhaps a limit cycle, but")
+    assert DOUBTS["distance"] in says("distance")
+    assert "perhaps a limit cycle, but" in says("certain", case=doubtful)
 
 
 def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet_the_goal(
@@ -1640,92 +1546,61 @@ def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet
     assert not any("meets the goal as it is" in line for line in answer(advice))
 
 
-def test_relaxations_left_for_want_of_work_are_told(rigid: Stage, tuning: Advice) -> None:
-    """With elements of friction, relaxations took half of all work."""
-    fleet = draw_fleet(rigid, Correlations(), 3, 1)
-    search = Search(remedies(rigid, Goal())[0], Goal(settle=0.02), fleet, fleet, rigid, TINY, lambda label: None)
-    search.optimise()
-    outcome = RemedyOutcome(search.remedy, None, None, None, (), (), search.points)
-    with allowance(1.0):
-        assert relaxations([outcome], search.goal, fleet) == ()
-    cut = replace(tuning, outcomes=(), interrupted=False, relaxed_all=False)
-    assert any("Not all relaxations of the goal were tried" in line for line in answer(cut))
-    assert not any("Not all relaxations" in line for line in answer(replace(cut, relaxed_all=True)))
-
-
 def test_costs_order_settings() -> None:
     """A setting that breaks a constraint costs more than one that meets all, and more the further it breaks it.
 
     If not all machines settle, it costs more the fewer do.
     """
-    columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf, np.inf], "looser": [1.0] * 5, "slower": [1.0] * 5}
-    columns |= {"force": [1.0] * 5, "margin": [0.6, 0.6, 0.4, 0.6, 0.6], "bandwidth": [8.0] * 5}
-    columns |= {"nearness": [1.0, 1.0, 1.0, 0.75, 0.25], "whole": [True] * 5, "moves_from": [1e-5] * 5}
-    points = TriedPoints(np.zeros((5, 1)), *(np.array(column) for column in columns.values()))
+    columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf, np.inf], "margin": [0.6, 0.6, 0.4, 0.6, 0.6]}
+    points = points_of([0.0] * 5, **columns, bandwidth=[8.0] * 5, nearness=[1.0, 1.0, 1.0, 0.75, 0.25])
     assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3, 4]
 
 
-@pytest.mark.parametrize("changed", [None, lambda shares: np.abs(shares - 0.2).sum(axis=1)])
+@pytest.mark.parametrize("wanted", [None, lambda shares: np.abs(shares - 0.2).sum(axis=1)])
 def test_points_given_up_early_are_those_that_no_search_would_have_kept(
-    rigid: Stage, goal: Goal, changed: Callable[[np.ndarray], np.ndarray] | None, monkeypatch: pytest.MonkeyPatch
+    rigid: Stage, goal: Goal, wanted: Callable[[np.ndarray], np.ndarray] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The best point and the way to it are the same as with all moves of all points, which needs more runs."""
     fleet = draw_fleet(rigid, Correlations(), TINY.machines, 1)
-    best, runs, budget = [], [], replace(TINY, generations=6)
+    gains = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "gains")
+    counted: list[int] = []
+
+    def moves(remedy: Remedy, shares: np.ndarray, few: Fleet, *rest: Any, **named: Any) -> Moves:
+        counted.append(len(shares) * few.count)
+        return moves_of_points(remedy, shares, few, *rest, **named)
+
+    monkeypatch.setattr(search_module, "moves_of_points", moves)
+    best, runs = [], []
     for bounded in (True, False):
-        search = Search(
-            next(r for r in remedies(rigid, goal) if r.name == "gains"),
-            goal,
-            fleet,
-            fleet,
-            rigid,
-            budget,
-            lambda _: None,
-        )
+        search = search_of(gains, goal, fleet, budget=replace(TINY, generations=6))
         whole = search.measured
         if not bounded:
-            search.measured = lambda shares, most=0.0, wanted=None, whole=whole: whole(shares)  # pyright: ignore
-        counted: list[int] = []
-
-        def moves(
-            remedy: Remedy, shares: np.ndarray, few: Fleet, *rest: Any, runs: list[int] = counted, **named: Any
-        ) -> Moves:
-            runs.append(len(shares) * few.count)
-            return moves_of_points(remedy, shares, few, *rest, **named)
-
-        monkeypatch.setattr(search_module, "moves_of_points", moves)
-        search.optimise(changed)
+            vars(search)["measured"] = lambda shares, most=0.0, wanted=None, whole=whole: whole(shares)
+        counted.clear()
+        search.optimise(wanted)
         points = search.points
-        costs = points.cost(goal, changed)
-        best.append(points.shares[costs.argmin()])
+        best.append(points.shares[points.cost(goal, wanted).argmin()])
         runs.append(sum(counted))
     assert np.array_equal(*best)
     assert runs[0] < runs[1]
 
 
-def test_a_search_goes_on_while_all_points_are_as_bad() -> None:
+def test_a_search_goes_on_while_all_points_are_as_bad(rigid: Stage, goal: Goal, machines: Fleet) -> None:
     """If no point of a generation settled, all had the same cost, and the search was taken to have converged."""
+    gains = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "gains")
     counts = []
-    for costs in (np.full(10, RemedySettings.current().worst_time), np.full(10, 0.5)):
+    for settling in (np.inf, 0.5):
         tried: list[int] = []
 
-        def cost(
-            shares: np.ndarray, most: np.ndarray | float, costs: np.ndarray = costs, tried: list[int] = tried
-        ) -> np.ndarray:
-            tried.append(shares.shape[1])
-            return costs
+        def measured(
+            shares: np.ndarray, *how: Any, tried: list[int] = tried, settling: float = settling
+        ) -> TriedPoints:
+            tried.append(len(shares))
+            return points_of(shares, settling=np.full(len(shares), settling), nearness=np.full(len(shares), 0.5))
 
-        _evolve(cost, np.random.default_rng(1).random((10, 2)), [(0.0, 1.0)] * 2, 6)
+        search_of(gains, goal, machines, measured=measured, budget=replace(TINY, generations=6, refined=1)).optimise()
         counts.append(len(tried))
-    assert counts[0] == 6
-    assert counts[1] < 6
-
-
-@pytest.mark.parametrize("motion", ["hold", "ramp"])
-def test_a_motion_that_needs_not_settle_is_refused(rigid: Stage, motion: str) -> None:
-    keys = {"motion": {"kind": motion, "duration": "1 s", **({"velocity": "1 mm/s"} if motion == "ramp" else {})}}
-    with pytest.raises(InputError):
-        tune(Stage(**{**rigid.as_written(), **keys}))
+    assert counts[0] > counts[1]
 
 
 @pytest.mark.parametrize(("margins", "kept"), [([0.6, 0.0, 0.5], [0, 2, 0]), ([0.6, 0.3, 0.5], [0, 1, 2])])
