@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from inside import friso_inside
+from refusals import refused, rows_of
 from systems import posix
 
 import friso
@@ -20,6 +21,7 @@ from friso.interface.inputs import stage_of
 from friso.stage.files import MOST_BYTES
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
+RIG = EXAMPLES / "thesis_rig.toml"
 AXIS = EXAMPLES / "drives" / "linuxcnc_torque_axis.ini"
 MACHINE = {
     **{"force_per_output": "10 N"},
@@ -53,7 +55,7 @@ def test_a_text_file_has_a_largest_size_and_a_name_a_longest(tmp_path: Path) -> 
 
 def test_a_table_of_countless_keys_is_refused_at_once() -> None:
     """For each of which the nearest known one would be looked for."""
-    text = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")
+    text = (RIG).read_text(encoding="utf-8")
     keys = "".join(f"k{number} = 1\n" for number in range(15_000))
     for place in ("", "[masses]\n"):
         with pytest.raises(InputError, match="a table of 1500"):
@@ -75,7 +77,7 @@ def test_a_file_whose_name_is_no_text_is_answered(tmp_path: Path) -> None:
 def test_a_stage_is_not_saved_over_a_file_that_appears_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    place, stage = tmp_path / "a.toml", friso.load(EXAMPLES / "thesis_rig.toml")
+    place, stage = tmp_path / "a.toml", friso.load(RIG)
 
     def text(stage: friso.Stage) -> str:
         place.write_text("mine")
@@ -110,11 +112,11 @@ RANGES = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "0.1 mm..1 mm"}
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *(("samples", value) for value in (0, -1, 1.5, True, "8", {}, [], float("nan"), 10**17, 10**5000)),
-        *(("export", value) for value in ("", "a.nc", 3, [3], [b"a.nc"], [""], ["x" * 300 + ".nc"], ["a\0.nc"])),
+        *(("samples", value) for value in (0, 1.5, True, "8", {}, float("nan"), 10**17, 10**5000)),
+        *(("export", value) for value in ("", 3, [3], [b"a.nc"], [""], ["x" * 300 + ".nc"], ["a\0.nc"])),
         *(("export", value) for value in (["nowhere/a.nc"], ["a.xls"], ["folder.nc"], {"a.nc": 1, "b": 2})),
-        *(("out", value) for value in ("", "/", "x" * 5000, "x" * 201, "x/" * 1500, "a\0b", 3, b"x", ["a"])),
-        *(("stage", value) for value in ("", "x" * 5000, "a\0b", 3, None)),
+        *(("out", value) for value in ("", "/", "x" * 5000, "x" * 201, "x/" * 1500, "a\0b", 3)),
+        *(("stage", value) for value in ("", "x" * 5000, 3, None)),
     ],
     ids=lambda value: repr(value)[:20] if not isinstance(value, int) else "number",
 )
@@ -123,22 +125,21 @@ def test_a_sweep_refuses_arguments_of_other_types_and_writes_nothing(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.nc").mkdir()
-    stage = friso.load(EXAMPLES / "thesis_rig.toml")
-    with pytest.raises(InputError) as refusal:
-        friso.sweep(**{"stage": stage, "axes": RANGES, "samples": 8, name: value})
+    with refused() as refusal:
+        friso.sweep(**{"stage": friso.load(RIG), "axes": RANGES, "samples": 8, name: value})
     assert max(map(len, str(refusal.value).splitlines())) < 200
-    assert refusal.value.expected
     assert [*tmp_path.rglob("*")] == [tmp_path / "folder.nc"]
 
 
-@pytest.mark.parametrize("path", ["", "x" * 201, "x" * 5000, "x/" * 1500])
-@pytest.mark.parametrize("option", ["--out", "--out=", "--export"])
+@pytest.mark.parametrize(
+    ("option", "path"), [("--out", ""), ("--out=", ""), ("--out", "x/" * 1500), ("--export", "x" * 201)]
+)
 def test_a_map_refuses_paths_that_are_none_and_writes_nothing(option: str, path: str, tmp_path: Path) -> None:
-    words = [option + path] if option.endswith("=") else [option, f"{path}.nc" if path and "port" in option else path]
-    done = friso_inside(tmp_path, "map", EXAMPLES / "thesis_rig.toml", "--x", "joint.stroke=0.1 mm..1 mm:3", *words)
+    words = [option + path] if option.endswith("=") else [option, f"{path}.nc" if "port" in option else path]
+    done = friso_inside(tmp_path, "map", RIG, "--x", "joint.stroke=0.1 mm..1 mm:3", *words)
     assert done.returncode == 2
-    assert "expected:" in done.stderr
-    assert option.rstrip("=") in done.stderr
+    assert option.rstrip("=") in done.stderr.splitlines()[0]
+    assert rows_of(done.stderr)
     assert [*tmp_path.iterdir()] == []
 
 
@@ -168,21 +169,6 @@ def test_a_dangling_link_is_a_file_that_exists(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [3.0, True, [float("nan")], [b"x"], np.array([1.0, 2.0]), {3: 4}, "masses.cart=1 kg"]
-)
-def test_overrides_of_another_type_are_refused(changes: object) -> None:
-    with pytest.raises(InputError):
-        friso.export("gains", EXAMPLES / "thesis_rig.toml", set=changes)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("elements", ["6", b"3", None, True, 2.5, pytest.param(10**5000, id="long")])
-def test_a_whole_number_of_another_type_is_refused(elements: object) -> None:
-    with pytest.raises(InputError) as refusal:
-        friso.convert(EXAMPLES / "thesis_rig.toml", "gms", elements=elements)  # type: ignore[arg-type]
-    assert ("from 1 to 12" in refusal.value.expected) == (type(elements) is int)
-
-
-@pytest.mark.parametrize(
     "gains",
     [
         {"kp": "1e30 N/m", "ki": "1 N/(m*s)", "kd": "1 N*s/m"},
@@ -201,36 +187,49 @@ def test_gains_beyond_all_drives_are_refused_or_left_out(gains: dict[str, str]) 
     json.dumps(document, allow_nan=False)
 
 
-def test_numbers_of_a_parameter_file_may_overflow(tmp_path: Path) -> None:
-    source = tmp_path / "axis.ini"
-    text = AXIS.read_text("utf-8")
-    line = next(line for line in text.splitlines() if line.startswith("P "))
-    source.write_text(text.replace(line, "P = 1" + 400 * "0"), "utf-8")
-    with pytest.raises(InputError):
-        friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)
-
-
-def test_an_option_out_of_range_is_named() -> None:
-    with pytest.raises(InputError) as caught:
-        friso.tune(EXAMPLES / "thesis_rig.toml", within="1e200 m")
-    assert caught.value.key == "within"
-
-
 QUESTIONS = {name: getattr(friso, name) for name in ("check", "bode", "simulate", "tune", "flexure", "reproduce")}
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
-@pytest.mark.parametrize(
-    "value", [np.array([1.0, 2.0]), {"a": {}}, object(), b"x", complex(1, 1)], ids=lambda value: type(value).__name__
-)
-def test_an_argument_of_another_type_is_named(name: str, value: Any) -> None:
-    for parameter in ("rtol", "seed", "only", "series", "stroke", "sample_time", "points"):
-        if parameter not in inspect.signature(QUESTIONS[name]).parameters:
-            continue
-        arguments = {} if name == "reproduce" else {"stage": EXAMPLES / "thesis_rig.toml"}
-        with pytest.raises(InputError) as caught:
-            QUESTIONS[name](**arguments, **{parameter: value})
-        assert caught.value.key == parameter
+def test_an_argument_of_another_type_is_named(name: str) -> None:
+    stage = {} if name == "reproduce" else {"stage": RIG}
+    named = {"rtol", "seed", "only", "series", "stroke", "sample_time", "points"}
+    for parameter in named & inspect.signature(QUESTIONS[name]).parameters.keys():
+        for value in (np.array([1.0, 2.0]), {"a": {}}, object(), b"x", complex(1, 1)):
+            with refused(parameter):
+                QUESTIONS[name](**stage, **{parameter: value})
+
+
+@pytest.mark.parametrize("choice", [np.array([1.0, 2.0]), 3, None, [], b"gains", float("nan")])
+def test_a_choice_of_another_type_is_refused(choice: Any) -> None:
+    asked = [lambda: friso.export(choice, RIG), lambda: friso.example(choice), lambda: friso.schema(choice)]
+    asked += [lambda: friso.export("gains", RIG, to=choice)] if choice is not None else []
+    for ask in asked:
+        with refused():
+            ask()
+
+
+@pytest.mark.parametrize("elements", ["6", b"3", None, True, 2.5, pytest.param(10**5000, id="long")])
+def test_a_whole_number_of_another_type_is_refused(elements: object) -> None:
+    with refused("elements") as refusal:
+        friso.convert(RIG, "gms", elements=elements)  # type: ignore[arg-type]
+    assert ("from 1 to 12" in refusal.value.expected) == (type(elements) is int)
+
+
+def test_changes_of_another_type_are_refused() -> None:
+    array, stage = np.array([1.0, 2.0]), friso.load(RIG)
+    for changes in (3.0, True, [float("nan")], [b"x"], array, {3: 4}, "masses.cart=1 kg"):
+        with refused():
+            friso.export("gains", RIG, set=changes)  # type: ignore[arg-type]
+    for changes in ({"joint": {1: 2}}, {3: 4}, ["masses.stage"], array, "masses.stage"):
+        with pytest.raises(InputError):
+            stage.replace(changes)  # type: ignore[arg-type]
+    with refused():
+        friso.export("gains", {3: 4})  # type: ignore[dict-item]
+    with pytest.raises(InputError, match="set="):
+        friso.check(RIG, {"masses.cart": "1 kg"})  # type: ignore[arg-type]
+    with refused("within"):
+        friso.tune(RIG, within="1e200 m")
 
 
 def test_huge_values_of_a_log_are_shown_as_far_as_a_picture_can(tmp_path: Path) -> None:
@@ -242,30 +241,26 @@ def test_huge_values_of_a_log_are_shown_as_far_as_a_picture_can(tmp_path: Path) 
     assert "not drawn" in drawn.title
 
 
-@pytest.mark.parametrize("line", ["P = 2_0", "P = \u0663", "P = 0x10"])
-def test_numbers_of_a_parameter_file_are_those_that_drives_read(line: str, tmp_path: Path) -> None:
-    source = tmp_path / "axis.ini"
-    lines = [line if one.startswith("P ") else one for one in AXIS.read_text("utf-8").splitlines()]
-    source.write_text("\n".join(lines), "utf-8")
-    with pytest.raises(InputError) as caught:
-        friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)
-    assert caught.value.key == "P"
+def line_of_gain(axis: list[str]) -> int:
+    return next(k for k, line in enumerate(axis) if line.startswith("P "))
 
 
-def test_a_section_with_a_huge_number_is_no_axis(tmp_path: Path) -> None:
-    source = tmp_path / "axis.ini"
-    source.write_text(f"{AXIS.read_text('utf-8')}\n[JOINT_{5000 * '9'}]\nP = 3\n", "utf-8")
-    assert friso.load(friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)).masses.stage is not None
+@pytest.mark.parametrize("number", ["2_0", "\u0663", "0x10", "1" + 400 * "0"])
+def test_numbers_of_a_parameter_file_are_those_that_drives_read(number: str, tmp_path: Path) -> None:
+    lines = AXIS.read_text("utf-8").splitlines()
+    lines[line_of_gain(lines)] = f"P = {number}"
+    (tmp_path / "axis.ini").write_text("\n".join(lines), "utf-8")
+    with refused("P"):
+        friso.init(tmp_path / "new.toml", from_=tmp_path / "axis.ini", set=MACHINE)
 
 
 def test_a_move_without_acceleration_is_asked_for(tmp_path: Path) -> None:
-    source = tmp_path / "axis.ini"
     lines = [line for line in AXIS.read_text("utf-8").splitlines() if not line.startswith("MAX_ACCELERATION")]
-    at = next(k for k, line in enumerate(lines) if line.startswith("P "))
-    source.write_text("\n".join([*lines[:at], "MAX_ACCELERATION = 0", *lines[at:]]), "utf-8")
+    lines.insert(line_of_gain(lines), "MAX_ACCELERATION = 0")
+    (tmp_path / "axis.ini").write_text("\n".join(lines), "utf-8")
     machine = {key: value for key, value in MACHINE.items() if not key.startswith("motion")}
     with pytest.raises(InputError, match=r"motion\.acceleration"):
-        friso.init(tmp_path / "new.toml", from_=source, set=machine)
+        friso.init(tmp_path / "new.toml", from_=tmp_path / "axis.ini", set=machine)
 
 
 @pytest.mark.parametrize("key", ["torqe_per_output", "mass", ""])
@@ -275,57 +270,32 @@ def test_an_answer_to_no_question_is_refused(key: str, tmp_path: Path) -> None:
     assert not (tmp_path / "new.toml").exists()
 
 
-@pytest.mark.parametrize("changes", [{"joint": {1: 2}}, {3: 4}, ["masses.stage"], np.array([1.0]), "masses.stage"])
-def test_keys_that_are_no_texts_are_refused(changes: Any) -> None:
-    stage = friso.load(EXAMPLES / "thesis_rig.toml")
-    with pytest.raises(InputError):
-        stage.replace(changes)
-
-
-def test_tables_whose_keys_are_no_texts_are_refused() -> None:
-    with pytest.raises(InputError):
-        friso.export("gains", {3: 4})  # type: ignore[dict-item]
-
-
-@pytest.mark.parametrize("choice", [np.array([1.0, 2.0]), 3, None, [], b"gains", float("nan")])
-def test_a_choice_of_another_type_is_refused(choice: Any) -> None:
-    rig = EXAMPLES / "thesis_rig.toml"
-    asked = [lambda: friso.export(choice, rig), lambda: friso.example(choice), lambda: friso.schema(choice)]
-    asked += [lambda: friso.export("gains", rig, to=choice)] if choice is not None else []
-    for ask in asked:
-        with pytest.raises(InputError):
-            ask()
-
-
 @pytest.mark.parametrize("text", ['masses.stage="0.6 kg', "masses.stage = '0.6 kg"])
 def test_a_quote_that_is_not_closed_is_shown(text: str) -> None:
     with pytest.raises(InputError) as caught:
-        friso.export("gains", EXAMPLES / "thesis_rig.toml", set=[text])
+        friso.export("gains", RIG, set=[text])
     _, line, caret = caught.value.actual.splitlines()
     assert line[caret.index("^")] in "\"'"
 
 
-def test_changes_in_place_of_another_argument_are_pointed_to() -> None:
-    with pytest.raises(InputError, match="set="):
-        friso.check(EXAMPLES / "thesis_rig.toml", {"masses.cart": "1 kg"})  # type: ignore[arg-type]
-
-
 def test_changes_supply_what_a_file_lacks(tmp_path: Path) -> None:
-    text = (EXAMPLES / "thesis_rig.toml").read_text("utf-8")
+    text = (RIG).read_text("utf-8")
     assert 'model = "lugre"' in text
     (tmp_path / "stage.toml").write_text(text.replace('model = "lugre"', ""), "utf-8")
     with pytest.raises(InputError, match=r"friction\.model"):
         friso.export("gains", tmp_path / "stage.toml", to="odrive")
-    assert stage_of(tmp_path / "stage.toml", {"friction.model": "lugre"}) == friso.load(EXAMPLES / "thesis_rig.toml")
+    assert stage_of(tmp_path / "stage.toml", {"friction.model": "lugre"}) == friso.load(RIG)
 
 
 def test_an_axis_is_chosen_by_its_letter(tmp_path: Path) -> None:
-    source = tmp_path / "axis.ini"
-    text = AXIS.read_text("utf-8")
+    """A section with a huge number is no axis."""
+    source, text = tmp_path / "axis.ini", AXIS.read_text("utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("COORDINATES")]
-    source.write_text("\n".join(lines).replace("[TRAJ]", "[TRAJ]\nCOORDINATES = X Y"), "utf-8")
+    chosen = "\n".join(lines).replace("[TRAJ]", "[TRAJ]\nCOORDINATES = X Y")
+    source.write_text(f"{chosen}\n[JOINT_{5000 * '9'}]\nP = 3\n", "utf-8")
     named = friso.init(tmp_path / "a.toml", from_=source, axis="X", set=MACHINE).read_text("utf-8")
     assert named == friso.init(tmp_path / "b.toml", from_=source, set=MACHINE).read_text("utf-8")
+    assert friso.loads(named).masses.stage is not None
 
 
 @pytest.mark.parametrize(("name", "hint"), [("axis.ini", "--from"), ("log.csv", "friso logs"), ("no.zarr", "store")])
