@@ -14,13 +14,12 @@ from hypothesis import strategies as st
 from inside import friso_inside
 from pages import Page
 from patched import patched
-from refusals import refused
+from refusals import rows_of
 from snapshots import Snapshots
 
 from friso.equations.motion import Stand
 from friso.equations.settings import SETTINGS, settings_named
 from friso.equations.structure import structure
-from friso.errors import InputError
 from friso.frequency import crossover
 from friso.frequency.crossover import loop_bandwidth
 from friso.frequency.margins import margins
@@ -87,6 +86,20 @@ def comparison(built: Stage) -> Comparison:
     return compare(built, COUNT, 1)
 
 
+def drawn(stage: Stage, count: int = 20) -> Machines:
+    return draw_machines(stage, Correlations(), count, 1)
+
+
+def work_of(built: Stage, machines: Machines) -> Any:
+    return study._Work(machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
+
+
+def with_measures(result: OptionResult, **measured: Any) -> OptionResult:
+    """Return the result of an option with other measures on all machines."""
+    columns = {name: np.full(COUNT, value) for name, value in measured.items()}
+    return replace(result, measures=replace(result.measures, **columns))
+
+
 def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
     flat = built.flat()
     assert {*machines.keys} == {*SPREADS.keys() & flat.keys(), "rail.seed"}
@@ -98,6 +111,14 @@ def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
     assert levels[0, 1] == pytest.approx(TOGETHER_BY, abs=0.02)
     assert np.abs(np.mean(machines.signs)) < 0.1
     assert {*machines.signs.tolist()} == {-1.0, 1.0}
+    scrambling = np.random.default_rng(3).random(machines.count) < 0.5  # signs have random numbers of their own
+    for other in (scrambling, *(machines.keys[key] for key in machines.spreads)):
+        assert abs(np.corrcoef(machines.signs, other)[0, 1]) < 0.1
+    again, another = (draw_machines(built, Correlations(), 1000, seed) for seed in (3, 4))
+    assert all(np.array_equal(again.keys[key], values) for key, values in machines.keys.items())
+    assert np.array_equal(again.signs, machines.signs)
+    assert not np.array_equal(another.keys["friction.static"], machines.keys["friction.static"])
+    assert len({*machines.keys["rail.seed"].tolist()}) == len({*machines.seeds.tolist()}) == 1000
 
 
 def test_presliding_of_every_law_is_drawn() -> None:
@@ -117,19 +138,11 @@ def test_presliding_of_every_law_is_drawn() -> None:
     drawn, lugre = (draw_machines(stage, Correlations(), 1000, 3) for stage in (bristles, load(EXAMPLE)))
     coulomb, stiffness = drawn.keys["friction.coulomb"], drawn.keys["friction.bristle_stiffness"]
     share = drawn.keys["friction.breakaway_deflection"] * stiffness / coulomb
-    assert (
-        not drawn.sample.broken
-    )  # what is left out lies beyond the bound of one key, not on the wrong side of the rule
+    assert not drawn.sample.broken  # what is left out is beyond the bound of one key, not against the rule
     assert np.std(coulomb) == pytest.approx(np.std(lugre.keys["friction.coulomb"]), rel=0.05)
     assert (share.min() > 0, share.max() < 1) == (True, True)
     assert np.median(share) == pytest.approx(0.7, abs=0.01)
     assert np.std(share) > 0.03
-
-
-def test_signs_have_random_numbers_of_their_own(machines: Machines) -> None:
-    scrambling = np.random.default_rng(3).random(machines.count) < 0.5
-    for other in (scrambling, *(machines.keys[key] for key in machines.spreads)):
-        assert abs(np.corrcoef(machines.signs, other)[0, 1]) < 0.1
 
 
 def test_machines_as_uncertain_as_the_file(built: Stage) -> None:
@@ -144,20 +157,10 @@ def test_machines_as_uncertain_as_the_file(built: Stage) -> None:
     assert machines.changes(machines.stage, {})["controller.tuned_mass"] == 1.7
 
 
-def test_same_seed_same_machines(built: Stage, machines: Machines) -> None:
-    again = draw_machines(built, Correlations(), 1000, 3)
-    other = draw_machines(built, Correlations(), 1000, 4)
-    assert all(np.array_equal(again.keys[key], values) for key, values in machines.keys.items())
-    assert np.array_equal(again.signs, machines.signs)
-    assert not np.array_equal(other.keys["friction.static"], machines.keys["friction.static"])
-    assert len({*machines.keys["rail.seed"].tolist()}) == len({*machines.seeds.tolist()}) == 1000
-
-
 def test_a_drive_without_a_clock_gets_one(built: Stage) -> None:
-    machines = draw_machines(built.replace({"drive": None, "rail": None}), Correlations(), 20, 1)
+    machines = drawn(built.replace({"drive": None, "rail": None}))
     assert machines.stage.flat()["drive.sample_time"] == 50e-6
     assert any("50 us" in note for note in machines.notes)
-    wording("\n".join(machines.notes))
 
 
 def test_the_seven_options(every: CompareOptions, machines: Machines) -> None:
@@ -204,13 +207,14 @@ FORCES = (
 """Keys in newtons per something: a motor of less force does to the loop what a plant does that has more of all."""
 
 
-@pytest.mark.parametrize("controller", [None, GAINS], ids=["tuned", "gains"])
-def test_the_motor_is_part_of_the_loop(built: Stage, controller: dict[str, str] | None) -> None:
-    stage = built.replace({"controller": controller} if controller else {}).variants()["free"]
+@pytest.mark.parametrize("controller", [{}, {"controller": GAINS}], ids=["tuned", "gains"])
+def test_the_motor_is_part_of_the_loop(built: Stage, controller: dict[str, Any]) -> None:
+    stage = built.replace(controller).variants()["free"]
     flat, ratio = stage.flat(), 0.68
-    weak = linear_loops(stage, linear_flat(stage, {**flat, "drive.motor_constant_ratio": ratio}), 1)
-    heavy = linear_loops(stage, linear_flat(stage, {**flat, **{key: flat[key] / ratio for key in FORCES}}), 1)
-    own = linear_loops(stage, linear_flat(stage, flat), 1)
+    own, weak, heavy = (
+        linear_loops(stage, linear_flat(stage, {**flat, **changed}), 1)
+        for changed in ({}, {"drive.motor_constant_ratio": ratio}, {key: flat[key] / ratio for key in FORCES})
+    )
     assert own.stable.all()
     assert weak.stable.all()
     assert weak.margin == pytest.approx(heavy.margin, rel=1e-6)
@@ -218,9 +222,9 @@ def test_the_motor_is_part_of_the_loop(built: Stage, controller: dict[str, str] 
 
 
 def test_a_weak_motor_leaves_room_for_bandwidth(built: Stage) -> None:
-    weak = built.replace(RIGID | {"drive.motor_constant_ratio": 0.8})
+    rigid = built.replace(RIGID)
     expected, other = (
-        options(draw_machines(item, Correlations(), 20, 1), 1e-6) for item in (built.replace(RIGID), weak)
+        options(drawn(stage), 1e-6) for stage in (rigid, rigid.replace({"drive.motor_constant_ratio": 0.8}))
     )
     assert other.options[1].factor > 1.02 * expected.options[1].factor
 
@@ -233,34 +237,28 @@ def test_unstable_loops_are_told(machines: Machines, every: CompareOptions) -> N
     assert not margins(linear_flat(fast, fast.flat()), member(1.6)).stable
 
 
-def test_without_a_joint_it_is_said(built: Stage, snapshots: Snapshots) -> None:
-    choices = options(draw_machines(built.replace(RIGID), Correlations(), 20, 1), 1e-6)
-    assert [option.letter for option in choices.options] == ["a", "b", "d", "e", "f"]
-    assert {*choices.left_out} == {*"cg"}
-    snapshots.check("compare", "no joint", choices.left_out["c"])
+PROPORTIONAL = {"controller": {"kind": "pid", "kp": "2000 N/m", "kd": "60 N*s/m", "tau": "2 ms"}}
 
 
-def test_gains_instead_of_rules(built: Stage, snapshots: Snapshots) -> None:
-    gains = {"kind": "pid", "kp": "2000 N/m", "kd": "60 N*s/m", "tau": "2 ms"}
-    choices = options(draw_machines(built.replace(RIGID | {"controller": gains}), Correlations(), 20, 1), 1e-6)
-    assert {*"de"} <= {*choices.left_out}
-    snapshots.check("compare", "no integral action", "\n".join(choices.left_out[letter] for letter in "de"))
-    faster = choices.options[1]
-    assert faster.stage.flat()["controller.kp"] == pytest.approx(2000 * faster.factor**2)
-
-
-def test_without_friction_nothing_to_feed_forward(built: Stage, snapshots: Snapshots) -> None:
-    ideal = draw_machines(built.replace(RIGID | {"friction": {"model": "none"}, "rail": None}), Correlations(), 20, 1)
-    left_out = options(ideal, 1e-6).left_out
-    assert {*left_out} >= {*"cfg"}
-    snapshots.check("compare", "no friction", left_out["f"])
-
-
-def test_no_room_above(built: Stage, snapshots: Snapshots) -> None:
-    fast = built.replace(RIGID | {"controller.crossover": "90 Hz"})
-    choices = options(draw_machines(fast, Correlations(), 20, 1), 1e-6)
-    assert {*choices.left_out} == {*"bcg"}
-    snapshots.check("compare", "no room above", choices.left_out["b"])
+@pytest.mark.parametrize(
+    ("changed", "left_out", "name"),
+    [
+        ({}, "cg", "no joint"),
+        (PROPORTIONAL, "decg", "no integral action"),
+        ({"friction": {"model": "none"}, "rail": None}, "cfg", "no friction"),
+        ({"controller.crossover": "90 Hz"}, "bcg", "no room above"),
+    ],
+)
+def test_what_an_option_lacks_is_said(
+    built: Stage, snapshots: Snapshots, changed: dict[str, Any], left_out: str, name: str
+) -> None:
+    choices = options(drawn(built.replace(RIGID | changed)), 1e-6)
+    assert {*choices.left_out} == {*left_out} == {*"abcdefg"} - {option.letter for option in choices.options}
+    first = {"no integral action": "de", "no friction": "f"}.get(name, left_out[0])
+    snapshots.check("compare", name, "\n".join(choices.left_out[letter] for letter in first))
+    if changed is PROPORTIONAL:
+        faster = choices.options[1]
+        assert faster.stage.flat()["controller.kp"] == pytest.approx(2000 * faster.factor**2)
 
 
 TIME = np.arange(0, 20, 0.01)
@@ -322,22 +320,14 @@ def test_medians_with_infinite_values(values: list[float]) -> None:
     assert {result.low, result.high} <= {*values}
 
 
-def test_intervals_of_medians_hold() -> None:
+def test_intervals_hold() -> None:
+    """The slowest have ranks by the binomial distribution; fewer than 72 bound no twentieth from above."""
     rng = np.random.default_rng(5)
     expected = [median(np.exp(rng.standard_normal(50))) for _ in range(2000)]
-    held = np.mean([item.low <= 1 <= item.high for item in expected])
-    assert 0.95 - 0.015 < held < 0.985
-
-
-def test_intervals_of_the_slowest_hold() -> None:
-    """Ranks, by the binomial distribution; fewer than 72 bound no twentieth from above."""
+    assert 0.95 - 0.015 < np.mean([item.low <= 1 <= item.high for item in expected]) < 0.985
     ranks = {1: (-np.inf, np.inf), 40: (35, np.inf), 71: (63, np.inf), 72: (64, 72), 100: (90, 100)}
     for count, interval in ranks.items():
         assert quantile_interval(np.arange(1.0, count + 1), 0.95) == interval
-
-
-def test_intervals_of_paired_differences_hold() -> None:
-    rng = np.random.default_rng(6)
     held = []
     for _ in range(2000):
         common, own = rng.random(60), rng.random(60)
@@ -346,7 +336,7 @@ def test_intervals_of_paired_differences_hold() -> None:
     assert 0.93 < np.mean(held) <= 1
 
 
-def test_differences_are_paired() -> None:
+def test_differences_are_paired_and_failed_runs_count_either_way() -> None:
     before = np.arange(100) < 40
     better = difference(before & (np.arange(100) >= 20), before)
     assert better.value == pytest.approx(-0.2)
@@ -354,9 +344,6 @@ def test_differences_are_paired() -> None:
     back = difference(before, before & (np.arange(100) >= 20))
     assert (back.value, back.low, back.high) == pytest.approx((0.2, -better.high, -better.low))
     assert difference(before, before).value == 0
-
-
-def test_runs_that_fail_count_either_way() -> None:
     flags, done = np.arange(100) < 10, np.arange(100) < 90
     assert share(flags, done).probability == pytest.approx(10 / 90)
     assert share(flags, done).low == share(flags, np.ones(100, bool)).low
@@ -379,22 +366,18 @@ def test_the_isolator_and_bandwidth_stop_what_swings(comparison: Comparison) -> 
 
 def test_an_integrator_that_starts_anew_does_not_stay(built: Stage, comparison: Comparison) -> None:
     """Without its integral the stage breaks away again, so slowly that only the longer run shows it: which is not run
-    where too few machines are in position before."""
-    reset = comparison.results[4]
-    assert reset.swinging.probability < comparison.results[0].swinging.probability
+    where too few machines are in position before.
+
+    Options share their machines: one that changes nothing comes out the same, to the last digit.
+    """
+    base, reset = comparison.results[0], comparison.results[4]
+    assert reset.swinging.probability < base.swinging.probability
     assert not reset.rests
     assert reset.settled.probability < 0.5
     assert not reset.later.done.size
-    work = study._Work(comparison.machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
+    work = work_of(built, comparison.machines)
     later = work.longer(reset.option)
     assert share(later.stays, later.done).high < 0.9
-
-
-def test_options_share_their_machines(built: Stage, comparison: Comparison) -> None:
-    """The first machines come out the same, to the last digit, on their own and among others; and so does an option
-    that changes nothing."""
-    work = study._Work(comparison.machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
-    base = comparison.results[0]
     again = work.runs(replace(base.option, kind=OPTIONS["feedforward"]), 0)
     assert np.array_equal(again.in_position, base.measures.in_position)
     assert np.array_equal(again.force, base.measures.force)
@@ -403,22 +386,16 @@ def test_options_share_their_machines(built: Stage, comparison: Comparison) -> N
 
 def test_hardly_any_friction_never_swings(built: Stage) -> None:
     ideal = {"friction.static": "1 mN +/- 1e-6 %", "friction.coulomb": "1 mN +/- 1e-6 %"}
-    machines = draw_machines(built.replace(ideal), Correlations(), 20, 1)
-    work = study._Work(machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
+    machines = drawn(built.replace(ideal))
     for name, variant in (("as-is", "locked"), ("isolator", "free")):
-        runs = work.runs(Option(OPTIONS[name], machines.stage.variants()[variant]), 0)
+        runs = work_of(built, machines).runs(Option(OPTIONS[name], machines.stage.variants()[variant]), 0)
         assert runs.done.all()
         assert not runs.swings.any()
         assert np.isfinite(runs.settling).all()
 
 
 def test_a_run_that_fails_does_not_swing(comparison: Comparison) -> None:
-    base = comparison.results[0]
-    part = measures.MachineMeasures(
-        **{name: np.array(getattr(base.measures, name)) for name in measures.MachineMeasures.__dataclass_fields__}
-        | {"outcome": np.full(COUNT, "failed"), "settling": np.full(COUNT, np.nan)}
-    )
-    result = replace(base, measures=part)
+    result = with_measures(comparison.results[0], outcome="failed", settling=np.nan)
     assert (result.failed, result.swinging.low, result.swinging.high) == (COUNT, 0, 1)
     assert np.isnan(result.swinging.probability)
     assert not result.rests
@@ -487,51 +464,38 @@ def test_how_many_machines_miss_the_far_end_is_told(made_up: Comparison) -> None
 
     Such machines do not settle in time.
     """
-
-    def words(time: float) -> str:
-        base = made_up.results[0]
-        result = replace(base, measures=replace(base.measures, settling=np.full(COUNT, time)))
-        return " ".join(sentences(replace(made_up, results=(result,))))
-
-    on_time, too_late = words(2.0), words(np.inf)
-    assert "far end" not in on_time
-    assert "At the far end, before the reference returns, 0 % with the machine as is (a)" in too_late
-    assert "to come to rest in the end" in too_late
+    for time, missed in ((2.0, False), (np.inf, True)):
+        result = with_measures(made_up.results[0], settling=time)
+        said = " ".join(sentences(replace(made_up, results=(result,))))
+        assert ("At the far end, before the reference returns, 0 %" in said) == missed
+        assert ("to come to rest in the end" in said) == missed
 
 
 def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
-    settled = [
-        replace(result, measures=replace(result.measures, settling=np.ones(COUNT))) for result in made_up.results
-    ]
-    quiet = replace(made_up, results=tuple(settled))
-    shaken = _shaken(quiet)
-    assert "nm RMS" not in " ".join(sentences(quiet))
-    assert "[floor]" in sentences(quiet)[-1]
-    assert "1.00 nm RMS" in " ".join(sentences(shaken))
-    assert "[floor]" not in " ".join(sentences(shaken))
-    assert [paired_rows(entry)[0][1][4] for entry in (quiet, shaken)] == ["no [floor]", "0.5 (0.5 to 0.5)"]
-    for item, compared in ((quiet, False), (shaken, True)):
-        expected, text = compare_document(item), Page(str(compare_files(item)["compare.html"])).text
-        ratio = expected["options"]["c"]["against_a"]["in_position_rms"]
-        assert (expected["standstill_compared"], ratio is not None) == (compared, compared)
-        assert any("no [floor]" in note for note in expected["notes"]) is not compared
+    quiet = replace(made_up, results=tuple(with_measures(result, settling=1.0) for result in made_up.results))
+    for item, ratio, compared in ((quiet, "no [floor]", False), (_shaken(quiet), "0.5 (0.5 to 0.5)", True)):
+        said = sentences(item)
+        assert ("1.00 nm RMS" in " ".join(said)) == compared
+        assert ("[floor]" in said[-1]) != compared
+        assert paired_rows(item)[0][1][4] == ratio
+        document, text = compare_document(item), Page(str(compare_files(item)["compare.html"])).text
+        rms = document["options"]["c"]["against_a"]["in_position_rms"]
+        assert (document["standstill_compared"], rms is not None) == (compared, compared)
+        assert any("no [floor]" in note for note in document["notes"]) is not compared
         assert ("no [floor]" in text) is not compared
-        wording(compare_figures(item)[0].caption)
 
 
 def test_machines_that_rest_where_they_begin_are_drawn(made_up: Comparison) -> None:
     """The RMS error of such a machine is 0, which a logarithmic axis cannot show: matplotlib warned."""
-    still = [
-        replace(result, measures=replace(result.measures, in_position=np.zeros(COUNT))) for result in made_up.results
-    ]
-    drawn = compare_figures(replace(made_up, results=tuple(still)))[0]
+    still = replace(made_up, results=tuple(with_measures(result, in_position=0.0) for result in made_up.results))
+    (drawn,) = compare_figures(still)
     assert image(drawn, "png")  # warnings are errors here
     assert [figure.panels[-1].y.log for figure in (drawn, *compare_figures(made_up))] == [False, True]
 
 
-def test_the_cable_is_said_to_be_left_out(built: Stage) -> None:
-    assert any("cable" in note for note in study._missing(built))
-    assert not any("cable" in note for note in study._missing(built.replace({"cable": None})))
+@pytest.mark.parametrize(("changed", "said"), [({}, True), ({"cable": None}, False)])
+def test_the_cable_is_said_to_be_left_out(built: Stage, changed: dict[str, None], said: bool) -> None:
+    assert any("cable" in note for note in study._missing(built.replace(changed))) == said
 
 
 def settled_by_hand(comparison: Comparison) -> Comparison:
@@ -539,14 +503,15 @@ def settled_by_hand(comparison: Comparison) -> Comparison:
     settles does so at another time after one other bit, so that processors differ in the quantiles of few machines."""
     results = []
     for place, result in enumerate(comparison.results, 1):
-        measures = result.measures
-        spread = {
-            name: np.where(np.isfinite(values), place * np.geomspace(0.9 * unit, 1.1 * unit, len(values)), values)
-            for name, unit in {"settling": 0.3, "in_position": 1e-9, "force": 5.0}.items()
-            for values in [getattr(measures, name)]
-        }
-        results.append(replace(result, measures=replace(measures, **spread)))
+        spread = {}
+        for name, unit in {"settling": 0.3, "in_position": 1e-9, "force": 5.0}.items():
+            values = getattr(result.measures, name)
+            spread[name] = np.where(np.isfinite(values), place * np.geomspace(0.9 * unit, 1.1 * unit, COUNT), values)
+        results.append(with_measures(result, **spread))
     return replace(comparison, results=tuple(results))
+
+
+WRITTEN = {MARKER, *(f"compare.{ending}" for ending in ("html", "pdf", "png", "svg"))}
 
 
 def test_command_writes_page_and_figures(
@@ -560,68 +525,56 @@ def test_command_writes_page_and_figures(
     for option in document["options"].values():
         assert option["swings"]["low"] <= option["swings"]["probability"] <= option["swings"]["high"]
     assert document["options"]["d"]["settling_time_s"]["high"] is None
-    assert {item.name for item in (tmp_path / "out").iterdir()} == {
-        MARKER, "compare.html", "compare.pdf", "compare.png", "compare.svg",
-    }  # fmt: skip
+    assert {item.name for item in (tmp_path / "out").iterdir()} == WRITTEN
     page = Page((tmp_path / "out" / "compare.html").read_text(encoding="utf-8"))
     assert [tag for tag in page.tags if tag in ("table", "figure")] == ["table", "figure", "table", "table"]
     snapshots.check("compare", "page", page.lines)
     snapshots.check("compare", "run", friso_inside(tmp_path, "compare", EXAMPLE, "--details").stdout)
 
 
-def test_interrupted_it_leaves_nothing(tmp_path: Path, comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
-    def stop(*arguments: object) -> None:
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(study, "compare", stop)
-        assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
-    monkeypatch.setattr(study, "compare", lambda *inputs: comparison)
-    monkeypatch.setattr("friso.shown.drawing.matplotlib_renderer.image", stop)
-    assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
-    assert not [*tmp_path.iterdir()]
-
-
-@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("times", [0, 1, 2])
 def test_ctrl_c_while_figures_are_drawn_waits_for_the_files(
     tmp_path: Path, comparison: Comparison, monkeypatch: pytest.MonkeyPatch, times: int
 ) -> None:
-    """Minutes of work are not lost for the seconds of a drawing; a second Ctrl-C does not wait."""
+    """Minutes of work are not lost for the seconds of a drawing; a second Ctrl-C does not wait.
+
+    Interrupted before, it leaves nothing.
+    """
     real, signals = matplotlib_renderer.image, iter([signal.SIGINT] * times)
+
+    def compared(*arguments: object) -> Comparison:
+        if not times:
+            raise KeyboardInterrupt
+        return comparison
 
     def drawn(*arguments: Any, **options: Any) -> Any:
         if number := next(signals, None):
             signal.raise_signal(number)
         return real(*arguments, **options)
 
-    monkeypatch.setattr(study, "compare", lambda *inputs: comparison)
+    monkeypatch.setattr(study, "compare", compared)
     monkeypatch.setattr(matplotlib_renderer, "image", drawn)
     assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
-    names = {item.name for item in tmp_path.rglob("*.*")}
-    assert names == ({MARKER, "compare.html", "compare.pdf", "compare.png", "compare.svg"} if times == 1 else set())
+    assert {item.name for item in tmp_path.rglob("*.*")} == (WRITTEN if times == 1 else set())
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("option", "value"),
     [
-        ["--machines", 19],
-        ["--seed", -1],
-        ["--within", "0 um"],
-        ["--within", 1],
-        ["--set", 'motion={kind="ramp", velocity="1 mm/s", duration="2 s"}'],
-        ["--set", 'motion.duration="8 s"'],
-        ["--set", 'drive.sample_time="20 ms"'],
+        ("--machines", 19),
+        ("--seed", -1),
+        ("--within", "0 um"),
+        ("--within", 1),
+        ("--set", 'motion={kind="ramp", velocity="1 mm/s", duration="2 s"}'),
+        ("--set", 'motion.duration="8 s"'),
+        ("--set", 'drive.sample_time="20 ms"'),
+        ("--also", "leek"),
     ],
 )
-def test_bad_input(tmp_path: Path, arguments: list[object]) -> None:
-    done = friso_inside(tmp_path, "compare", EXAMPLE, *arguments)
+def test_bad_input(tmp_path: Path, option: str, value: object) -> None:
+    done = friso_inside(tmp_path, "compare", EXAMPLE, option, value)
     assert (done.returncode, done.stdout) == (2, "")
-    refused.says(done.stderr)
-
-
-def test_no_controller_no_comparison(built: Stage) -> None:
-    with refused("controller"):
-        built.replace({"controller": {"kind": "pid"}})
+    assert rows_of(done.stderr)
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -634,12 +587,7 @@ def test_a_setting_against_friction_is_one_that_the_stage_can_have(name: str) ->
     assert {key: chosen.flat()[key] for key in numbers} == pytest.approx(numbers)
     assert structure(chosen.flat()) != structure(stage.flat())
     assert OPTIONS[name].says == setting.says
-
-
-def test_settings_that_are_asked_for_are_tried() -> None:
-    assert [OPTIONS[name].letter for name in SETTINGS] == list("hijklm")
-    with pytest.raises(InputError, match="--also leak"):
-        settings_named(("leek",))
+    assert OPTIONS[name].letter == "hijklm"[[*SETTINGS].index(name)]
 
 
 def test_a_limit_of_the_bandwidth_holds_for_faster_controllers(machines: Machines) -> None:
@@ -657,8 +605,7 @@ def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
     """If more machines rest at each higher bandwidth, it is the first from which enough do."""
     needed = NeededBandwidth(np.array([10.0, 12.0, 14.0, 16.0]), np.array([0.5, 1.0, 0.9, 1.0]), 2.0 ** np.arange(4))
     assert (needed.turning(0.99), needed.turning(0.4), needed.turning(1.1)) == (3, 0, None)
-    never = replace(comparison.results[0].measures, settling=np.full(COUNT, np.inf))
-    base = replace(comparison.results[0], measures=never)
+    base = with_measures(comparison.results[0], settling=np.inf)
     hunting = replace(comparison, results=(base,))
     (line,) = _turning(replace(hunting, needed=needed))
     assert "from a bandwidth of 16.0 Hz on" in line
