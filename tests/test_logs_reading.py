@@ -520,8 +520,8 @@ def test_friction_is_no_delay(tmp_path: Path) -> None:
     force = M["force"] + 80 * M["velocity"] + 5 * np.sign(M["velocity"])
     assert not is_among(log_of(tmp_path, NAMES, changed(3, force)).warnings, "come after")
     late = log_of(tmp_path, NAMES, changed(3, np.r_[np.zeros(4), force[:-4]]))
-    (told_delay,) = (line for line in late.warnings if "come after" in line)
-    start, _, rest = told_delay.partition(" by ")
+    (delayed,) = (line for line in late.warnings if "come after" in line)
+    start, _, rest = delayed.partition(" by ")
     assert "force" in start
     assert float(rest.split()[0]) == pytest.approx(4, abs=0.1)
 
