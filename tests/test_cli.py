@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import xarray as xr
 from inside import friso_inside
-from refusals import refused
+from refusals import rows_of
 
 import friso
 from friso.cli.app import _failed
@@ -45,31 +45,43 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return seconds
 
 
-def test_the_time_to_go_of_other_work_counts_from_its_beginning(clock: list[float]) -> None:
-    bar, times = ProgressBar(), []
-    reports = ((100, 10), (190, 40), (220, 91), (230, 0), (240, 50), (250, 20), (260, 30))
-    for clock[0], done in reports:
-        bar(done, 100, "work")
-        times.append(bar.line().rpartition(", ")[2])
-    assert times == ["work", "3 min to go", "13 s to go", "work", "10 s to go", "work", "70 s to go"]
-
-
-def test_no_time_to_go_is_told_without_a_basis_for_it(clock: list[float]) -> None:
-    """Before a twentieth of the work is done, or a hundred steps of it, the rest may take any time."""
-    bar, times = ProgressBar("first"), []
-    reports = (
-        (60, 0, 0),
-        (120, 1, 800),
-        (240, 30, 800),
-        (246, 41, 800),
-        (300, 41, 9000),
-        (310, 99, 9000),
-        (320, 200, 9000),
-    )
+@pytest.mark.parametrize(
+    ("reports", "times"),
+    [
+        (
+            (
+                (100, 10, 100),
+                (190, 40, 100),
+                (220, 91, 100),
+                (230, 0, 100),
+                (240, 50, 100),
+                (250, 20, 100),
+                (260, 30, 100),
+            ),
+            ["work", "3 min to go", "13 s to go", "work", "10 s to go", "work", "70 s to go"],
+        ),
+        (
+            (
+                (60, 0, 0),
+                (120, 1, 800),
+                (240, 30, 800),
+                (246, 41, 800),
+                (300, 41, 9000),
+                (310, 99, 9000),
+                (320, 200, 9000),
+            ),
+            ["work", "work", "work", "40 min to go", "work", "work", "18 min to go"],
+        ),
+    ],
+)
+def test_the_time_to_go(clock: list[float], reports: list[tuple[int, ...]], times: list[str]) -> None:
+    """That of other work counts from its beginning; before a twentieth of the work is done, or a hundred steps of it,
+    the rest may take any time."""
+    bar, shown = ProgressBar("first"), []
     for clock[0], done, total in reports:
         bar(done, total, "work")
-        times.append(bar.line().rpartition(", ")[2])
-    assert times == ["work", "work", "work", "40 min to go", "work", "work", "18 min to go"]
+        shown.append(bar.line().rpartition(", ")[2])
+    assert shown == times
 
 
 def test_the_time_to_go_leaves_out_compiling(clock: list[float]) -> None:
@@ -107,26 +119,18 @@ def _until_told(capsys: pytest.CaptureFixture[str], line: str) -> None:
     raise AssertionError(printed)
 
 
-def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]) -> None:
-    document = checked
-    assert document["stage"] == "Thesis rig"
-    locked = document["cases"]["locked"]
+def test_check_json(checked: dict[str, Any]) -> None:
+    """The condition of passivity that is not met: thesis, Table 2: sigma_2 is far below sigma_1 (F_s - F_c)/F_c = 316.2
+    (3 - 1)/1 N*s/m."""
+    assert checked["stage"] == "Thesis rig"
+    assert checked["cases"]["given"] == checked["cases"]["free"]
+    assert "632.5 N*s/m" in (checked["friction_passive_where"] or "")
+    locked, free = (copy.deepcopy(checked["cases"][case]) for case in ("locked", "free"))
     agreed = {"verdict", "peaks", "peak_to_peak_m", "period_s", "settling_time_s", "cycle", "solver"}
     expected = {"cycles", "reason", "settled_after_s", "margin", "kick", "moves", "observed", "loop_unstable_while_it"}
     assert agreed | expected <= locked.keys()
     assert locked["solver"].keys() == {"status", "steps", "rejected", "rtol"}
     assert (locked["verdict"], locked["peaks"], locked["cycles"], locked["reason"]) == ("hunts", 6, 1, None)
-    assert document["cases"]["given"] == document["cases"]["free"]
-
-
-def test_check_json_has_the_condition_that_a_law_which_gives_energy_back_does_not_meet(checked: dict[str, Any]) -> None:
-    """Thesis, Table 2: sigma_2 is far below sigma_1 (F_s - F_c)/F_c = 316.2 (3 - 1)/1 N*s/m."""
-    assert "632.5 N*s/m" in (checked["friction_passive_where"] or "")
-
-
-def test_check_json_has_the_cycle_and_what_starts_it(checked: dict[str, Any]) -> None:
-    cases = copy.deepcopy(checked["cases"])
-    locked, free = cases["locked"], cases["free"]
     cycle = locked["cycle"]
     assert (cycle["symmetric"], cycle["attracts"], locked["observed"]) == (True, True, False)
     expected = {"amplitude_m": 0.520e-3, "period_s": 1.6277, "multiplier": -0.9312, "growth": -0.9312, "slope": -0.9312}
@@ -141,7 +145,7 @@ def test_check_json_has_the_cycle_and_what_starts_it(checked: dict[str, Any]) ->
     assert locked["kick"]["velocity_m_per_s"][0][0] == pytest.approx(0.0231, rel=0.02)
     assert locked["moves"] == {"drawn": 128, "hunting": pytest.approx(111, abs=2)}
     assert (free["cycle"], free["cycles"], free["kick"], free["moves"]) == (None, 0, None, None)
-    assert free["reason"] == "from every distance the stage swings back less far than it started"
+    assert "swings back less far" in free["reason"]
     assert free["settled_after_s"] == free["settling_time_10um_s"]
 
 
@@ -183,13 +187,15 @@ def test_simulate_writes_what_python_returns(tmp_path: Path) -> None:
 
 
 def test_init_writes_a_stage_that_checks_and_overwrites_nothing(tmp_path: Path) -> None:
-    assert run("init", "stage.toml", cwd=tmp_path).returncode == 0
-    before = (tmp_path / "stage.toml").read_text()
+    made = run("init", "my stage.toml", cwd=tmp_path)
+    assert made.returncode == 0
+    assert 'then: friso check "my stage.toml"' in made.stdout
+    before = (tmp_path / "my stage.toml").read_text()
     friso.loads(before)
-    again = run("init", "stage.toml", cwd=tmp_path)
+    again = run("init", "my stage.toml", cwd=tmp_path)
     assert again.returncode == 2
     assert "nothing was overwritten" in again.stderr
-    assert (tmp_path / "stage.toml").read_text() == before
+    assert (tmp_path / "my stage.toml").read_text() == before
 
 
 def test_version() -> None:
@@ -199,49 +205,40 @@ def test_version() -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("arguments", "key"),
     [
-        ["check", "nowhere.toml"],
-        ["check", ROOT / "examples"],
-        ["check"],
-        ["chek", RIG],
-        ["check", RIG, "--rtol", "0"],
-        ["check", RIG, "--rtol", "fine"],
-        ["check", RIG, "--set", "controller.crosover=8 Hz"],
-        ["check", RIG, "--set", "controller.crossover"],
-        ["check", RIG, "--set", "bias.cart=8"],
-        ["check", RIG, "--out", RIG],
-        ["simulate"],
-        ["simulate", "--json"],
-        ["simulate", RIG, "--sample-time", "1"],
-        ["simulate", RIG, "--sample-time", "100 s"],
-        ["simulate", RIG, "--sample-time", "1 mm"],
-        ["tune", RIG, "--only", "jont"],
+        (["check", "nowhere.toml"], "nowhere.toml"),
+        (["check", ROOT / "examples"], "examples"),
+        (["check", RIG, "--rtol", "0"], "--rtol"),
+        (["check", RIG, "--rtol", "fine"], "--rtol"),
+        (["check", RIG, "--set", "controller.crosover=8 Hz"], "controller.crosover"),
+        (["check", RIG, "--set", "controller.crossover"], "--set"),
+        (["check", RIG, "--set", "bias.cart=8"], "bias.cart"),
+        (["check", RIG, "--out", RIG], "--out"),
+        (["simulate", RIG, "--sample-time", "1"], "--sample-time"),
+        (["simulate", RIG, "--sample-time", "100 s"], "--sample-time"),
+        (["simulate", RIG, "--sample-time", "1 mm"], "--sample-time"),
+        (["tune", RIG, "--only", "jont"], "--only"),
+        (["reproduce", "--points", "x"], "--points"),
+        (["compare", RIG, "--machines=1e3"], "--machines"),
+        (["map", RIG, "--verify", "some"], "--verify"),
+        (["check", RIG, "--draws", " "], "--draws"),
+        (["app", "--port", "70000"], "--port"),
     ],
 )
-def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, tmp_path: Path) -> None:
+def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, key: str, tmp_path: Path) -> None:
     done = run(*arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    refused.says(done.stderr)
-    assert not done.stdout
+    assert (done.returncode, done.stdout) == (2, "")
+    assert key in done.stderr.splitlines()[0]
+    assert rows_of(done.stderr)
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("arguments", "lines"),
-    [
-        (["reproduce", "--points", "x"], ["--points", '"x"', "a whole number", "--points 41"]),
-        (["compare", RIG, "--machines=1e3"], ["--machines", '"1e3"', "a whole number", "--machines 2000"]),
-        (["map", RIG, "--verify", "some"], ["--verify", '"some"', "a number", "--verify 0.05"]),
-        (["check", RIG, "--draws", " "], ["--draws", '" "', "a whole number", "--draws 4"]),
-        (["app", "--port", "70000"], ["--port", '"70000"', "a whole number from 0 to 65535", "--port 65535"]),
-    ],
-)
-def test_a_number_that_is_none_is_refused_as_all_else_is(arguments: list, lines: list[str]) -> None:
-    done = run(*arguments)
-    assert done.returncode == 2
-    heads = ("friso: ", "  given:    ", "  expected: ", "  example:  ")
-    assert done.stderr.splitlines() == [head + line for head, line in zip(heads, lines, strict=True)]
+def test_commands_that_lack_something_or_are_none() -> None:
+    for arguments, words in ((["check"], "STAGE"), (["chek", RIG], "chek"), (["simulate", "--json"], "STAGE")):
+        done = run(*arguments)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert words in done.stderr
 
 
 def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
@@ -261,22 +258,19 @@ def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
     assert document["cases"]["given"]["peak_to_peak_m"] is None
 
 
-def test_what_comes_next_can_be_copied(tmp_path: Path) -> None:
-    assert 'then: friso check "my stage.toml"' in run("init", "my stage.toml", cwd=tmp_path).stdout
-
-
-def test_a_failed_rename_names_its_target(capsys: pytest.CaptureFixture[str]) -> None:
-    assert _failed(PermissionError(13, "Permission denied", "draft", None, "page.html")) == 1
-    assert capsys.readouterr().err.rstrip().endswith("Permission denied: page.html")
-
-
 @pytest.mark.parametrize(
-    "error",
-    [ImportError("DLL load failed while importing _multiarray"), OSError("Could not find/load 'libllvmlite.so'")],
+    ("error", "words"),
+    [
+        (PermissionError(13, "Permission denied", "draft", None, "page.html"), "Permission denied: page.html"),
+        (ImportError("DLL load failed while importing _multiarray"), LIBRARIES),
+        (OSError("Could not find/load 'libllvmlite.so'"), LIBRARIES),
+    ],
 )
-def test_a_library_that_cannot_be_loaded_names_the_remedy(error: Exception, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_failure_names_the_target_or_the_remedy(
+    error: Exception, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert _failed(error) == 1
-    assert LIBRARIES in " ".join(capsys.readouterr().err.split())
+    assert words in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize("module", [["-m", "friso"], ["-mfriso.__main__"], ["-W", "ignore", "-Bum", "friso"]])
@@ -289,11 +283,9 @@ def test_as_a_module_friso_imports_nothing_from_the_current_folder(tmp_path: Pat
     assert not (tmp_path / "run").exists()
 
 
-def test_a_path_with_blanks_that_lacks_its_quotes_is_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", ["check", "logs"])
+def test_a_path_with_blanks_that_lacks_its_quotes_is_told(tmp_path: Path, command: str) -> None:
     (tmp_path / "my rig.toml").write_text("")
-    done = friso_inside(tmp_path, "check", "my", "rig.toml")
-    assert done.returncode == 2
-    assert "needs quotes: 'my rig.toml'" in done.stderr.replace('"', "'")
-    done = friso_inside(tmp_path, "logs", "my", "rig.toml")  # each of them a file that is not there
+    done = friso_inside(tmp_path, command, "my", "rig.toml")
     assert done.returncode == 2
     assert "needs quotes: 'my rig.toml'" in done.stderr.replace('"', "'")
