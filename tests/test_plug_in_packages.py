@@ -58,12 +58,31 @@ def package(folder: Path, name: str, **points: str | Points) -> None:
     (info / "entry_points.txt").write_text("\n".join(lines))
 
 
-def friso_command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def python(folder: Path, code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     paths = os.pathsep.join([str(TESTS.parent), str(folder)])
     return subprocess.run(
-        [sys.executable, "-c", "from friso.cli import main; main()", *arguments],
+        [sys.executable, "-c", code, *arguments],
         cwd=folder, capture_output=True, text=True, timeout=600, env={**os.environ, "PYTHONPATH": paths},
     )  # fmt: skip
+
+
+def friso_command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return python(folder, "from friso.cli import main; main()", *arguments)
+
+
+def answered(folder: Path, *arguments: str) -> str:
+    """What a command prints that answers."""
+    done = friso_command(folder, *arguments)
+    assert done.returncode == 0, done.stderr
+    return " ".join(done.stdout.split())
+
+
+def asked_in_vain(folder: Path, *arguments: str) -> str:
+    """What a command says that cannot answer."""
+    done = friso_command(folder, *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+    return done.stderr
 
 
 @pytest.fixture
@@ -98,35 +117,28 @@ def test_a_metric_of_a_package_is_mapped(tmp_path: Path) -> None:
     assert "Use of the force" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
-def test_help_names_them(installed: Path) -> None:
-    done = friso_command(installed, "--help")
-    assert done.returncode == 0, done.stderr
-    assert "controller pi-d (own_controller)" in " ".join(done.stdout.split())
-    assert "friction law air (air_film)" in " ".join(done.stdout.split())
-
-
-def test_a_stage_file_uses_one_and_page_and_document_name_it(installed: Path) -> None:
-    done = friso_command(installed, "bode", "stage.toml", "--json", "--out", "out")
-    assert done.returncode == 0, done.stderr
-    document = json.loads(done.stdout)
+def test_a_controller_and_a_law_are_used_and_named(installed: Path) -> None:
+    """Processes that compile or compute cells import neither before they receive a stage with it."""
+    listed = answered(installed, "--help")
+    assert "controller pi-d (own_controller)" in listed
+    assert "friction law air (air_film)" in listed
+    document = json.loads(answered(installed, "bode", "stage.toml", "--json", "--out", "out"))
     (page,) = (Path(file) for file in document["files"] if file.endswith(".html"))
     assert "controller pi-d (own_controller)" in (installed / page).read_text(encoding="utf-8")
     assert "controller pi-d (own_controller)" in document["plug_ins"]
-
-
-def test_processes_that_compile_and_that_compute_cells_know_one(installed: Path) -> None:
-    """Neither process imports the package before it receives a stage with the package's controller."""
     bandwidths = "controller.bandwidth=8 Hz, 9 Hz"
-    done = friso_command(installed, "map", "stage.toml", "--x", bandwidths, "--workers", "2", "--out", "m", "--json")
-    assert done.returncode == 0, done.stderr
-    outcomes = json.loads(done.stdout)["outcomes"]
+    cells = answered(installed, "map", "stage.toml", "--x", bandwidths, "--workers", "2", "--out", "m", "--json")
+    outcomes = json.loads(cells)["outcomes"]
     assert sum(outcomes.values()) == 2
     assert not outcomes.get("failed")
 
 
-@pytest.mark.parametrize(("name", "module"), [("lugre", "taken"), ("air", "missing"), ("air", "leaves")])
-def test_a_taken_name_or_a_missing_module_is_one_message(name: str, module: str, tmp_path: Path) -> None:
-    """The rest is there all the same."""
+@pytest.mark.parametrize(
+    ("name", "module", "why"),
+    [("lugre", "taken", '"lugre"'), ("air", "missing", "cannot be imported"), ("air", "leaves", "cannot be imported")],
+)
+def test_a_law_that_is_of_no_use_is_one_message(name: str, module: str, why: str, tmp_path: Path) -> None:
+    """The rest is there all the same; a stage file that names it is told why it is not."""
     (tmp_path / "taken.py").write_text(LAW.replace("{name}", name))
     (tmp_path / "leaves.py").write_text("raise SystemExit(0)")
     package(tmp_path, "other", friction=module)
@@ -134,7 +146,12 @@ def test_a_taken_name_or_a_missing_module_is_one_message(name: str, module: str,
     assert done.returncode == 0
     assert "  check " in done.stdout
     assert f"friso: friso.friction: {module}" in left_out(done)
-    assert ('"lugre"' if module == "taken" else "cannot be imported") in left_out(done)
+    assert why in left_out(done)
+    if module == "missing":
+        (tmp_path / "stage.toml").write_text(f'{STAGE}\n[friction]\nmodel = "air"\n')
+        said = asked_in_vain(tmp_path, "check", "stage.toml")
+        assert "missing, which cannot be imported" in said
+        assert "friction.model" in said
 
 
 def left_out(done: subprocess.CompletedProcess[str]) -> str:
@@ -142,15 +159,6 @@ def left_out(done: subprocess.CompletedProcess[str]) -> str:
     assert done.stderr.count("\n") == 1, done.stderr
     assert "is left out" in done.stderr
     return done.stderr
-
-
-def test_a_law_that_cannot_be_imported_is_told_where_a_stage_file_names_it(tmp_path: Path) -> None:
-    package(tmp_path, "other", friction="missing")
-    (tmp_path / "stage.toml").write_text(f'{STAGE}\n[friction]\nmodel = "air"\n')
-    done = friso_command(tmp_path, "check", "stage.toml")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "missing, which cannot be imported" in done.stderr
-    assert "friction.model" in done.stderr
 
 
 @pytest.fixture(scope="module")
@@ -166,29 +174,18 @@ def resting(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_command_of_a_package_is_listed_and_has_its_help(resting: Path) -> None:
+def test_a_command_and_a_function_of_a_package_are_listed_and_answer(resting: Path) -> None:
     listed = friso_command(resting, "--help")
     assert (listed.returncode, listed.stderr) == (0, "")
-    names = [
-        line.split()[0] for line in listed.stdout.partition("Why does it hunt?")[2].splitlines() if line[2:3].strip()
-    ]
+    rows = listed.stdout.partition("Why does it hunt?")[2].splitlines()
+    names = [line.split()[0] for line in rows if line[2:3].strip()]
     assert names.index("convert") < names.index("resting") < names.index("reproduce")
-    done = friso_command(resting, "resting", "--help")
-    assert done.returncode == 0, done.stderr
-    assert "Example: friso resting rig.toml" in done.stdout
-
-
-def test_a_command_of_a_package_answers_with_its_page_and_document(resting: Path) -> None:
-    rig = str(TESTS.parent / "examples" / "thesis_rig.toml")
-    done = friso_command(resting, "resting", rig, "--set", "friction.static=6 N", "--json", "--out", "out")
-    assert done.returncode == 0, done.stderr
-    document = json.loads(done.stdout)
+    assert "Example: friso resting rig.toml" in answered(resting, "resting", "--help")
+    changed = ("resting", example("thesis_rig"), "--set", "friction.static=6 N")
+    document = json.loads(answered(resting, *map(str, changed), "--json", "--out", "out"))
     assert document["distance_m"] == pytest.approx(6 / (1.7 * (2 * math.pi * 8) ** 2 / 10**0.5))
     page = (resting / "out" / "resting.html").read_text(encoding="utf-8")
     assert "From another package: Friction may hold" in page
-
-
-def test_a_function_of_a_package_stands_beside_those_of_friso(resting: Path) -> None:
     code = "import friso; answer = friso.resting(friso.example('thesis_rig')); print(answer, 'resting' in dir(friso))"
     done = python(resting, code)
     assert done.stdout.startswith("Friction may hold the stage up to"), done.stderr
@@ -196,21 +193,9 @@ def test_a_function_of_a_package_stands_beside_those_of_friso(resting: Path) -> 
 
 
 def test_an_experiment_of_a_package_is_listed_and_runs_with_its_view(resting: Path) -> None:
-    listed = friso_command(resting, "rig", "--help")
-    assert "at-rest Nothing moves, and the force is the seed" in " ".join(listed.stdout.split())
-    drive = str(TESTS.parent / "examples" / "thesis_drive.toml")
-    done = friso_command(resting, "rig", "at-rest", drive, "--out", "rig")
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("It rests.")
+    assert "at-rest Nothing moves, and the force is the seed" in answered(resting, "rig", "--help")
+    assert answered(resting, "rig", "at-rest", str(example("thesis_drive")), "--out", "rig").startswith("It rests.")
     assert (resting / "rig" / "rested.csv").exists()
-
-
-def python(folder: Path, code: str) -> subprocess.CompletedProcess[str]:
-    paths = os.pathsep.join([str(TESTS.parent), str(folder)])
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder, capture_output=True, text=True, timeout=600, env={**os.environ, "PYTHONPATH": paths},
-    )  # fmt: skip
 
 
 QUESTION = "from friso.interface.question import WHY, Question\nQUESTION = Question(__name__, {declared})"
@@ -230,7 +215,6 @@ def unread(stage: Nowhere) -> None:
         ("empty", "empty", "whose QUESTION is missing"),
         ("wrong", "wrong", "whose QUESTION is int"),
         ("leaves", "leaves", "cannot be imported"),
-        ("broken", "broken", "cannot be imported: invalid syntax"),
         ("early", "early", "place 'early' is not a number"),
         ("lost", "lost", "topic 'Why?' is none of"),
         ("alone", "alone", "a module that can be read"),
@@ -240,7 +224,7 @@ def unread(stage: Nowhere) -> None:
 def test_a_question_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
     name: str, module: str, why: str, tmp_path: Path
 ) -> None:
-    texts = {"empty": "", "wrong": "QUESTION = 1", "leaves": "raise SystemExit(0)", "broken": "def"}
+    texts = {"empty": "", "wrong": "QUESTION = 1", "leaves": "raise SystemExit(0)"}
     declared = {"early": "'early', WHY, ''", "lost": "1, 'Why?', ''", "alone": "1, WHY, ''"}
     texts |= {file: QUESTION.format(declared=text) for file, text in declared.items()}
     for file, text in texts.items():
@@ -252,17 +236,9 @@ def test_a_question_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
     assert "  check " in listed.stdout
     assert f"friso: friso.questions: {name} is left out: {module}" in left_out(listed)
     assert why in left_out(listed)
-    done = friso_command(tmp_path, "init", "stage.toml")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert friso_command(tmp_path, "check", "--help").returncode == 0
-    rig = friso_command(tmp_path, "rig", "--help")
-    assert rig.returncode == 0
-    assert "stiffness" in rig.stdout
+    assert "stiffness" in answered(tmp_path, "rig", "--help")
     if name not in ("check", "reproduce"):
-        asked = friso_command(tmp_path, name)
-        assert (asked.returncode, asked.stdout) == (2, "")
-        assert "Traceback" not in asked.stderr
-        assert f"friso.questions: {name}" in asked.stderr
+        assert f"friso.questions: {name}" in asked_in_vain(tmp_path, name)
 
 
 def write_question(folder: Path, declared: str, module: str) -> None:
@@ -272,23 +248,17 @@ def write_question(folder: Path, declared: str, module: str) -> None:
     (folder / "question.py").write_text(module)
 
 
-def test_a_question_whose_options_cannot_be_read_is_told_when_it_is_asked(tmp_path: Path) -> None:
+def test_a_question_that_cannot_be_read_is_told_when_it_is_asked(tmp_path: Path) -> None:
+    """Its options cannot, or it lacks its decorator."""
     write_question(tmp_path / "unread", "1, WHY, 'unread rig.toml'", FUNCTION)
-    package(tmp_path, "other", questions={"unread": "unread"})
-    assert "unread" in friso_command(tmp_path, "--help").stdout
-    asked = friso_command(tmp_path, "unread", "rig.toml")
-    assert (asked.returncode, asked.stdout) == (2, "")
-    assert "unread.question, which cannot be imported: name 'Nowhere' is not defined" in asked.stderr
-
-
-def test_a_question_without_its_decorator_or_a_description_is_told_when_it_is_asked(tmp_path: Path) -> None:
-    for name, text in {"plain": "def plain(stage: 'StageLike', size: 'int' = 1) -> None:\n    'Be plain.'\n"}.items():
-        write_question(tmp_path / name, "1, WHY, 'plain rig.toml'", text)
-    package(tmp_path, "other", questions={"plain": "plain"})
-    asked = friso_command(tmp_path, "plain", "rig.toml")
-    assert (asked.returncode, asked.stdout) == (2, "")
-    assert "friso.questions: plain" in asked.stderr
-    assert "a function with @question" in asked.stderr
+    plain = "def plain(stage: 'StageLike', size: 'int' = 1) -> None:\n    'Be plain.'\n"
+    write_question(tmp_path / "plain", "1, WHY, 'plain rig.toml'", plain)
+    package(tmp_path, "other", questions={"unread": "unread", "plain": "plain"})
+    said = asked_in_vain(tmp_path, "unread", "rig.toml")
+    assert "unread.question, which cannot be imported: name 'Nowhere' is not defined" in said
+    said = asked_in_vain(tmp_path, "plain", "rig.toml")
+    assert "friso.questions: plain" in said
+    assert "a function with @question" in said
 
 
 def test_a_function_that_is_of_no_use_is_refused_and_leaves_the_others(tmp_path: Path) -> None:
