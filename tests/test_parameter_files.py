@@ -43,33 +43,29 @@ MACHINE = {
 }
 ROTARY = {"masses.stage": "0.02 kg*m^2", "friction.model": "none"}
 
+TORQUE = {**MACHINE, "force_per_output": "20 N"}
+VELOCITY = {**MACHINE, "controller.kp": "900 N*s/m", "drive.sample_time": "125 us"}
+SCREW = {**MACHINE, "travel_per_turn": "5 mm"}
+HELD = {**SCREW, "motion.kind": "hold", "motion.duration": "1 s"}
+"""What a file does not state, of axes in torque mode and in velocity mode, and of ODrives with a screw."""
+
 GAINS = {"P": 4.0, "I": 80.0, "D": 0.06, "FF1": 0.001, "FF2": 4e-4, "DEADBAND": 0.002, "MAX_OUTPUT": 10.0}
 
-ODRIVE = {
-    "axis0": {
-        "motor": {
-            "config": {
-                "torque_constant": 0.04,
-                "current_lim": 20.0,
-                "torque_lim": float("inf"),
-                "current_control_bandwidth": 1000.0,
-            }
-        },
-        "encoder": {"config": {"cpr": 8192, "bandwidth": 1000.0}},
-        "controller": {
-            "config": {
-                "control_mode": 3,
-                "input_mode": 5,
-                "pos_gain": 20.0,
-                "vel_gain": 0.16,
-                "vel_integrator_gain": 0.32,
-                "vel_integrator_limit": 0.5,
-                "inertia": 1e-4,
-                "vel_limit": 10.0,
-            }
-        },
-        "trap_traj": {"config": {"vel_limit": 2.0, "accel_limit": 20.0, "decel_limit": 20.0}},
-    }
+CONTROL = {
+    "control_mode": 3,
+    "input_mode": 5,
+    "pos_gain": 20.0,
+    "vel_gain": 0.16,
+    "vel_integrator_gain": 0.32,
+    "vel_integrator_limit": 0.5,
+    "inertia": 1e-4,
+    "vel_limit": 10.0,
+}
+MOTOR = {
+    "torque_constant": 0.04,
+    "current_lim": 20.0,
+    "torque_lim": float("inf"),
+    "current_control_bandwidth": 1000.0,
 }
 
 
@@ -85,17 +81,29 @@ def ini(folder: Path, gains: dict[str, Any], unit: str = "mm", joint: str = "TYP
 
 def backup(folder: Path, **changes: Any) -> Path:
     """An ODrive configuration; changes are of controller.config."""
-    document = json.loads(json.dumps(ODRIVE))
-    document["axis0"]["controller"]["config"].update(changes)
+    parts = {
+        "motor": MOTOR,
+        "encoder": {"cpr": 8192, "bandwidth": 1000.0},
+        "controller": {**CONTROL, **changes},
+        "trap_traj": {"vel_limit": 2.0, "accel_limit": 20.0, "decel_limit": 20.0},
+    }
     path = folder / "odrive.json"
-    path.write_text(json.dumps(document))
+    path.write_text(json.dumps({"axis0": {name: {"config": part} for name, part in parts.items()}}))
     return path
 
 
 def test_the_example_is_an_axis_in_torque_mode(tmp_path: Path) -> None:
+    """All that is not in the file is asked for at once, and nothing is written until it is answered."""
+    command = ("init", "axis.toml", "--from", AXIS)
+    unanswered = friso_inside(tmp_path, *command)
+    assert unanswered.returncode == 2
+    asked = re.findall(r"^ +--set ([a-z_.]+)=", unanswered.stderr, re.MULTILINE)
+    assert asked[0] == "force_per_output"
+    assert {*asked[1:]} == {*MACHINE}
+    assert not list(tmp_path.iterdir())
     options = [part for key, value in MACHINE.items() for part in ("--set", f"{key}={value}")]
-    labels = ["--set", "force_per_output=60 N", *options]
-    done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *labels)
+    command = (*command, "--set", "force_per_output=60 N", *options)
+    done = friso_inside(tmp_path, *command)
     assert done.returncode == 0
     (left_out,) = done.stderr.splitlines()
     assert "error-previous-target" in left_out
@@ -104,35 +112,8 @@ def test_the_example_is_an_axis_in_torque_mode(tmp_path: Path) -> None:
     assert flat["controller.error_deadband"] == pytest.approx(0.5e-6)
     assert flat["drive.sample_time"] == pytest.approx(0.5e-3)
     assert flat["motion.acceleration"] == pytest.approx(2.0)
-    again = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *labels)
+    again = friso_inside(tmp_path, *command)
     assert (again.returncode, "nothing was overwritten" in again.stderr) == (2, True)
-
-
-def test_the_stage_file_says_that_its_mass_holds_the_rotor_which_no_parameter_file_states(tmp_path: Path) -> None:
-    """A user gave the mass of the load alone; the rotor of a screw axis may be the larger part."""
-    for unit, joint, force, answers in (
-        ("mm", "TYPE = LINEAR", "20 N", MACHINE),
-        ("deg", "TYPE = ANGULAR", "3 N*m", ROTARY),
-    ):
-        path = ini(tmp_path, GAINS, unit, joint)
-        with pytest.raises(InputError) as refused:
-            stage_from(path, None, {"force_per_output": force})
-        text = stage_from(path, None, {"force_per_output": force, **answers}).text()
-        (asked,) = (line for line in str(refused.value).splitlines() if "masses.stage" in line)
-        (marked,) = (line for line in text.splitlines() if line.startswith("# [masses]"))
-        for line in (asked, marked):
-            assert "rotor" in line
-            assert ("inertia of load" in line) == (unit == "deg")
-        assert "not in the drive's file" in marked
-
-
-def test_all_that_is_not_in_the_file_is_asked_for_at_once(tmp_path: Path) -> None:
-    done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS)
-    assert done.returncode == 2
-    asked = re.findall(r"^ +--set ([a-z_.]+)=", done.stderr, re.MULTILINE)
-    assert asked == ["force_per_output", *(key for key in asked[1:] if key in MACHINE)]
-    assert {*asked[1:]} == {*MACHINE}
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -144,22 +125,30 @@ def test_all_that_is_not_in_the_file_is_asked_for_at_once(tmp_path: Path) -> Non
     ],
 )
 def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force: str, answers: dict[str, Any]) -> None:
-    more = {"force_per_output": force}
-    drawn = stage_from(ini(tmp_path, {**GAINS, "MAX_ERROR_I": 0.01}, unit, joint), None, {**answers, **more})
-    back = gains_of(friso.loads(drawn.text()), {**more, "machine_unit": unit}, "linuxcnc").parameters
+    """The mass that is asked for holds the rotor, which may be the larger part and which no parameter file states."""
+    more, path = {"force_per_output": force}, ini(tmp_path, {**GAINS, "MAX_ERROR_I": 0.01}, unit, joint)
+    text = stage_from(path, None, {**answers, **more}).text()
+    back = gains_of(friso.loads(text), {**more, "machine_unit": unit}, "linuxcnc").parameters
     assert back is not None
     assert {name: back[name] for name in GAINS} == pytest.approx(GAINS)
     assert back["MAX_ERROR_I"] == pytest.approx(0.01)
+    with pytest.raises(InputError) as refused:
+        stage_from(path, None, more)
+    (asked,) = (line for line in str(refused.value).splitlines() if "masses.stage" in line)
+    (marked,) = (line for line in text.splitlines() if line.startswith("# [masses]"))
+    for line in (asked, marked):
+        assert "rotor" in line
+        assert ("inertia of load" in line) == (unit == "deg")
+    assert "not in the drive's file" in marked
 
 
 def test_a_variable_that_stands_twice_counts_once_and_is_named(tmp_path: Path) -> None:
     """The first value counts, as in LinuxCNC. Comments may be in Latin-1."""
     path = ini(tmp_path, {"P": 50, "I": 100})
-    answers = {**MACHINE, "force_per_output": "20 N"}
-    expected = stage_from(path, None, answers)
+    expected = stage_from(path, None, TORQUE)
     twice = "P = 1\nP = 2\n" + path.read_text().replace("[JOINT_0]", "# für die Achse, in µm\n[JOINT_0]")
     path.write_bytes(f"{twice}\nP = 60\nI = 100\n".encode("latin-1"))
-    stage = stage_from(path, None, answers)
+    stage = stage_from(path, None, TORQUE)
     assert stage.stage.flat() == expected.stage.flat()
     (repeated,) = {*stage.left_out} - {*expected.left_out}
     assert " of P, " in repeated
@@ -184,11 +173,10 @@ def test_files_are_written_in_several_ways(tmp_path: Path, usual: str, written: 
     path = ini(tmp_path, {"P": 50, "I": 100})
     plain = path.read_text()
     assert usual in plain
-    answers = {**MACHINE, "force_per_output": "20 N"}
-    expected = stage_from(path, None, answers)
+    before = stage_from(path, None, TORQUE).stage.flat()
     path.write_text(plain.replace(usual, written))
-    drawn = stage_from(path, None, answers)
-    flat, before = (of.stage.flat() for of in (drawn, expected))
+    drawn = stage_from(path, None, TORQUE)
+    flat = drawn.stage.flat()
     assert flat["controller.kp"] == pytest.approx(before["controller.kp"] / times)
     assert flat["motion.acceleration"] == pytest.approx(before["motion.acceleration"] * times)
     assert flat["drive.sample_time"] == pytest.approx(before["drive.sample_time"])
@@ -201,28 +189,26 @@ def test_what_include_names_is_read_inside_the_folder_alone(tmp_path: Path, name
     folder = tmp_path / "machine"
     (folder / "below").mkdir(parents=True)
     path = ini(folder, {})
-    answers = {**MACHINE, "force_per_output": "20 N"}
-    gains = "P = 70\n#INCLUDE more.inc\n"
     for place in ("joints.inc", "below/joints.inc", "../outside.inc"):
-        (folder / place).write_text(gains)
+        (folder / place).write_text("P = 70\n#INCLUDE more.inc\n")
     (folder / "more.inc").write_text("I = 5\n")
     (folder / "beside.inc").symlink_to(tmp_path / "outside.inc")
     path.write_text(f"{path.read_text()}#INCLUDE {name}\n")
     if not name.endswith("joints.inc"):
         with pytest.raises(InputError, match=re.escape(name)):
-            stage_from(path, None, answers)
+            stage_from(path, None, TORQUE)
         return
-    drawn = stage_from(path, None, answers)
+    drawn = stage_from(path, None, TORQUE)
     assert drawn.stage.flat()["controller.kp"] == pytest.approx(70 * 20 / 1e-3)
     assert drawn.stage.flat()["controller.ki"] == 0
     assert not any("INCLUDE" in sentence for sentence in drawn.left_out)
 
 
 def test_units_that_contradict_each_other_are_asked_for(tmp_path: Path) -> None:
-    path, answers = ini(tmp_path, {"P": 50}, joint="UNITS = inch"), {**MACHINE, "force_per_output": "20 N"}
+    path = ini(tmp_path, {"P": 50}, joint="UNITS = inch")
     with pytest.raises(InputError, match="machine_unit"):
-        stage_from(path, None, answers)
-    flat = stage_from(path, None, {**answers, "machine_unit": "inch"}).stage.flat()
+        stage_from(path, None, TORQUE)
+    flat = stage_from(path, None, {**TORQUE, "machine_unit": "inch"}).stage.flat()
     assert flat["controller.kp"] == pytest.approx(50 * 20 / 0.0254)
 
 
@@ -231,29 +217,19 @@ def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
 
     An axis with a step generator and an encoder is a servo axis as well.
     """
-    gains = {"P": 50.0, "I": 10.0, "FF1": 1.0, "DEADBAND": 0.001, "BIAS": 0.5}
-    gains |= {"STEPGEN_MAXVEL": 104.17, "ENCODER_SCALE": 4000.0, "HOME_OFFSET": 2.0}
-    gains |= {"OUTPUT_SCALE": 250.0, "BACKLASH": 0.01, "FF9": 3.0, "DEDBAND": 0.1}
-    loop = {"controller.kp": "900 N*s/m", "controller.velocity_integral_time": "8 ms"}
-    with pytest.raises(InputError, match=r"drive\.sample_time"):  # the drive's own, which no INI file has
-        stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop})
-    drawn = stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop, "drive.sample_time": "125 us"})
+    gains = {"P": 50.0, "I": 10.0, "FF1": 1.0, "DEADBAND": 0.001}
+    others = {"BIAS": 0.5, "STEPGEN_MAXVEL": 104.17, "ENCODER_SCALE": 4000.0, "HOME_OFFSET": 2.0}
+    others |= {"OUTPUT_SCALE": 250.0, "BACKLASH": 0.01, "FF9": 3.0, "DEDBAND": 0.1}
+    loop = {"controller.velocity_integral_time": "8 ms"}
+    drawn = stage_from(ini(tmp_path, gains | others), None, {**VELOCITY, **loop})
     times = [drawn.stage.flat()[f"drive.{name}"] for name in ("sample_time", "position_sample_time")]
     assert times == pytest.approx([125e-6, 1e-3])
-    for beginning in (
-        "BIAS = 0.5",
-        "BACKLASH = 0.01",
-        "OUTPUT_SCALE = 250",
-        "FF9, DEDBAND: ",
-        "the scale of the output",
-    ):
-        assert sum(sentence.startswith(beginning) for sentence in drawn.left_out) == 1
+    for start in ("BIAS = 0.5", "BACKLASH = 0.01", "OUTPUT_SCALE = 250", "FF9, DEDBAND: ", "the scale of the output"):
+        assert sum(sentence.startswith(start) for sentence in drawn.left_out) == 1
     assert "velocity_per_output" in " ".join(drawn.left_out)
     back = gains_of(drawn.stage, {"machine_unit": "mm", "velocity_per_output": "1 mm/s"}, "linuxcnc").parameters
     assert back is not None
-    assert {name: back[name] for name in ("P", "I", "FF1", "DEADBAND")} == pytest.approx(
-        {name: gains[name] for name in ("P", "I", "FF1", "DEADBAND")}
-    )
+    assert {name: back[name] for name in gains} == pytest.approx(gains)
 
 
 def _asked(path: Path, answers: dict[str, Any]) -> list[str]:
@@ -280,11 +256,9 @@ def test_the_mode_of_an_axis_is_told_before_anything_is_asked(tmp_path: Path) ->
 def test_an_output_in_volts_has_a_scale(tmp_path: Path) -> None:
     """P and FF1 of an output of which 1 makes 5 mm/s; without the scale they are not known."""
     path = ini(tmp_path, {"P": 50.0, "I": 10.0, "FF1": 0.2})
-    labels = {**MACHINE, "controller.kp": "900 N*s/m", "drive.sample_time": "125 us"}
     with pytest.raises(InputError, match="velocity_per_output"):
-        stage_from(path, None, labels)
-    scale = {"velocity_per_output": "5 mm/s"}
-    drawn = stage_from(path, None, {**labels, **scale})
+        stage_from(path, None, VELOCITY)
+    drawn = stage_from(path, None, {**VELOCITY, "velocity_per_output": "5 mm/s"})
     flat = drawn.stage.flat()
     assert flat["controller.kv"] == pytest.approx(250.0)
     assert flat["controller.velocity_feedforward"] == pytest.approx(1.0)
@@ -336,31 +310,26 @@ def test_the_commands_are_those_of_the_component_pid(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("travel", ["5 mm", "360 deg"])
 def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
-    labels = {**(MACHINE if travel == "5 mm" else ROTARY), "travel_per_turn": travel}
+    turn = {"travel_per_turn": travel}
+    labels = {**(MACHINE if travel == "5 mm" else ROTARY), **turn}
     drawn = stage_from(backup(tmp_path), None, labels)
-    config = ODRIVE["axis0"]["controller"]["config"]
-    back = gains_of(friso.loads(drawn.text()), {"travel_per_turn": travel}, "odrive").parameters
+    back = gains_of(friso.loads(drawn.text()), turn, "odrive").parameters
     assert back is not None
     names = ("input_mode", "pos_gain", "vel_gain", "vel_integrator_gain", "inertia", "vel_integrator_limit")
-    assert {name: back[f"controller.config.{name}"] for name in names} == pytest.approx(
-        {name: config[name] for name in names}
-    )
+    assert [back[f"controller.config.{name}"] for name in names] == pytest.approx([CONTROL[name] for name in names])
     assert back["encoder.config.bandwidth"] == back["motor.config.current_control_bandwidth"] == pytest.approx(1000.0)
     lines = tmp_path / "parameters.txt"
-    lines.write_text(
-        f"# kept\n{FORMATS['odrive'].text(back)}odrv0.axis0.controller.config.enable_gain_scheduling = False\n"
-    )
+    scheduling = "odrv0.axis0.controller.config.enable_gain_scheduling = False"
+    lines.write_text(f"# kept\n{FORMATS['odrive'].text(back)}{scheduling}\n")
     again = stage_from(lines, None, {**labels, "motion.kind": "hold", "motion.duration": "1 s"})
     assert not any("gain_scheduling" in sentence for sentence in again.left_out)
-    repeated = gains_of(friso.loads(again.text()), {"travel_per_turn": travel}, "odrive").parameters
-    assert repeated == pytest.approx(back)
+    assert gains_of(friso.loads(again.text()), turn, "odrive").parameters == pytest.approx(back)
     assert back["motor.config.torque_lim"] == pytest.approx(0.04 * 20)
 
 
 def test_an_odrive_exerts_the_force_of_its_torque(tmp_path: Path) -> None:
     """Turns and N m by the firmware's formula, against metres and newtons by the stage's."""
-    labels = {**MACHINE, "travel_per_turn": "5 mm"}
-    key = {k.removeprefix("controller."): v for k, v in stage_from(backup(tmp_path), None, labels).stage.flat().items()}
+    key = {k.removeprefix("controller."): v for k, v in stage_from(backup(tmp_path), None, SCREW).stage.flat().items()}
     error, speed, wound = 3e-5, 0.01, 4e-5  # [m], [m/s], [m] of the velocity's error
     turns = [value / 5e-3 for value in (error, speed, wound)]
     torque = 0.16 * (20.0 * turns[0] - turns[1]) + 0.32 * turns[2]
@@ -403,25 +372,18 @@ def lines(folder: Path, **changes: str) -> Path:
 
 
 def test_a_script_for_an_odrive_says_what_its_arithmetic_and_its_symbols_make(tmp_path: Path) -> None:
-    labels = {**MACHINE, "travel_per_turn": "5 mm", "motion.kind": "hold", "motion.duration": "1 s"}
-    flat = stage_from(lines(tmp_path), None, labels).stage.flat()
+    path = lines(tmp_path)
+    text, flat = path.read_text(), stage_from(path, None, HELD).stage.flat()
     assert flat["controller.force_limit"] == pytest.approx(20 * 8.27 / 170 * 2 * np.pi / 5e-3)
     assert flat["controller.velocity_feedforward"] == 1.0
     assert flat["controller.filters.1.frequency"] == pytest.approx(1000 / (2 * np.pi))
-    path = lines(tmp_path)
-    path.write_text(f"import odrive\nodrv0 = odrive.find_any()\n{path.read_text()}odrv0.save_configuration() # kept\n")
-    assert stage_from(path, None, labels).stage.flat() == flat
-
-
-def test_two_drives_of_a_script_are_two_axes(tmp_path: Path) -> None:
-    path = lines(tmp_path)
-    text = path.read_text()
+    path.write_text(f"import odrive\nodrv0 = odrive.find_any()\n{text}odrv0.save_configuration() # kept\n")
+    assert stage_from(path, None, HELD).stage.flat() == flat
     path.write_text(text + text.replace("odrv0", "odrv1").replace("= 20.0", "= 30.0"))
-    labels = {**MACHINE, "travel_per_turn": "5 mm", "motion.kind": "hold", "motion.duration": "1 s"}
     with pytest.raises(InputError, match=r"one of odrv0\.axis0, odrv1\.axis0"):
-        stage_from(path, None, labels)
-    assert stage_from(path, "odrv0.axis0", labels).stage.flat()["controller.kv"] == 20.0
-    assert stage_from(path, "odrv1.axis0", labels).stage.flat()["controller.kv"] == 30.0
+        stage_from(path, None, HELD)
+    for axis, gain in (("odrv0.axis0", 20.0), ("odrv1.axis0", 30.0)):
+        assert stage_from(path, axis, HELD).stage.flat()["controller.kv"] == gain
 
 
 @pytest.mark.parametrize(
@@ -443,12 +405,11 @@ def test_counts_of_older_firmware_are_told_from_turns(tmp_path: Path, changes: d
 def test_where_nothing_tells_turns_from_counts_it_is_asked(tmp_path: Path) -> None:
     names = ("motor__torque_constant", "motor__current_lim", "controller__input_mode", "controller__control_mode")
     path = lines(tmp_path, **dict.fromkeys(names, ""))
-    labels = {**MACHINE, "travel_per_turn": "5 mm", "motion.kind": "hold", "motion.duration": "1 s"}
-    assert _asked(path, labels) == ["gains_in"]
-    flat = stage_from(path, None, {**labels, "gains_in": "turns"}).stage.flat()
+    assert _asked(path, HELD) == ["gains_in"]
+    flat = stage_from(path, None, {**HELD, "gains_in": "turns"}).stage.flat()
     assert flat["controller.kv"] == 20.0
     with pytest.raises(InputError, match="counts"):
-        stage_from(path, None, {**labels, "gains_in": "counts"})
+        stage_from(path, None, {**HELD, "gains_in": "counts"})
 
 
 def _tokens(text: str) -> list[tuple[int, int]]:
@@ -484,15 +445,6 @@ def test_a_line_that_sets_nothing_is_quoted(tmp_path: Path, line: str) -> None:
     with pytest.raises(InputError, match="line 9") as refused:
         stage_from(path, None, {})
     assert line in refused.value.actual
-
-
-@pytest.mark.parametrize("line", ["[JOINT_1", "P 50", "TYPE = LINAER"])
-def test_a_line_of_an_ini_file_that_says_nothing_is_quoted(tmp_path: Path, line: str) -> None:
-    path = ini(tmp_path, {"P": 50})
-    path.write_text(path.read_text().replace("TYPE = LINEAR", line))
-    with pytest.raises(InputError) as refused:
-        stage_from(path, None, {})
-    assert (line.partition("= ")[2] or line) in refused.value.actual
 
 
 def test_gains_in_the_units_of_drives() -> None:
@@ -534,28 +486,20 @@ def test_export_writes_page_and_parameters(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("answers", "to", "part"),
+    ("name", "answers", "to", "part"),
     [
-        ({}, "odrive", "travel_per_turn"),
-        ({"travel_per_turn": "3 N"}, None, "travel_per_turn"),
-        ({"travel": "3 mm"}, None, "one of"),
-        ({}, "siemens", "one of"),
+        ("twincat_cascade", {}, "odrive", "travel_per_turn"),
+        ("twincat_cascade", {"travel_per_turn": "3 N"}, None, "travel_per_turn"),
+        ("twincat_cascade", {"travel": "3 mm"}, None, "one of"),
+        ("twincat_cascade", {}, "siemens", "one of"),
+        ("thesis_rig", {"travel_per_turn": "10 mm"}, "odrive", "a cascade, the only structure"),
+        ("ball_screw_axis", {"travel_per_turn": "10 mm"}, "odrive", "a cascade, the only structure"),
+        ("ball_screw_axis", {"travel_per_turn": "5 mm"}, None, "that of the transmission"),
     ],
 )
-def test_what_export_cannot_do(answers: dict[str, Any], to: str | None, part: str) -> None:
+def test_what_export_cannot_do(name: str, answers: dict[str, Any], to: str | None, part: str) -> None:
     with pytest.raises(InputError, match=part):
-        gains_of(friso.load(EXAMPLES / "twincat_cascade.toml"), answers, to)
-
-
-@pytest.mark.parametrize("name", ["thesis_rig", "ball_screw_axis"])
-def test_a_controller_that_a_drive_does_not_have(name: str) -> None:
-    with pytest.raises(InputError, match="a cascade, the only structure"):
-        gains_of(friso.load(EXAMPLES / f"{name}.toml"), {"travel_per_turn": "10 mm"}, "odrive")
-
-
-def test_a_travel_other_than_that_of_the_screw_is_refused() -> None:
-    with pytest.raises(InputError, match="that of the transmission"):
-        gains_of(friso.load(EXAMPLES / "ball_screw_axis.toml"), {"travel_per_turn": "5 mm"}, None)
+        gains_of(friso.load(EXAMPLES / f"{name}.toml"), answers, to)
 
 
 @pytest.mark.parametrize("to", [*FORMATS])
@@ -568,6 +512,13 @@ def test_a_controller_of_one_s_own_is_none_of_a_drive(to: str) -> None:
         gains_of(stage, {question.key: question.example.strip('"') for question in asked}, to)
 
 
+def axes_of_odrives(count: int) -> str:
+    """A configuration of so many axes of old firmware."""
+    gains = {"pos_gain": 1, "vel_integrator_gain": 1}
+    return json.dumps({f"axis{k}": {"controller.config": gains} for k in range(count)})
+
+
+LONG_KEYS = {"x" * 10_000: dict.fromkeys(map(str, range(99_000)), 0)}
 BAD: dict[str, tuple[str | bytes, str]] = {
     "empty": ("", "a file of another kind"),
     "binary": (bytes(range(256)), "is not UTF-8"),
@@ -579,24 +530,16 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "not a number": ("[JOINT_0]\nP = nan\n", "a number of at most"),
     "two axes": ("[JOINT_0]\nP = 50\n[JOINT_1]\nP = 50\n", "--axis JOINT_0"),
     "negative": ("[JOINT_0]\nP = -50\n", "a gain of 0 or more"),
+    "no section": ("[JOINT_0]\nP = 50\n[JOINT_1\n", r"\[JOINT_1"),
+    "no equals sign": ("[JOINT_0]\nP 50\n", "P 50"),
+    "no type": ("[JOINT_0]\nTYPE = LINAER\nP = 50\n", "LINAER"),
     "broken json": ('{"axis0": {"vel_integrator_gain": ', "not JSON"),
     "nested": ('{"axis0": "vel_integrator_gain", "x": ' + "[" * 100_000, "nested too deeply|not JSON"),
     "empty lines": ("\n" * 1_000_000, "a file of another kind|an empty file"),
-    "long keys": (
-        json.dumps({"axis0": {"vel_integrator_gain": {"x" * 10_000: dict.fromkeys(map(str, range(99_000)), 0)}}}),
-        "a key of 10",
-    ),
+    "long keys": (json.dumps({"axis0": {"vel_integrator_gain": LONG_KEYS}}), "a key of 10"),
     "digits": (f"[JOINT_0]\nP = {100_000 * '1'}x\n", "a number"),
-    "countless axes": (
-        json.dumps(
-            {f"axis{k}": {"controller.config": {"pos_gain": 1, "vel_integrator_gain": 1}} for k in range(20_000)}
-        ),
-        "0.5.1 to 0.5.6",
-    ),
-    "old firmware": (
-        '{"axis0": {"controller": {"config": {"pos_gain": 1, "vel_gain": 1, "vel_integrator_gain": 1}}}}',
-        "0.5.1 to 0.5.6",
-    ),
+    "countless axes": (axes_of_odrives(20_000), "0.5.1 to 0.5.6"),
+    "old firmware": (axes_of_odrives(1), "0.5.1 to 0.5.6"),
 }
 
 
@@ -630,18 +573,20 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
 )
 def test_an_odrive_that_controls_no_position(tmp_path: Path, changes: dict[str, Any], part: str) -> None:
     with pytest.raises(InputError, match=part):
-        stage_from(backup(tmp_path, **changes), None, {**MACHINE, "travel_per_turn": "5 mm"})
+        stage_from(backup(tmp_path, **changes), None, SCREW)
 
 
 def test_what_is_left_out_is_told(tmp_path: Path) -> None:
-    path = backup(tmp_path, enable_gain_scheduling=True, gain_scheduling_width=0.01, input_mode=1)
+    more = {"gain_scheduling_width": 0.01, "gain_scheduling_min_ratio": 0.2, "load_encoder_axis": 1}
+    path = backup(tmp_path, enable_gain_scheduling=True, input_mode=1, **more)
     path.write_text(path.read_text().replace('"decel_limit": 20.0', '"decel_limit": 5.0'))
-    drawn = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"})
-    for setting in ("enable_gain_scheduling", "decel_limit = 5"):
+    drawn = stage_from(path, None, SCREW)
+    settings = ("enable_gain_scheduling", "decel_limit = 5", "gain_scheduling_min_ratio", "load_encoder_axis = 1")
+    for setting in settings:
         assert any(setting in text for text in drawn.left_out)
     assert all(f"# Left out: {text}" in drawn.text() for text in drawn.left_out)
     assert drawn.stage.flat()["controller.velocity_feedforward"] == 0.0
-    mirrored = stage_from(backup(tmp_path, input_mode=7), None, {**MACHINE, "travel_per_turn": "5 mm"})
+    mirrored = stage_from(backup(tmp_path, input_mode=7), None, SCREW)
     assert any("input_mode = 7" in text for text in mirrored.left_out)
 
 
@@ -659,23 +604,11 @@ def test_an_odrive_feeds_forward_along_its_own_trajectories(share: float, mode: 
     assert {key for key in back.not_held if "feedforward" in key} == {f"controller.{name}_feedforward" for name in lost}
 
 
-def test_what_these_firmwares_do_not_have_is_told(tmp_path: Path) -> None:
-    path = backup(tmp_path, gain_scheduling_min_ratio=0.2, load_encoder_axis=1)
-    left_out = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"}).left_out
-    assert any(text.startswith("gain_scheduling_min_ratio") for text in left_out)
-    assert any(text.startswith("load_encoder_axis = 1") for text in left_out)
-
-
 def test_what_is_left_out_is_as_many_lines_as_friso_says(tmp_path: Path) -> None:
     strange = {f"x{k}\nfriso: all is well": 1 for k in range(2000)}
-    path = backup(tmp_path, load_encoder_axis=10**29, **strange)
-    left_out = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"}).left_out
+    left_out = stage_from(backup(tmp_path, load_encoder_axis=10**29, **strange), None, SCREW).left_out
     assert len(left_out) < 10
     assert all(len(text) < 2000 and "\n" not in text for text in left_out)
-
-
-def test_formats_are_listed() -> None:
-    assert [*FORMATS] == ["linuxcnc", "odrive"]
 
 
 @pytest.mark.parametrize("name", ["transfer_function", "sections", "state_space", "sampled_transfer_function"])
