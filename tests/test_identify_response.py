@@ -9,7 +9,8 @@ from refusals import refused
 from scipy import signal
 from scipy.linalg import expm
 
-from friso.errors import InputError
+import friso
+from friso.frequency.analysis import linear
 from friso.identification.estimate import Estimate
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
@@ -26,7 +27,6 @@ from friso.identification.response.records import ResponseRecord, drift, from_lo
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import ResponseSettings
 from friso.identification.response.two_mass import fit_two_mass, two_masses, widened
-from friso.stage import loads
 
 DT, PERIOD = 2e-3, 1000  # period of 2 s: lines at 0.5, 1, ... Hz
 TRUE = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 1e-3, 0.0, 0.0, 0.0])
@@ -85,32 +85,15 @@ def test_exact_period_and_whole_periods_from_the_end(before: int, after: int) ->
     assert periods.stop - periods.start == periods.count * 997
 
 
-def test_a_period_given_roughly_is_corrected_and_that_is_said() -> None:
-    rng = np.random.default_rng(2)
-    record = played(rng, rig, np.arange(1, 40))
-    assert find_periods(record.input, 1004.0).samples == PERIOD
-    wording(find_periods(record.input, 1004.0).warnings[0])
-    assert find_periods(record.input, 1000.0).warnings == ()
-
-
-def test_noise_on_the_input_does_not_move_the_period() -> None:
+def test_a_period_is_corrected_and_noise_on_the_input_does_not_move_it() -> None:
     rng = np.random.default_rng(3)
     record = played(rng, rig, np.arange(1, 40))
+    corrected = find_periods(record.input, 1004.0)
+    assert corrected.samples == PERIOD
+    assert "every 1000 samples, not every 1004" in corrected.warnings[0]
+    assert find_periods(record.input, 1000.0).warnings == ()
     periods = find_periods(record.input + 0.1 * np.std(record.input) * rng.normal(size=len(record.input)))
     assert (periods.samples, periods.count) == (PERIOD, 6)
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_record_that_is_constant_before_a_step_does_not_repeat() -> None:
-    with pytest.raises(InputError, match="constant"):
-        find_periods(np.repeat([0.0, 5.0], 2000))
-
-
-def test_what_does_not_repeat_is_refused() -> None:
-    with refused("period"):
-        find_periods(np.random.default_rng(4).normal(size=4000))
-    with refused("period"):
-        find_periods(np.ones(400))
 
 
 def test_drift_leaves_harmonics_alone_and_takes_ramps_away() -> None:
@@ -123,17 +106,22 @@ def test_drift_leaves_harmonics_alone_and_takes_ramps_away() -> None:
 # Periodic excitation
 
 
+def share_inside(response: FrequencyResponse, truth: Response = rig) -> float:
+    """The share of lines on which the band holds the truth."""
+    band, size = response.band(), np.abs(truth(response.frequency))
+    return float(np.mean((band.magnitude_low <= size) & (size <= band.magnitude_high)))
+
+
 def test_deviations_hold_the_truth_on_95_percent_of_lines() -> None:
     rng, lines = np.random.default_rng(5), np.arange(2, 60)
-    inside = {"noise": [], "both": []}
+    inside: list[tuple[float, float]] = []
     for _ in range(40):
         one = multisine([played(rng, rig, lines, 8, noise=0.05)])
         three = multisine([played(rng, rig, lines, 6, noise=0.02, distortion=0.05) for _ in range(3)])
-        for name, result in (("noise", one), ("both", three)):
-            band, truth = result.band(), np.abs(rig(result.frequency))
-            inside[name].append(np.mean((band.magnitude_low <= truth) & (truth <= band.magnitude_high)))
-    assert np.mean(inside["noise"]) == pytest.approx(0.95, abs=0.02)
-    assert np.mean(inside["both"]) == pytest.approx(0.95, abs=0.03)
+        inside.append((share_inside(one), share_inside(three)))
+    of_noise, of_both = np.mean(inside, axis=0)
+    assert of_noise == pytest.approx(0.95, abs=0.02)
+    assert of_both == pytest.approx(0.95, abs=0.03)
 
 
 def test_noise_and_distortion_are_told_apart() -> None:
@@ -150,11 +138,16 @@ def test_one_realisation_says_that_distortion_is_unknown_unless_lines_are_free()
     rng = np.random.default_rng(7)
     full = multisine([played(rng, rig, np.arange(2, 60), noise=0.01)])
     assert np.isnan(full.distortion).all()
-    wording(full.warnings[-1])
+    assert "noise, not nonlinear distortion" in full.warnings[-1]
     odd = played(rng, rig, np.arange(1, 60, 2), noise=1e-6)
     bent = ResponseRecord(odd.input, odd.output + 0.2 * odd.output**2 / np.std(odd.output), DT)
     assert np.isfinite(multisine([bent]).distortion).all()
     assert np.median(multisine([bent]).distortion) > 100 * np.median(multisine([odd]).distortion)
+
+
+def off(response: FrequencyResponse, truth: Response = rig) -> float:
+    """The largest relative error of a response."""
+    return float(np.abs(response.response / truth(response.frequency) - 1).max())
 
 
 def test_a_transient_is_left_out_and_a_drift_does_not_matter() -> None:
@@ -164,19 +157,39 @@ def test_a_transient_is_left_out_and_a_drift_does_not_matter() -> None:
     start = 3 * np.std(record.output) * np.exp(-time / 0.5) * np.cos(60 * time)
     result = multisine([ResponseRecord(record.input, record.output + start + 1e-3 * time, DT)])
     assert any("transient" in text for text in result.warnings)
-    assert np.abs(result.response / rig(result.frequency) - 1).max() < 0.05
+    assert off(result) < 0.05
     assert not any("transient" in text for text in multisine([record]).warnings)
 
 
-def test_realisations_that_do_not_belong_together_are_refused() -> None:
-    rng = np.random.default_rng(9)
-    one = played(rng, rig, np.arange(2, 60))
-    with refused("records"):
-        multisine([one, ResponseRecord(one.input, one.output, 2 * DT)])
-    with refused("records"):
-        multisine([one, played(rng, rig, np.arange(80, 99))])
-    with refused("records"):
-        multisine([])
+ONE = played(np.random.default_rng(9), rig, np.arange(2, 60))
+HOLED = np.where(np.arange(6000) == 7, np.nan, ONE.output)
+LOG = Log("a", np.arange(6000) * DT, DT, {"force": ONE.input}, (slice(0, 6000),), {"force": "V"})
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("call", "key"),
+    [
+        (lambda: find_periods(np.random.default_rng(4).normal(size=4000)), "period"),
+        (lambda: find_periods(np.ones(400)), "period"),
+        (lambda: find_periods(np.repeat([0.0, 5.0], 2000)), "period"),
+        (lambda: multisine([ONE, ResponseRecord(ONE.input, ONE.output, 2 * DT)]), "records"),
+        (lambda: multisine([ONE, played(np.random.default_rng(10), rig, np.arange(80, 99))]), "records"),
+        (lambda: multisine([]), "records"),
+        (lambda: multisine([ResponseRecord(ONE.input, HOLED, DT)]), "output"),
+        (lambda: multisine([ResponseRecord(ONE.input, np.zeros(6000), DT)]), "output"),
+        (lambda: multisine([ResponseRecord(ONE.input[:-1], ONE.output, DT)]), "record"),
+        (lambda: multisine([ResponseRecord(ONE.input, ONE.output, 0.0)]), "sample_time"),
+        (lambda: multisine([ResponseRecord(ONE.input[:5], ONE.output[:5], DT)]), "input"),
+        (lambda: multisine([ONE]).between(400, 500), "band"),
+        (lambda: relative_error(rig, ONE, (200, 220)), "band"),
+        (lambda: fit_modes(exact(rig, np.arange(3.0, 10.0), 0.02, None)), "band"),
+        (lambda: from_log(LOG, output="velocity"), "velocity"),
+    ],
+)
+def test_bad_records_and_bands_are_refused(call: Callable[[], object], key: str) -> None:
+    with refused(key):
+        call()
 
 
 def test_clocks_that_differ_by_100_ppm_are_accepted_and_named() -> None:
@@ -185,50 +198,35 @@ def test_clocks_that_differ_by_100_ppm_are_accepted_and_named() -> None:
     fast = [records[0], ResponseRecord(records[1].input, records[1].output, DT * (1 + 1e-4))]
     response = multisine(fast)
     assert any("100 ppm" in text for text in response.warnings)
-    assert np.abs(response.response / rig(response.frequency) - 1).max() < 0.02
+    assert off(response) < 0.02
     assert not any("ppm" in text for text in multisine(records).warnings)
+
+
+def resampled(record: ResponseRecord, lines: np.ndarray, phase: np.ndarray) -> list[np.ndarray]:
+    """The signals of a periodic record at other instants, as shares of its period."""
+    spectra = [np.fft.rfft(one[:PERIOD])[lines] for one in (record.input, record.output)]
+    turning = np.exp(2j * np.pi * np.outer(lines, phase))
+    return [2 / PERIOD * np.real(spectrum @ turning) for spectrum in spectra]
 
 
 @pytest.mark.parametrize("faster", [1e-4, 6e-4])
 def test_a_generator_whose_clock_is_not_that_of_the_recorder(faster: float) -> None:
     """A period of 1000.1 or 1000.6 samples, twenty times, beside a record of 1000: their lines are the same."""
-    rng, lines = np.random.default_rng(32), np.arange(2, 60)
-    record = played(rng, rig, lines, 20)
-    instants = np.arange(len(record.input)) / (1 + faster)
-    phases = 2j * np.pi * np.outer(lines, instants / PERIOD)
-    spectra = [np.fft.rfft(signal[:PERIOD])[lines] for signal in (record.input, record.output)]
-    slow = [2 / PERIOD * np.real(spectrum @ np.exp(phases)) for spectrum in spectra]
+    lines = np.arange(2, 60)
+    record = played(np.random.default_rng(32), rig, lines, 20)
+    slow = resampled(record, lines, np.arange(20 * PERIOD) / (1 + faster) / PERIOD)
     slipping = ResponseRecord(slow[0], slow[1], DT)
-    for response in (multisine([slipping]), multisine([record, slipping])):
-        assert np.abs(response.response / rig(response.frequency) - 1).max() < 0.02
+    assert off(multisine([slipping])) < 0.02
+    assert off(multisine([record, slipping])) < 0.02
 
 
 def test_one_period_sampled_at_two_rates() -> None:
     """Two samples more in a period make one more line: those that both have are used."""
     rng, lines = np.random.default_rng(33), np.arange(2, 60)
     record = played(rng, rig, lines, 6)
-    instants = np.arange(6 * (PERIOD + 2)) / (PERIOD + 2)
-    phases = 2j * np.pi * np.outer(lines, instants)
-    spectra = [np.fft.rfft(signal[:PERIOD])[lines] for signal in (record.input, record.output)]
-    signals = [2 / PERIOD * np.real(spectrum @ np.exp(phases)) for spectrum in spectra]
+    signals = resampled(record, lines, np.arange(6 * (PERIOD + 2)) / (PERIOD + 2))
     noisy = [one * (1 + 1e-5 * rng.standard_normal(len(one))) for one in signals]
-    response = multisine([record, ResponseRecord(noisy[0], noisy[1], DT * PERIOD / (PERIOD + 2))])
-    assert np.abs(response.response / rig(response.frequency) - 1).max() < 0.02
-
-
-@pytest.mark.parametrize(
-    "spoilt",
-    [
-        lambda one: ResponseRecord(one.input, np.where(np.arange(6000) == 7, np.nan, one.output), DT),
-        lambda one: ResponseRecord(one.input, np.zeros(6000), DT),
-        lambda one: ResponseRecord(one.input[:-1], one.output, DT),
-        lambda one: ResponseRecord(one.input, one.output, 0.0),
-        lambda one: ResponseRecord(one.input[:5], one.output[:5], DT),
-    ],
-)
-def test_bad_records_are_refused(spoilt: Callable[[ResponseRecord], ResponseRecord]) -> None:
-    with refused():
-        multisine([spoilt(played(np.random.default_rng(10), rig, np.arange(2, 60)))])
+    assert off(multisine([record, ResponseRecord(noisy[0], noisy[1], DT * PERIOD / (PERIOD + 2))])) < 0.02
 
 
 def test_weak_lines_are_left_out_and_nothing_left_is_an_error() -> None:
@@ -236,30 +234,18 @@ def test_weak_lines_are_left_out_and_nothing_left_is_an_error() -> None:
     result = multisine([played(rng, rig, np.arange(2, 200), noise=0.3)])
     strong = result.usable()
     assert 0 < len(strong.frequency) < len(result.frequency)
-    wording(strong.warnings[-1])
-    record = played(rng, rig, np.arange(2, 60))
+    assert "of 198 lines left out, too weakly excited" in strong.warnings[-1]
     with refused("excitation"):
-        multisine([ResponseRecord(record.input, rng.normal(size=6000), DT)]).usable(ratio=10)
-
-
-def test_other_forms_of_a_response() -> None:
-    result = multisine([played(np.random.default_rng(12), rig, np.arange(2, 60), noise=0.01)])
+        multisine([ResponseRecord(ONE.input, rng.normal(size=6000), DT)]).usable(ratio=10)
     assert result.accelerations().response == pytest.approx(-((2 * np.pi * result.frequency) ** 2) * result.response)
     assert result.accelerations().channels.output_unit == "m/s^2"
-    with refused("band"):
-        result.between(400, 500)
 
 
 def test_a_log_becomes_a_record() -> None:
-    one = played(np.random.default_rng(31), rig, np.arange(2, 60))
-    signals = {"force": one.input, "position": one.output}
-    parts = (slice(0, 100), slice(100, 6000))
-    log = Log("a", np.arange(6000) * DT, DT, signals, parts, {"force": "V"})
-    record, channels = from_log(log)
+    signals, parts = {"force": ONE.input, "position": ONE.output}, (slice(0, 100), slice(100, 6000))
+    record, channels = from_log(replace(LOG, signals=signals, segments=parts))
     assert len(record.input) == 5900
     assert (channels.input_unit, channels.output_unit) == ("V", "m")
-    with refused("velocity"):
-        from_log(log, output="velocity")
 
 
 # Arbitrary excitation
@@ -272,14 +258,11 @@ def filtered(frequency: np.ndarray) -> np.ndarray:
 
 
 def test_arbitrary_excitation_holds_the_truth() -> None:
-    rng = np.random.default_rng(13)
-    inside: list[float] = []
+    rng, inside = np.random.default_rng(13), []
     for _ in range(12):
-        estimate = rng.normal(size=20000)
-        output = signal.lfilter(B, A, estimate) + 0.05 * rng.normal(size=20000)
-        result = local_polynomial(ResponseRecord(estimate, output, DT))
-        band, truth = result.band(), np.abs(filtered(result.frequency))
-        inside.append(np.mean((band.magnitude_low <= truth) & (truth <= band.magnitude_high)))
+        white = rng.normal(size=20000)
+        output = signal.lfilter(B, A, white) + 0.05 * rng.normal(size=20000)
+        inside.append(share_inside(local_polynomial(ResponseRecord(white, output, DT)), filtered))
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
 
@@ -333,16 +316,14 @@ def test_indirect_multisine_holds_the_truth() -> None:
         for _ in range(2):
             once = played(rng, rig, np.arange(2, 100), 1).input
             records.append(looped(rng, 8 * PERIOD, np.tile(once, 8) / np.std(once), noise=0.3))
-        result = multisine(records)
-        band, truth = result.band(), np.abs(loop_plant(result.frequency))
-        inside.append(np.mean((band.magnitude_low <= truth) & (truth <= band.magnitude_high)))
+        inside.append(share_inside(multisine(records), loop_plant))
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
 
 def test_feedback_is_noticed_and_not_imagined() -> None:
     rng = np.random.default_rng(18)
     loop = looped(rng, 8000, rng.normal(size=8000))
-    wording(feedback(ResponseRecord(loop.input, loop.output, DT))[0])
+    assert "predicts 50 % of the innovation" in feedback(ResponseRecord(loop.input, loop.output, DT))[0]
     once = played(rng, rig, np.arange(2, 100), 1).input
     periodic = looped(rng, 8 * PERIOD, np.tile(once, 8) / np.std(once), noise=0.1)
     assert feedback(ResponseRecord(periodic.input, periodic.output, DT))
@@ -356,32 +337,16 @@ def test_feedback_is_noticed_and_not_imagined() -> None:
     assert feedback(played(rng, rig, np.arange(2, 60), noise=0.05)) == ()
 
 
-def amplified(plant: FrequencyResponse, gain: float) -> FrequencyResponse:
-    return replace(plant, response=gain * plant.response, deviation=gain * plant.deviation)
-
-
-def test_crossover_of_the_open_loop() -> None:
-    frequency, rng, held = np.arange(1.0, 100.0, 0.5), np.random.default_rng(19), 0
-    truth = np.sqrt(40.0 / (2 * np.pi) ** 2 / 1.7) * np.sqrt(100)
-    for _ in range(100):
-        plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.02, rng)
-        (result,) = crossovers(amplified(plant, 4000.0))
-        held += result.holds(truth)
-    assert held >= 88
-
-
-def test_a_noisy_open_loop_crosses_once() -> None:
+@pytest.mark.parametrize(("noise", "step"), [(0.02, 0.5), (0.1, 0.25)])
+def test_an_open_loop_crosses_once(noise: float, step: float) -> None:
     """Lines closer than the noise pass 0 dB several times."""
-    frequency, rng = np.arange(1.0, 100.0, 0.25), np.random.default_rng(28)
-    truth, passed, result = np.sqrt(4000.0 / 1.7) / (2 * np.pi), [], []
-    for _ in range(40):
-        plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.1, rng)
-        loop = amplified(plant, 4000.0)
-        passed.append(np.count_nonzero(np.diff(np.abs(loop.response) > 1)))
+    frequency, rng = np.arange(1.0, 100.0, step), np.random.default_rng(28)
+    truth, result = np.sqrt(4000.0 / 1.7) / (2 * np.pi), []
+    for _ in range(60):
+        loop = exact(lambda f: -4000 / (1.7 * (2 * np.pi * f) ** 2), frequency, noise, rng)
         result.append(crossovers(loop))
-    assert np.mean(passed) > 1.5
-    assert [len(entry) for entry in result].count(1) >= 38
-    assert sum(item[0].holds(truth) for item in result) >= 36
+    assert [len(entry) for entry in result].count(1) >= 57
+    assert sum(item[0].holds(truth) for item in result) >= 54
 
 
 # Lines and modes
@@ -442,8 +407,6 @@ def test_the_number_of_modes_is_found_and_said() -> None:
         assert fit[f"resonance {number} damping ratio"].value == pytest.approx(damping, rel=0.2)
     ends = np.array([0.05, 1e6])  # on the mass lines below and above all modes
     assert np.abs(fit.predict(ends)) * (2 * np.pi * ends) ** 2 == pytest.approx([0.6, 1.3], rel=0.02)
-    with refused("band"):
-        fit_modes(exact(three, np.arange(3.0, 10.0), 0.02, None))
 
 
 def test_a_resonance_that_an_antiresonance_nearly_cancels_is_flagged() -> None:
@@ -484,13 +447,11 @@ def test_two_mass_predicts_another_record_and_signs_are_told() -> None:
     first, second = (multisine([played(rng, lambda f, i=i: -rig(f, i), lines, noise=0.01)]) for i in (0, 1))
     fit = fit_two_mass(first, second, (3, 40))
     assert fit.signs == (-1.0, -1.0)
-    wording(fit.warnings[0])
+    assert "its sign was reversed" in fit.warnings[0]
     for collocated, which in ((True, 0), (False, 1)):
         aside = played(rng, lambda f, i=which: -rig(f, i), lines, noise=0.01)
         assert relative_error(lambda f, c=collocated: fit.predict(f, c), aside, (3, 20)) < 0.02
     assert relative_error(lambda f: 0.0 * f, aside, (3, 20)) == pytest.approx(1.0)
-    with refused("band"):
-        relative_error(rig, aside, (200, 220))
 
 
 def sampled_with_hold(parameters: np.ndarray, frequency: np.ndarray, step: float) -> np.ndarray:
@@ -596,15 +557,17 @@ def dragged(frequency: np.ndarray) -> np.ndarray:
 
 def test_departure_from_the_mass_line() -> None:
     rng, frequency = np.random.default_rng(28), np.arange(0.2, 20, 0.2)
-    response = exact(dragged, frequency, 0.05, rng)
-    result = departure(response, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
+
+    def mass_line(f: np.ndarray) -> np.ndarray:
+        return -1 / (1.7 * (2 * np.pi * f) ** 2)
+
+    result = departure(exact(dragged, frequency, 0.05, rng), mass_line)
     assert result.frequency.determined
     assert 1.0 < result.frequency.value < 8.0  # damping is a tenth of the inertia force at 7.5 Hz
     assert result.differ is None
-    straight = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.05, rng)
-    none = departure(straight, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
+    none = departure(exact(mass_line, frequency, 0.05, rng), mass_line)
     assert not none.frequency.determined
-    wording(none.frequency.reason)
+    assert "follows the model down" in none.frequency.reason
 
 
 def test_coulomb_friction_behind_a_departure() -> None:
@@ -636,62 +599,25 @@ def test_sliding_mass_against_its_closed_form() -> None:
     assert abs(end) <= 1.0 / 20.0 + 1e-9  # it sticks where friction holds the spring
 
 
-@pytest.mark.parametrize(("value", "factors"), [(0.0, (1.0,)), (0.1, (0.5, 2.0))])
-def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(("value", "factors", "key"), [(0.0, (1.0,), "friction.coulomb"), (0.1, (0.5, 2.0), "factors")])
+def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...], key: str) -> None:
     estimate = Estimate.normal("x", "N", value, 0.01, "")
     drag = Drag(estimate, estimate, estimate, estimate, 1.0, 1.0, 0.1, ())
-    response = exact(dragged, np.arange(1.0, 30), 0.05, None)
-    with refused():
-        explained(drag, response, [np.ones(100)], DT, (1, 20), factors)
+    with refused(key):
+        explained(drag, exact(dragged, np.arange(1.0, 30), 0.05, None), [np.ones(100)], DT, (1, 20), factors)
 
 
-RIG = """
-[masses]
-cart = "1.2 kg"
-stage = "0.5 kg"
-[friction]
-model = "lugre"
-static = "3 N"
-coulomb = "1 N"
-stribeck_velocity = "1.6 mm/s"
-stribeck_exponent = 2
-bristle_stiffness = "1e5 N/m"
-bristle_damping = "316 N*s/m"
-viscous = "0.5 N*s/m"
-[joint]
-locked = false
-stiffness = "2.4 N/mm"
-damping = "0.5 N*s/m"
-stroke = "1 mm"
-limiter_stiffness = "2e7 N/m"
-limiter_damping = "100 N*s/m"
-[controller]
-kind = "pid"
-crossover = "8 Hz"
-alpha = 0.1
-beta = 2
-[motion]
-kind = "hold"
-duration = "1 s"
-"""
-
-
-@pytest.mark.parametrize("cart", ["stuck", "sliding"])
-def test_limit_cases_are_recognised(cart: str) -> None:
-    from friso.frequency.analysis import linear
-
-    plant = linear(loads(RIG), cart)
+@pytest.mark.parametrize(("cart", "lowest"), [("stuck", 2400 / (1 + 2400 / 1e5)), ("sliding", 1.7)])
+def test_limit_cases_are_recognised(cart: str, lowest: float) -> None:
+    """The first line is the stiffness to ground, or the whole mass; the last one is the mass of the stage alone."""
+    plant = linear(friso.load(friso.example("thesis_rig")).replace({"joint.locked": False, "parasitic": None}), cart)
     row, column = plant.output_labels.index("stage"), plant.input_labels.index("force")
 
     def truth(frequency: np.ndarray) -> np.ndarray:
         return np.asarray(plant(2j * np.pi * frequency, squeeze=False))[row, column]
 
-    response = exact(truth, np.geomspace(1.0, 200, 150), 0.02, np.random.default_rng(30))
-    shown_modes = visible(response)
-    assert shown_modes.case == cart
-    assert shown_modes.words[-1].startswith(f"cart {cart}: ")
-    if cart == "stuck":
-        assert shown_modes.lines[0].value.value == pytest.approx(2400 / (1 + 2400 / 1e5), rel=0.05)
-    else:
-        assert shown_modes.lines[0].value.value == pytest.approx(1.7, rel=0.05)
-    assert shown_modes.lines[-1].value.value == pytest.approx(0.5, rel=0.05)
+    modes = visible(exact(truth, np.geomspace(1.0, 200, 150), 0.02, np.random.default_rng(30)))
+    assert modes.case == cart
+    assert modes.words[-1].startswith(f"cart {cart}: ")
+    assert modes.lines[0].value.value == pytest.approx(lowest, rel=0.05)
+    assert modes.lines[-1].value.value == pytest.approx(0.5, rel=0.05)
