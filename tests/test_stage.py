@@ -41,37 +41,20 @@ def rig() -> Stage:
 
 
 def test_thesis_rig_in_si(rig: Stage) -> None:
-    assert rig.flat() == {
-        "masses.cart": 1.2,
-        "masses.stage": 0.5,
-        "friction.model": "lugre",
-        "friction.static": 3.0,
-        "friction.coulomb": 1.0,
-        "friction.stribeck_velocity": 0.0016,
-        "friction.stribeck_exponent": 2.0,
-        "friction.bristle_stiffness": 1e5,
-        "friction.bristle_damping": 316.2277660168379,
-        "friction.viscous": 0.5,
-        "joint.locked": False,
-        "joint.stiffness": 2400.0,
-        "joint.damping": 0.5,
-        "joint.stroke": 0.001,
-        "joint.limiter_stiffness": 2e7,
-        "joint.limiter_damping": 100.0,
-        "parasitic.frequency": 300.0,
-        "parasitic.mass": 0.25,
-        "parasitic.damping_ratio": 0.01,
-        "controller.kind": "pid",
-        "controller.crossover": 8.0,
-        "controller.alpha": 0.1,
-        "controller.beta": 2.0,
-        "controller.tuned_mass": 1.7,
-        "motion.kind": "there_and_back",
-        "motion.acceleration": 100.0,
-        "motion.acceleration_time": 0.03,
-        "motion.return_at": 5.0,
-        "motion.duration": 20.0,
+    """Plain values of Python."""
+    numbers = {
+        "masses": {"cart": 1.2, "stage": 0.5},
+        "friction": {"static": 3.0, "coulomb": 1.0, "stribeck_velocity": 0.0016, "stribeck_exponent": 2.0}
+        | {"bristle_stiffness": 1e5, "bristle_damping": 316.2277660168379, "viscous": 0.5, "model": "lugre"},
+        "joint": {"stiffness": 2400.0, "damping": 0.5, "stroke": 0.001, "limiter_stiffness": 2e7}
+        | {"limiter_damping": 100.0, "locked": False},
+        "parasitic": {"frequency": 300.0, "mass": 0.25, "damping_ratio": 0.01},
+        "controller": {"kind": "pid", "crossover": 8.0, "alpha": 0.1, "beta": 2.0, "tuned_mass": 1.7},
+        "motion": {"kind": "there_and_back", "acceleration": 100.0, "acceleration_time": 0.03}
+        | {"return_at": 5.0, "duration": 20.0},
     }
+    assert rig.flat() == {f"{table}.{key}": value for table, keys in numbers.items() for key, value in keys.items()}
+    assert {type(value) for value in rig.flat().values()} == {float, bool, str}
 
 
 def test_a_key_set_in_a_table_that_the_stage_has_not_is_named_itself() -> None:
@@ -79,10 +62,6 @@ def test_a_key_set_in_a_table_that_the_stage_has_not_is_named_itself() -> None:
         loads(RIGID).replace({"joint.locked": True})
     assert refused.value.key == "joint.locked"
     assert "joint.limiter_stiffness" in refused.value.expected
-
-
-def test_flat_holds_plain_python_values(rig: Stage) -> None:
-    assert {type(value) for value in rig.flat().values()} == {float, bool, str}
 
 
 def test_defaults_of_a_rigid_mass_without_friction() -> None:
@@ -112,12 +91,9 @@ def test_emps_gains_follow_from_the_recorded_loop() -> None:
 @pytest.mark.parametrize(
     ("text", "unit", "si"),
     [
-        ("2.4 N/mm", "N/m", 2400.0),
         ("2.4N/mm", "N/m", 2400.0),
         ("  2.4   N / mm ", "N/m", 2400.0),
         ("+.5e1 kN/m", "N/m", 5000.0),
-        ("30 ms", "s", 0.03),
-        ("3 um", "m", 3e-6),
         ("3 µm", "m", 3e-6),
         ("3 μm", "m", 3e-6),
         ("0.5 min", "s", 30.0),
@@ -129,10 +105,7 @@ def test_emps_gains_follow_from_the_recorded_loop() -> None:
         ("9.81 m/s**2", "m/s^2", 9.81),
         ("9.81 m s^-2", "m/s^2", 9.81),
         ("9.81 m·s⁻²", "m/s^2", 9.81),
-        ("4 N/(m*s)", "N/(m*s)", 4.0),
         ("4 N/(mm s)", "N/(m*s)", 4000.0),
-        ("5 kg/s", "N*s/m", 5.0),
-        ("8 Hz", "Hz", 8.0),
         ("0.3 kHz", "Hz", 300.0),
         ("50 rad/s", "Hz", 7.957747154594768),
         ("480 rpm", "Hz", 8.0),
@@ -149,7 +122,7 @@ def test_units(text: str, unit: str, si: float) -> None:
 def test_unit_factor_converts_arrays() -> None:
     assert Quantity("m", positive, "1 mm").factor("mm") == 1e-3
     assert Quantity("Hz", positive, "8 Hz").factor("rad/s") == 1 / (2 * math.pi)
-    with refused():
+    with pytest.raises(InputError):
         Quantity("m", positive, "1 mm").factor("kg")
 
 
@@ -220,74 +193,59 @@ def test_save_keeps_permissions_and_links(tmp_path: Path, rig: Stage, mode: int)
     assert (link.is_symlink(), file.stat().st_mode & 0o777) == (True, mode)
 
 
-def test_save_replaces_nothing_that_is_read_only(tmp_path: Path, rig: Stage) -> None:
+def test_save_refuses_what_may_not_be_written(tmp_path: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that is read-only, a folder that is not there, and a device of Windows."""
     file = tmp_path / "rig.toml"
     file.write_text("mine")
     file.chmod(0o400)
     with pytest.raises(InputError, match="read-only"):
         save(rig, file, overwrite=True)
-    assert file.read_text() == "mine"
-
-
-def test_save_into_nowhere(tmp_path: Path, rig: Stage) -> None:
     with refused():
         save(rig, tmp_path / "missing" / "rig.toml")
-
-
-def test_a_device_of_windows_is_no_file(tmp_path: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(paths, "name_refused", lambda path: f"{path.name} is a device")
     with pytest.raises(InputError, match=r"con\.toml is a device"):
         save(rig, tmp_path / "con.toml")
-    assert not [*tmp_path.iterdir()]
+    assert ([*tmp_path.iterdir()], file.read_text()) == ([file], "mine")
 
 
 def test_replace(rig: Stage) -> None:
+    """Values of another stage are taken, keys removed by None, and the form of the controller changed."""
     changed = rig.replace({"controller.crossover": "12 Hz", "joint.locked": True, "name": "Other"})
     assert (changed.flat()["controller.crossover"], changed.flat()["joint.locked"]) == (12.0, True)
     assert changed.name == "Other"
     assert rig.flat()["controller.crossover"] == 8.0
-
-
-def test_replace_removes_with_none(rig: Stage) -> None:
     rigid = rig.replace({"joint": None, "parasitic": None, "friction": None})
     assert rigid.joint is None
     assert rigid.flat()["friction.model"] == "none"
     locked = rig.replace({"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None})
     assert "joint.stiffness" not in locked.flat()
-
-
-def test_replace_changes_the_form_of_the_controller(rig: Stage) -> None:
     rules = dict.fromkeys(["controller.crossover", "controller.alpha", "controller.beta", "controller.tuned_mass"])
-    assert rig.replace({**rules, "controller.kp": "3 N/m"}).flat()["controller.kp"] == 3.0
-    whole = rig.replace({"controller": {"kind": "pid", "kp": "3 N/m"}})
-    assert whole.flat()["controller.kp"] == 3.0
-
-
-def test_replace_takes_values_of_another_stage(rig: Stage) -> None:
-    assert rig.replace({"joint.limiter_stiffness": rig.joint and rig.joint.stiffness}).flat()[
-        "joint.limiter_stiffness"
-    ] == pytest.approx(2400)
+    for gains in ({**rules, "controller.kp": "3 N/m"}, {"controller": {"kind": "pid", "kp": "3 N/m"}}):
+        assert rig.replace(gains).flat()["controller.kp"] == 3.0
+    taken = rig.replace({"joint.limiter_stiffness": rig.joint and rig.joint.stiffness, "joint.stroke": "0 mm"}).flat()
+    assert taken["joint.limiter_stiffness"] == pytest.approx(2400)
+    assert taken["joint.stroke"] == 0.0
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    ("text", "key", "value"),
     [
-        ("controller.crossover=12 Hz", ("controller.crossover", "12 Hz")),
-        ('controller.crossover="12 Hz"', ("controller.crossover", "12 Hz")),
-        (" controller.alpha = 0.2 ", ("controller.alpha", 0.2)),
-        ("joint.locked=true", ("joint.locked", True)),
-        ("joint.locked=True", ("joint.locked", "True")),
-        ("controller.beta=2", ("controller.beta", 2)),
-        ("name=a=b", ("name", "a=b")),
-        ("name=", ("name", "")),
-        ("name=3 # no comment", ("name", "3 # no comment")),
-        ("name=1}\nx={y=2", ("name", "1}\nx={y=2")),
-        ("name=1, other = 2", ("name", "1, other = 2")),
-        ("name=" + "[" * 5000, ("name", "[" * 5000)),
+        ("controller.crossover=12 Hz", "controller.crossover", "12 Hz"),
+        ('controller.crossover="12 Hz"', "controller.crossover", "12 Hz"),
+        (" controller.alpha = 0.2 ", "controller.alpha", 0.2),
+        ("joint.locked=true", "joint.locked", True),
+        ("joint.locked=True", "joint.locked", "True"),
+        ("controller.beta=2", "controller.beta", 2),
+        ("name=a=b", "name", "a=b"),
+        ("name=", "name", ""),
+        ("name=3 # no comment", "name", "3 # no comment"),
+        ("name=1}\nx={y=2", "name", "1}\nx={y=2"),
+        ("name=1, other = 2", "name", "1, other = 2"),
+        ("name=" + "[" * 5000, "name", "[" * 5000),
     ],
 )
-def test_parse_set(text: str, expected: tuple[str, object]) -> None:
-    assert parse_set(text) == expected
+def test_parse_set(text: str, key: str, value: object) -> None:
+    assert parse_set(text) == (key, value)
 
 
 def test_swept_values_move_the_defaults_that_follow_them(rig: Stage) -> None:
@@ -313,7 +271,6 @@ def test_violations_tell_cells_apart(rig: Stage) -> None:
         ("friction.coulomb", "friction.static"): [False, False, True, False],
         ("parasitic.mass", "masses.stage"): [True] * 4,
     }
-    wording("\n".join(why for _, why in broken))
 
 
 def test_numeric_keys_have_units(rig: Stage) -> None:
@@ -325,48 +282,30 @@ def test_numeric_keys_have_units(rig: Stage) -> None:
     assert "joint.locked" not in units
 
 
-def test_stages_copy_and_pickle(rig: Stage) -> None:
+def test_stages_copy_pickle_and_are_frozen_and_hashable(rig: Stage) -> None:
     assert pickle.loads(pickle.dumps(rig)).to_toml() == rig.to_toml()
     assert copy.deepcopy(Value(0.03, "30 ms")).text == "30 ms"
     error = pickle.loads(pickle.dumps(InputError("key", "given", "expected", "example", "origin")))
     assert str(error) == "origin: key\n  given:    given\n  expected: expected\n  example:  example"
-
-
-def test_stages_are_frozen_and_hashable(rig: Stage) -> None:
     with pytest.raises(AttributeError, match=r"stage\.replace"):
         rig.name = "other"
     assert hash(rig) == hash(load(THESIS_RIG))
 
 
 @pytest.mark.parametrize(
-    ("table", "keys"),
-    [
-        ({"model": "none"}, set()),
-        (
-            {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0 N*s/m"},
-            {"coulomb"},
-        ),
-    ],
+    ("kind", "key", "text", "si"),
+    [("release", "displacement", "-2 mm", -2e-3), ("step", "size", "1 m", 1.0), ("ramp", "velocity", "0.1 m/s", 0.1)],
 )
-def test_friction_laws_are_told_apart_by_model(rig: Stage, table: dict[str, str], keys: set[str]) -> None:
-    flat = rig.replace({"friction": table}).flat()
-    assert flat["friction.model"] == table["model"]
-    assert {f"friction.{key}" for key in keys} <= flat.keys()
+def test_other_motions(rig: Stage, kind: str, key: str, text: str, si: float) -> None:
+    flat = rig.replace({"motion": {"kind": kind, key: text, "duration": "1 s"}}).flat()
+    assert flat[f"motion.{key}"] == si
 
 
-@pytest.mark.parametrize("key", ["displacement", "size", "velocity"])
-def test_other_motions(rig: Stage, key: str) -> None:
-    kind, value = {
-        "displacement": ("release", "-2 mm"),
-        "size": ("step", "1 m"),
-        "velocity": ("ramp", "0.1 m/s"),
-    }[key]
-    flat = rig.replace({"motion": {"kind": kind, key: value, "duration": "1 s"}}).flat()
-    assert flat[f"motion.{key}"] == Quantity({"velocity": "m/s"}.get(key, "m"), any_sign, "").read(value)
-
-
-def test_zero_stroke_is_legal(rig: Stage) -> None:
-    assert rig.replace({"joint.stroke": "0 mm"}).flat()["joint.stroke"] == 0.0
+def test_other_friction_laws(rig: Stage) -> None:
+    dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0 N*s/m"}
+    flat = rig.replace({"friction": dahl}).flat()
+    assert (flat["friction.model"], flat["friction.coulomb"]) == ("dahl", 1.0)
+    assert rig.replace({"friction": {"model": "none"}}).flat()["friction.model"] == "none"
 
 
 @pytest.mark.parametrize("value", ["12", "12.0", "12hz", "12 HZ", " 12 Hz "])
