@@ -130,6 +130,21 @@ def folder(written: tuple[Path, str]) -> Path:
     return written[0]
 
 
+def verified(designed: Design, **moves: Any) -> Design:
+    """Return the design with other moves."""
+    return replace(designed, verification=replace(designed.verification, **moves))
+
+
+def lacking(text: str, *facts: str) -> list[str]:
+    """Return the facts that a text does not tell."""
+    return [fact for fact in facts if fact not in text]
+
+
+def some(count: int, otherwise: float) -> np.ndarray:
+    """Return a number for each of 64 moves, of which the first do not end."""
+    return np.where(np.arange(64) < count, np.nan, otherwise)
+
+
 @pytest.fixture
 def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are not drawn again, and nothing is written."""
@@ -163,7 +178,9 @@ def _figures(designed: Design) -> dict[str, Figure]:
 # ---------------------------------------------------------------- files and document
 
 
-def test_all_files_are_written_and_the_stages_load(designed: Design, folder: Path) -> None:
+def test_all_files_are_written_and_the_stages_load(
+    designed: Design, spec: Path, folder: Path, quick: None, capsys: pytest.CaptureFixture
+) -> None:
     pictures = {f"{name}.svg" for name in FIGURES}
     own = {"design.toml", "worst.toml", "design.html", "design_drawing.svg"}
     assert {path.name for path in folder.iterdir()} == pictures | own | {MARKER}
@@ -171,10 +188,7 @@ def test_all_files_are_written_and_the_stages_load(designed: Design, folder: Pat
     assert stage.flat()["joint.stiffness"] == pytest.approx(designed.fitted.choice.beams.drive[0], rel=0.02)
     assert worst.flat()["friction.static"] == designed.verification.worst.flat()["friction.static"]
     assert ElementTree.parse(folder / "design_drawing.svg").getroot().tag.endswith("svg")
-
-
-def test_a_design_may_be_written_again(spec: Path, folder: Path, quick: None, capsys: pytest.CaptureFixture) -> None:
-    command(RIG, spec, out=folder)
+    command(RIG, spec, out=folder)  # once more
     assert "next: friso check" in capsys.readouterr().out
 
 
@@ -185,38 +199,20 @@ def test_the_document_has_the_agreed_keys(
     shown = capsys.readouterr()
     document = _strict(shown.out)
     assert shown.err == ""
-    assert document.keys() == {
-        *(
-            "conclusion",
-            "stage",
-            "spec",
-            "feasible",
-            "needed",
-            "machine_limit_hz",
-            "without",
-            "joint",
-            "leaves",
-            "front",
-        ),
-        *("controller", "verification", "files", "plug_ins", "relax"),
-    }
+    asked = "conclusion stage spec feasible needed machine_limit_hz without joint leaves front controller verification"
+    assert document.keys() == {*asked.split(), "files", "plug_ins", "relax"}
     assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
     assert document["files"][0] == str(folder / "design.toml")
-    assert document["without"]["corners"] == designed.without.population.count
-    assert document["without"]["worst_corner"].keys() == {
-        *("masses_cart_kg", "masses_stage_kg", "friction_static_n", "friction_coulomb_n"),
-    }
-    joint, leaves = document["joint"], document["leaves"]
+    without, joint, leaves = document["without"], document["joint"], document["leaves"]
+    assert without["corners"] == designed.without.population.count
+    corner = "masses_cart_kg masses_stage_kg friction_static_n friction_coulomb_n"
+    assert without["worst_corner"].keys() == {*corner.split()}
     assert joint["force_at_stroke_n"] == pytest.approx(joint["stiffness_n_per_m"] * joint["stroke_m"], rel=0.01)
     assert joint["least_static_friction_n"] == 1.0
-    assert joint["highest_edge_hz"] < document["without"]["highest_edge_hz"]
+    assert joint["highest_edge_hz"] < without["highest_edge_hz"]
     assert leaves["drive_stiffness_n_per_m"] == joint["stiffness_n_per_m"]
     assert [requirement["key"] for requirement in leaves["requirements"]][-1] == "safety.parasitic"
     assert all(requirement["excess"] <= 1 for requirement in leaves["requirements"])
-
-
-def test_the_document_tells_front_controller_and_moves(designed: Design) -> None:
-    document = design_document(designed)
     asked = [item for item in document["front"] if item["beams_hz"] is not None]
     assert len(document["front"]) == len(designed.candidates)
     assert 0 < len({item["beams_hz"] for item in asked}) <= 3
@@ -234,12 +230,13 @@ def test_the_document_tells_front_controller_and_moves(designed: Design) -> None
 def test_what_is_not_finite_is_null(designed: Design) -> None:
     never = replace(designed.verification.free, settling=np.full(64, np.nan), words=np.full(64, "swings"))
     nowhere = replace(designed.without, edges=np.zeros(designed.without.population.count), unknown=1)
-    other = replace(designed, without=nowhere, verification=replace(designed.verification, free=never))
-    document = design_document(other)
+    document = design_document(replace(verified(designed, free=never), without=nowhere, lost={"dahl": [1, 2]}))
     json.dumps(document, allow_nan=False)
     assert document["verification"]["settling_95_s"] is None
     assert (document["without"]["highest_edge_hz"], document["without"]["unknown_corners"]) == (None, 1)
     assert document["verification"]["settling_time_met"] is False
+    assert document["friction_laws_lost_in_corners"] == {"dahl": [1, 2]}
+    assert "dahl" in headline(replace(designed, lost={"dahl": [1, 2]}))[-1][1]
 
 
 # ---------------------------------------------------------------- words
@@ -262,10 +259,9 @@ def test_an_isolator_that_is_not_needed_is_weighed(designed: Design, snapshots: 
 
 
 def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapshots) -> None:
-    limit = replace(designed.without, edges=np.full(designed.without.population.count, 60.0))
-    needed = replace(designed, without=limit)
+    needed = replace(designed, without=replace(designed.without, edges=np.full(len(designed.without.edges), 60.0)))
     (_, first), *_ = headline(needed)
-    assert [fact for fact in ("72.0 Hz", "1.2 times", "48.0 Hz") if fact not in first] == []
+    assert lacking(first, "72.0 Hz", "1.2 times", "48.0 Hz") == []
     step = isolator_step(needed)
     assert len(step.sentences) < len(isolator_step(designed).sentences)  # nothing to compare it with
     snapshots.check("design", "isolator needed", "\n".join([first, step.title, *step.sentences]))
@@ -274,20 +270,19 @@ def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapsh
 def test_the_joint_is_held_below_the_static_friction(designed: Design) -> None:
     text = " ".join(joint_step(designed).sentences)
     allowed = 1 / (1.1 * 1.1)  # [N]: friction over the safety factor and the stiffness error
-    for fact in ("no less than 1 N", "factor of 1.1", "error of 10 %", f"{allowed:.3g} N", "stroke of 1 mm"):
-        assert fact in text
-    unknown = replace(designed.edges, unknown=2)
-    wording(" ".join(joint_step(replace(designed, edges=unknown)).sentences))
+    stated = ("no less than 1 N", "factor of 1.1", "error of 10 %", f"{allowed:.3g} N", "stroke of 1 mm")
+    assert lacking(text, *stated) == []
+    unknown = joint_step(replace(designed, edges=replace(designed.edges, unknown=2))).sentences
+    assert "were stopped, which counts as hunting" in " ".join(unknown)
 
 
-def test_edges_in_words(designed: Design, snapshots: Snapshots) -> None:
-    def some(*edges: float) -> str:
-        return edge(Corners(designed.without.population, np.array(edges), (1.2, 144.0)))
-
-    texts = [some(0.0, 0.0), some(0.0, np.inf), some(0.0, 7.62)]
-    for facts, text in zip((("1.20 Hz", "144 Hz"), ("144 Hz",), ("7.62 Hz",)), texts, strict=True):
-        assert [fact for fact in facts if fact not in text] == []
-    snapshots.check("design", "edges", "\n".join(texts))
+@pytest.mark.parametrize(
+    ("edges", "stated"),
+    [((0.0, 0.0), ("1.20 Hz", "144 Hz")), ((0.0, np.inf), ("144 Hz",)), ((0.0, 7.62), ("7.62 Hz",))],
+)
+def test_edges_in_words(designed: Design, edges: tuple[float, float], stated: tuple[str, ...]) -> None:
+    text = edge(Corners(designed.without.population, np.array(edges), (1.2, 144.0)))
+    assert lacking(text, *stated) == []
 
 
 def test_leaves_and_what_binds_them(designed: Design) -> None:
@@ -300,8 +295,7 @@ def test_leaves_and_what_binds_them(designed: Design) -> None:
         assert (name in text) == spare.endswith("binds")
     assert f"{len(designed.candidates)} geometries" in text
     broken = replace(designed.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
-    other = replace(designed, confirmed=(broken, *designed.confirmed[1:]))
-    wording(" ".join(leaves_step(other).sentences))
+    assert "fail" in " ".join(leaves_step(replace(designed, confirmed=(broken, *designed.confirmed[1:]))).sentences)
     assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
     assert [row[3] for row in rows] == ["98.5 %, binds", "20 %", "10 %", "60 %", "99 %, binds"]
     loose = replace(designed.fitted, choice=replace(tight, excess=excess / 2))
@@ -321,13 +315,13 @@ def test_the_window_of_the_crossover(designed: Design) -> None:
 
 
 def test_damping_that_is_worth_adding_or_not(designed: Design, snapshots: Snapshots) -> None:
-    def damped(*margins: float) -> str:
-        other = replace(designed.controller.damping, margins=np.array(margins))
-        return controller_step(replace(designed, controller=replace(designed.controller, damping=other))).sentences[-1]
-
-    worth, not_worth = damped(0.3, 0.58, 0.6), damped(0.57, 0.59, 0.6)
-    assert [fact for fact in ("0.5 N·s/m", "0.58") if fact not in worth] == []
-    snapshots.check("design", "damping", f"{worth}\n{not_worth}")
+    texts = []
+    for margins in ([0.3, 0.58, 0.6], [0.57, 0.59, 0.6]):
+        damping = replace(designed.controller.damping, margins=np.array(margins))
+        other = replace(designed, controller=replace(designed.controller, damping=damping))
+        texts.append(controller_step(other).sentences[-1])
+    assert lacking(texts[0], "0.5 N·s/m", "0.58") == []
+    snapshots.check("design", "damping", "\n".join(texts))
 
 
 def restless(count: int) -> np.ndarray:
@@ -338,41 +332,26 @@ def restless(count: int) -> np.ndarray:
 
 
 def test_moves_that_swing_or_take_too_long(designed: Design, snapshots: Snapshots) -> None:
-    off = np.arange(64) < 2
-    free = replace(
-        designed.verification.free,
-        words=restless(2),
-        settling=np.where(off, np.nan, 2.0),
-        swing=off * np.arange(64) * 1e-3,
-    )
-    other = replace(designed, verification=replace(designed.verification, free=free))
+    swing = (np.arange(64) < 2) * np.arange(64) * 1e-3
+    free = replace(designed.verification.free, words=restless(2), settling=some(2, 2.0), swing=swing)
+    other = verified(designed, free=free)
     step = moves_step(other)
-    assert [fact for fact in ("64 moves", "2 do not", "1 swing", "1 creep") if fact not in step.title] == []
-    text = " ".join(step.sentences)
-    assert [fact for fact in ("95 %", "1.00 s", "Not met", "1 mm") if fact not in text] == []
+    assert lacking(step.title, "64 moves", "2 do not", "1 swing", "1 creep") == []
+    assert lacking(" ".join(step.sentences), "95 %", "1.00 s", "Not met", "1 mm") == []
     snapshots.check("design", "moves that swing", "\n".join([*step.sentences, headline(other)[-1][1]]))
     lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
-    step = moves_step(replace(designed, verification=replace(designed.verification, free=lost)))
-    assert "4 moves" in " ".join(step.sentences)
+    assert "4 moves" in " ".join(moves_step(verified(designed, free=lost)).sentences)
 
 
 def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapshots) -> None:
-    off = np.arange(64) < 20
-    locked = replace(designed.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
-    other = replace(designed, verification=replace(designed.verification, locked=locked))
+    locked = replace(designed.verification.locked, words=restless(20), settling=some(20, 3.0))
+    other = verified(designed, locked=locked)
     text = " ".join(moves_step(other).sentences)
-    assert [fact for fact in ("3.00 s", "95 %", "Of 64", "20 do not") if fact not in text] == []
-    wording(headline(other)[-1][1])
+    assert lacking(text, "3.00 s", "95 %", "Of 64", "20 do not") == []
     snapshots.check("design", "moves of a locked joint", "\n".join([text, headline(other)[-1][1]]))
     never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))
     assert not re.search(r"\d", settling(never))
-    assert "never" in brings(replace(designed, verification=replace(designed.verification, locked=never)))
-
-
-def test_laws_that_a_corner_loses_are_named(designed: Design) -> None:
-    other = replace(designed, lost={"dahl": [1, 2]})
-    wording(headline(other)[-1][1])
-    assert design_document(other)["friction_laws_lost_in_corners"] == {"dahl": [1, 2]}
+    assert "never" in brings(verified(designed, locked=never))
 
 
 # ---------------------------------------------------------------- figures and page
@@ -441,46 +420,38 @@ def test_window_with_edges_beyond_the_search(designed: Design) -> None:
 
 
 def test_settling_ends_where_moves_do_not_rest(designed: Design) -> None:
-    off = np.arange(64) < 16
-    free = replace(designed.verification.free, words=restless(16), settling=np.where(off, np.nan, 0.2))
-    none = replace(free, settling=np.full(64, np.nan))
-    other = replace(designed, verification=replace(designed.verification, free=free, locked=none))
-    (panel,) = _figures(other)["design_settling"].panels
+    free = replace(designed.verification.free, words=restless(16), settling=some(16, 0.2))
+    figure = _figures(verified(designed, free=free, locked=replace(free, settling=some(64, 0.0))))["design_settling"]
+    (panel,) = figure.panels
     assert panel.series[0].y.max() == 75.0
     assert [line.label for line in panel.series] == ["joint free", "joint locked", "specified"]
-    assert matplotlib_renderer.image(_figures(other)["design_settling"], "svg")
+    assert matplotlib_renderer.image(figure, "svg")
 
 
 # ---------------------------------------------------------------- what is refused
 
 
-def test_no_design_says_what_to_relax(no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+@pytest.mark.parametrize("as_json", [False, True])
+def test_no_design_says_what_to_relax(tmp_path: Path, capsys: Any, no_design: None, as_json: bool) -> None:
     with pytest.raises(typer.Exit) as left:
-        command(RIG, SPEC, out=tmp_path / "out")
+        command(RIG, SPEC, out=tmp_path / "out", as_json=as_json)
     shown = capsys.readouterr()
-    assert (left.value.exit_code, shown.out) == (2, "")
-    wording(shown.err)
+    assert left.value.exit_code == 2
+    assert lacking(shown.err, "from 10 to 8.12", "leaves.length", "no leaf springs meet the specification") == []
     assert not (tmp_path / "out").exists()
-
-
-def test_no_design_as_a_document(no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(typer.Exit):
-        command(RIG, SPEC, out=tmp_path / "out", as_json=True)
-    shown = capsys.readouterr()
+    if not as_json:
+        assert shown.out == ""
+        return
     document = _strict(shown.out)
     assert document.keys() == {"conclusion", "stage", "spec", "feasible", "reason", "relax", "files", "plug_ins"}
     assert document["feasible"] is False
-    length = document["relax"][1]
-    assert {name: length[name] for name in ("key", "from", "to", "unit")} == {
-        **{"key": "leaves.length", "from": 0.07, "to": 0.07421, "unit": "m"},
-    }
-    wording(shown.err)
+    length = {"key": "leaves.length", "from": 0.07, "to": 0.07421, "unit": "m"}
+    assert document["relax"][1].items() >= length.items()
 
 
 def test_no_single_relaxation() -> None:
-    wording(refusal(NoDesign("too tight")))
-    many = refusal(NoDesign("too tight", RELAXED * 3))
-    assert len(many.splitlines()) == 7
+    assert "too tight" in refusal(NoDesign("too tight"))
+    assert len(refusal(NoDesign("too tight", RELAXED * 3)).splitlines()) == 7
     assert refused_document(friso.load(RIG), "spec", NoDesign("too tight"))["relax"] == []
 
 
@@ -495,75 +466,51 @@ def test_relaxations_are_rounded_to_be_enough(value: float, larger: bool, expect
     assert outwards(value, larger) == expected
 
 
-@pytest.mark.parametrize("name", ["design.toml", "worst.toml"])
-def test_files_of_no_design_are_not_overwritten(finished: list[str], tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text("mine")
+@pytest.mark.parametrize("name", ["design.toml", "worst.toml", "."])
+def test_files_of_no_design_are_not_overwritten(finished: list[str], folder: Path, tmp_path: Path, name: str) -> None:
+    """Nor is the stage that is read, and a folder may be no file."""
+    taken = tmp_path / name if name != "." else tmp_path / "taken"
+    taken.write_text("mine")
     with refused():
-        command(RIG, SPEC, out=tmp_path)
-    assert (tmp_path / name).read_text() == "mine"
-
-
-def test_the_stage_that_is_read_is_not_overwritten(finished: list[str], folder: Path) -> None:
+        command(RIG, SPEC, out=tmp_path if name != "." else taken)
+    assert taken.read_text() == "mine"
     with refused():
         command(folder / "design.toml", SPEC, out=folder)
 
 
-def test_a_folder_that_is_a_file_is_refused(finished: list[str], tmp_path: Path) -> None:
-    (tmp_path / "taken").write_text("")
-    with refused():
-        command(RIG, SPEC, out=tmp_path / "taken")
-
-
-def test_overrides_are_of_the_stage(
-    finished: list[str],
-    folder: Path,
-    quick: None,
-    spec: Path,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_overrides_are_of_the_stage(finished: list[str], folder: Path, quick: None, spec: Path, caplog: Any) -> None:
     command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
-    wording("\n".join(f"friso: {message}" for message in caplog.messages))
+    assert "[drive]" in caplog.text
     with refused():
         command(RIG, spec, set=['controller.crosover="8 Hz"'], out=folder)
 
 
 @pytest.mark.parametrize(
-    ("broken", "status", "message"),
-    [("specification", 2, "expected"), ("interrupt", 130, "interrupted"), ("argument", 2, "Missing argument")],
+    ("arguments", "status", "message"),
+    [((RIG, "bad.toml"), 2, "expected"), ((RIG, SPEC), 130, "interrupted"), ((), 2, "Missing argument")],
 )
 def test_exit_status(
-    broken: str,
-    status: int,
-    message: str,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture,
+    arguments: tuple, status: int, message: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any
 ) -> None:
     def interrupt(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(method, "design", interrupt)
-    bad = tmp_path / "bad.toml"
-    bad.write_text(SPEC.read_text().replace("stainless 1.4310", "stainles"))
-    inputs = {"specification": [str(RIG), str(bad)], "interrupt": [str(RIG), str(SPEC)], "argument": []}
-    monkeypatch.setattr(sys, "argv", ["friso", "design", *inputs[broken], "--out", str(tmp_path / "out")])
+    monkeypatch.chdir(tmp_path)
+    Path("bad.toml").write_text(SPEC.read_text().replace("stainless 1.4310", "stainles"))
+    monkeypatch.setattr(sys, "argv", ["friso", "design", *map(str, arguments), "--out", "out"])
     with pytest.raises(SystemExit) as left:
         main()
     shown = capsys.readouterr()
     assert (left.value.code, shown.out) == (status, "")
     assert message in shown.err
     assert "Traceback" not in shown.err
-    assert not (tmp_path / "out").exists()
+    assert not Path("out").exists()
 
 
 def test_a_specification_that_is_not_met_is_told(
-    spec: Path,
-    folder: Path,
-    quick: None,
-    designed: Design,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
+    spec: Path, folder: Path, quick: None, designed: Design, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
     """What exists is written all the same; the status is 2, and the message says what would be met."""
     hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]
@@ -578,7 +525,7 @@ def test_a_specification_that_is_not_met_is_told(
     (relax,) = document["relax"]
     assert relax["key"] == "position.settling_time"
     assert relax["to"] > relax["from"] == 1e-3
-    wording(shown.err)
+    assert "position.settling_time" in shown.err
 
 
 @pytest.mark.parametrize("during", ["hunting_map", "verification"])
@@ -611,20 +558,11 @@ def test_ctrl_c_keeps_the_leaves_and_the_crossover(
 
 
 def test_a_design_ends_where_no_isolator_is_needed(
-    rig: Stage,
-    spec: Path,
-    small: None,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
+    rig: Stage, spec: Path, small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
     """Its leaf springs are not tried, and files of an earlier design beside its own are named."""
-
-    def tried(*_: Any, **__: Any) -> Any:
-        raise AssertionError("the design went on")
-
     monkeypatch.setattr(method, "design", DESIGN)
-    monkeypatch.setattr(method, "hunting_map", tried)
+    monkeypatch.setattr(method, "hunting_map", lambda *_, **__: pytest.fail("the design went on"))
     answer = friso.design(rig, spec)
     assert not answer.result.need.isolator
     assert (answer.interrupted, answer.failure) == (False, "")
