@@ -150,26 +150,31 @@ def choose(
     tests: dict[str, Candidate], costs: dict[tuple[str, str], float], lines: int, budget: float
 ) -> Iterator[str]:
     """Yield the tests to run, by what they add for their cost, within the budget [units]."""
-    weight, paid, spent = np.ones(lines), set[tuple[str, str]](), 0.0
+    weight, paid, chosen, spent = np.ones(lines), set[tuple[str, str]](), set[str](), 0.0
 
     def cost(test: Candidate) -> float:
         return test.cost + sum(costs[key] for key in test.shared if key not in paid)
 
+    def value(name: str) -> float:
+        return (0.1 + weight[tests[name].lines].sum()) / cost(tests[name])
+
     waiting = [(-np.inf, name) for name in tests]
-    heapq.heapify(waiting)
     while waiting:
         _, name = heapq.heappop(waiting)
-        test = tests[name]
-        if spent + cost(test) > budget:
+        if name in chosen or spent + cost(tests[name]) > budget:
             continue
-        value = -(0.1 + weight[test.lines].sum()) / cost(test)
-        if waiting and value > waiting[0][0]:
-            heapq.heappush(waiting, (value, name))
+        if waiting and -value(name) > waiting[0][0]:
+            heapq.heappush(waiting, (-value(name), name))
             continue
-        spent += cost(test)
-        paid.update(test.shared)
-        weight[test.lines] *= 0.5
+        spent += cost(tests[name])
+        weight[tests[name].lines] *= 0.5
+        chosen.add(name)
         yield name
+        if new := {key for key in tests[name].shared if key not in paid}:
+            paid |= new
+            for other, test in tests.items():  # which cost less from now on
+                if other not in chosen and new & set(test.shared):
+                    heapq.heappush(waiting, (-value(other), other))
 
 
 def main() -> None:

@@ -24,6 +24,9 @@ FOLDER = "FRISO_CACHE_DIR"
 MADE = "FRISO_TEST_CACHE_DIR"
 BLAS = "OPENBLAS_NUM_THREADS"
 
+SLOW = Path(__file__).parent / "slow.txt"
+"""Tests that a plain `pytest` leaves out, with their durations in units; written by `python -m benchmarks.tiers`."""
+
 # The same examples for the same test, however slow the machine is: a change is refused for what it did. Others are
 # drawn by `pytest --hypothesis-profile random`.
 settings.register_profile("random", deadline=None)
@@ -50,10 +53,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of a whole study, which a fixture named `thorough_...` computes, are thorough."""
+    """Mark tests as thorough that a fixture named `thorough_...` computes, and as slow those listed in slow.txt."""
+    slow = {line.partition(" ")[2] for line in SLOW.read_text(encoding="utf-8").splitlines()}
     for item in items:
         if any(name.startswith("thorough_") for name in getattr(item, "fixturenames", ())):
             item.add_marker("thorough")
+        if item.nodeid in slow:
+            item.add_marker("slow")
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
