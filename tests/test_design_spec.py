@@ -1,6 +1,7 @@
 """Test specifications: what is read, what is refused, and the machines that they allow."""
 
 import copy
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -35,27 +36,16 @@ def rig() -> friso.Stage:
 
 
 def test_the_example_is_read() -> None:
+    """Parasitic frequencies set the limit too, or its former name; a range of thickness stands for usual gauges."""
     spec = load_spec(SPEC)
     assert spec.limit == 48
     assert (spec.friction.static.low, spec.friction.static.high) == (1, 3)  # type: ignore[union-attr]
     assert spec.masses.cart.low == pytest.approx(1.14)  # type: ignore[union-attr]
     assert len(sheets(spec)) == 8
-
-
-def test_a_limit_by_its_former_name_is_read() -> None:
     assert changed("machine", crossover_limit=None, bandwidth_limit="25 Hz").limit == 25
-
-
-def test_parasitic_frequencies_set_the_limit() -> None:
-    spec = changed("machine", crossover_limit=None, parasitic_frequencies=["730 Hz", "480 Hz"])
-    assert spec.limit == pytest.approx(48)
-
-
-def test_a_range_of_thickness_stands_for_usual_gauges() -> None:
+    modes = changed("machine", crossover_limit=None, parasitic_frequencies=["730 Hz", "480 Hz"])
+    assert modes.limit == pytest.approx(48)
     assert changed("leaves", thickness="0.2 mm .. 0.35 mm").leaves.thickness == (0.2e-3, 0.25e-3, 0.3e-3, 0.35e-3)
-
-
-def test_a_single_length_is_the_largest() -> None:
     low, high = box(changed("leaves", length="70 mm"))
     assert (low[0], high[0]) == pytest.approx((7e-3, 70e-3))
 
@@ -88,12 +78,25 @@ def test_what_is_refused(table: str, keys: dict[str, Any], words: str) -> None:
     assert caught.value.key.startswith(table)
 
 
-def test_a_missing_file_and_an_empty_one(tmp_path: Path) -> None:
-    with refused():
-        load_spec(tmp_path / "none.toml")
-    (tmp_path / "empty.toml").write_text("")
-    with refused():
-        load_spec(tmp_path / "empty.toml")
+DAHL = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
+LOCKED = {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
+
+
+@pytest.mark.parametrize(
+    ("key", "asked"),
+    [
+        (None, lambda rig: load_spec(EXAMPLES / "none.toml")),
+        (None, lambda rig: load_spec(Path(os.devnull))),
+        ("friction.static", lambda rig: corners(load_spec(SPEC), rig.replace({"friction": DAHL}).flat())),
+        (None, lambda rig: prepared(rig.replace({"joint": LOCKED}), load_spec(SPEC))),
+        (None, lambda rig: prepared(rig.replace({"friction": {"model": "none"}}), load_spec(SPEC))),
+    ],
+)
+def test_files_and_stages_of_which_there_is_no_design_are_refused(
+    rig: friso.Stage, key: str | None, asked: Any
+) -> None:
+    with refused(key):
+        asked(rig)
 
 
 def test_corners_hold_the_ends_of_all_ranges(rig: friso.Stage) -> None:
@@ -116,38 +119,16 @@ def test_drawn_machines_lie_in_all_ranges(rig: friso.Stage) -> None:
     assert travel.min() >= 1e-3 * (1 - 1e-9)
     assert travel.max() <= 0.1 * (1 + 1e-9)
     assert np.all(samples.keys["friction.coulomb"] < samples.keys["friction.static"])
+    overlapping = random_machines(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), flat, 200, 0.0)
+    assert np.all(overlapping.keys["friction.coulomb"] <= overlapping.keys["friction.static"])
     again = random_machines(spec, flat, 500, 0.3)
     assert all(np.array_equal(samples.keys[key], again.keys[key]) for key in samples.keys)
-
-
-def test_coulomb_friction_never_exceeds_the_static_one(rig: friso.Stage) -> None:
-    samples = random_machines(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
-    assert np.all(samples.keys["friction.coulomb"] <= samples.keys["friction.static"])
 
 
 def test_the_typical_move_is_in_the_middle() -> None:
     move = typical_move(load_spec(SPEC))
     assert move["motion.acceleration"] * move["motion.acceleration_time"] ** 2 == pytest.approx(0.01)
     assert move["motion.acceleration"] == pytest.approx(np.sqrt(10 * 100))
-
-
-def test_a_range_the_friction_law_does_not_have(rig: friso.Stage) -> None:
-    dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
-    stage = rig.replace({"friction": dahl})
-    with refused("friction.static"):
-        corners(load_spec(SPEC), stage.flat())
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"joint": {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}},
-        {"friction": {"model": "none"}},
-    ],
-)
-def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any]) -> None:
-    with refused():
-        prepared(rig.replace(change), load_spec(SPEC))
 
 
 @pytest.mark.parametrize("masses", [{"cart": "1.2 kg", "stage": "0.5 kg"}, {"stage": "1.7 kg"}])

@@ -49,57 +49,85 @@ def across(*verdicts: LawVerdict) -> VerdictsByLaw:
     return VerdictsByLaw(RIGID, verdicts, {"dahl": ("static",)})
 
 
-def test_one_verdict_under_all_laws() -> None:
-    laws = across(under("lugre", ("hunts", 9.7)), under("gms", ("hunts", 9.1), ("hunts", 10.4)))
-    assert laws.hunts("given") is True
-    wording(" ".join(laws_sentences(laws)))
-    document = laws_document(laws)
-    assert document["cases"]["given"]["measure"] == []
-    assert [*document["left_out"]] == ["dahl"]
-    rows = dict(laws_rows(laws))
-    assert rows["As given: edge"] == ["9.70 Hz", "9.10 to 10.4 Hz"]
+FAST, SLOW, LOST = ("hunts", 9.7), ("settles", 6.0), ("settles", None, True, True, ("other bandwidths",))
 
 
-def test_laws_that_disagree() -> None:
-    """The measurement that separates the fewer laws from the others is named.
+@pytest.mark.parametrize(
+    ("lugre", "other", "verdicts", "hunts", "words"),
+    [
+        (
+            FAST,
+            "gms",
+            [("hunts", 9.1), ("hunts", 10.4)],
+            True,
+            "hunts, edge 9.10 to 10.4 Hz. The advice keeps clear",
+        ),
+        (FAST, "elasto_plastic", [("settles", 9.1)], None, "the verdict depends on the friction law"),
+        (("bistable", 9.7), "elasto_plastic", [("hunts", 9.1)], True, "the stage can hunt, edge 9.10 to 9.70 Hz"),
+        (
+            FAST,
+            "gms",
+            [("hunts", 9.1), ("settles", 7.0)],
+            None,
+            "hunts with attraction 160 N/s and settles with attrac",
+        ),
+        (("failed", None), "gms", [("failed", None)], None, "the verdict is not certain under any law"),
+        (("settles", 6.0, False), "gms", [("hunts", 6.0, False)], None, "the verdict is not certain under any law"),
+        (SLOW, "gms", [("settles", 7.0), ("settles", 7.1, False)], None, "N/s and is not certain with attraction 1.00"),
+        (("settles", None), "gms", [LOST], False, "its edge of hunting not determined under gms"),
+        (SLOW, "gms", [LOST], False, "edge 6.00 Hz, not determined under gms"),
+        (("settles", None), "gms", [("settles", None)], False, "no edge of hunting between 0.25 and 10 times"),
+        (SLOW, "gms", [("settles", 7.0, True, False)], False, "edge 6.00 to 9.33 Hz (not certain)"),
+    ],
+)
+def test_what_laws_say_together(lugre: Any, other: str, verdicts: list[Any], hunts: bool | None, words: str) -> None:
+    laws = across(under("lugre", lugre), under(other, *verdicts))
+    assert laws.hunts("given") is hunts
+    assert words in laws_sentences(laws)[0]
+    assert laws.depends_on_law("given") == ("depends on the friction law" in laws_sentences(laws)[0])
 
-    No measurement separates LuGre from all others.
-    """
-    alone = across(under("lugre", ("hunts", 9.7)), under("elasto_plastic", ("settles", 9.1)))
-    assert alone.deciding("given") == [friction_law("elasto_plastic").decided_by[""]]
-    laws = across(
-        under("lugre", ("hunts", 9.7)),
-        under("gms", ("hunts", 9.1)),
-        under("rolling", ("settles", 6.0), ("settles", 6.1)),
-    )
-    assert laws.hunts("given") is None
+
+def test_what_decides_between_laws() -> None:
+    """The measurement that separates the fewer laws from the others, or what is open in the law that is not certain."""
+    rolling = under("rolling", ("settles", 6.0), ("settles", 6.1))
+    laws = across(under("lugre", FAST), under("gms", ("hunts", 9.1, True, False)), rolling)
     (deciding,) = laws.deciding("given")
     assert deciding in friction_law("rolling").decided_by.values()
-    wording(laws_sentences(laws)[0])
-    document = laws_document(laws)["cases"]["given"]
-    assert document["depends_on_law"]
-    assert document["laws"]["rolling"]["verdicts"] == ["settles"]
+    assert across(under("lugre", FAST), under("elasto_plastic", SLOW)).deciding("given") == [
+        friction_law("elasto_plastic").decided_by[""]
+    ]
+    for verdicts in ([("hunts", 9.1), SLOW], [SLOW, ("settles", 7.1, False)]):
+        lugre = FAST if verdicts[1] == SLOW else SLOW
+        assert across(under("lugre", lugre), under("gms", *verdicts)).deciding("given") == [
+            friction_law("gms").decided_by["friction.attraction"]
+        ]
+    beside = laws_sentences(across(under("lugre", FAST), rolling, under("gms", ("settles", 7.0, False))))[0]
+    assert "hunts under lugre; settles under rolling. Under gms that is not certain" in beside
+    document = laws_document(laws)
+    assert [*document["left_out"]] == ["dahl"]
+    expected = document["cases"]["given"]
+    assert expected["depends_on_law"]
+    assert expected["laws"]["rolling"]["verdicts"] == ["settles"]
+    assert not expected["laws"]["gms"]["trials"][0]["edge_certain"]
+    alike = across(under("lugre", FAST), under("elasto_plastic", ("hunts", 9.1)))
+    assert laws_document(alike)["cases"]["given"]["measure"] == []
+    said = " ".join(laws_sentences(alike))
+    assert "dahl (break-away)" in said
+    assert "misses the virgin curve by 12 %" in said
 
 
-def test_a_stage_that_can_hunt_but_settles_after_this_move_does_not_hunt_for_sure() -> None:
-    laws = across(under("lugre", ("bistable", 9.7)), under("elasto_plastic", ("hunts", 9.1)))
-    assert laws.hunts("given") is True
-    wording(" ".join(laws_sentences(laws)))
-
-
-def test_a_verdict_that_hangs_on_what_is_open_in_a_law() -> None:
-    laws = across(under("lugre", ("hunts", 9.7)), under("gms", ("hunts", 9.1), ("settles", 7.0)))
-    assert laws.verdicts[1].hunts("given") is None
-    assert laws.deciding("given") == [friction_law("gms").decided_by["friction.attraction"]]
-    wording(laws_sentences(laws)[0])
-
-
-def test_failed_runs_leave_it_open() -> None:
-    laws = across(under("lugre", ("failed", None)))
-    assert laws.hunts("given") is None
-    assert not laws.depends_on_law("given")
-    assert dict(laws_rows(laws))["As given: edge"] == ["not determined"]
-    wording(laws_sentences(laws)[0])
+@pytest.mark.parametrize(
+    ("verdicts", "edge"),
+    [
+        ([("hunts", 9.1), ("hunts", 10.4)], "9.10 to 10.4 Hz"),
+        ([("failed", None)], "not determined"),
+        ([("settles", None)], NOTHING),
+        ([LOST], "not determined"),
+        ([("settles", 7.0, True, False)], "7.00 to 9.33 Hz (not certain)"),
+    ],
+)
+def test_edges_of_a_law(verdicts: list[Any], edge: str) -> None:
+    assert dict(laws_rows(across(under("gms", *verdicts))))["As given: edge"] == [edge]
 
 
 @pytest.mark.parametrize("verdict", [("settles", 6.0, False), ("hunts", 6.0, False), ("failed", None)])
@@ -108,32 +136,10 @@ def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple) -
     assert laws.hunts("given") is None
     assert laws.uncertain("given") == ["gms"]
     assert laws.deciding("given") == [friction_law("gms").decided_by[""]]
-    wording(laws_sentences(laws)[0])
+    assert "Under gms that is not certain. Edge 6.00 to 6.10 Hz" in laws_sentences(laws)[0]
     assert dict(laws_rows(laws))["As given: verdict"] == ["settles", "settles", f"{verdict[0]} (not certain)"]
     document = laws_document(laws)["cases"]["given"]
     assert (document["hunts"], document["depends_on_law"], document["not_certain"]) == (None, False, ["gms"])
-
-
-def test_laws_that_certainly_disagree_do_so_beside_one_that_is_not_certain() -> None:
-    laws = across(
-        under("lugre", ("hunts", 9.7)), under("rolling", ("settles", 6.0)), under("gms", ("settles", 7.0, False))
-    )
-    assert laws.depends_on_law("given")
-    wording(laws_sentences(laws)[0])
-
-
-def test_no_law_is_certain() -> None:
-    laws = across(under("lugre", ("settles", 6.0, False)), under("gms", ("hunts", 6.0, False)))
-    assert (laws.hunts("given"), laws.depends_on_law("given")) == (None, False)
-    wording(laws_sentences(laws)[0])
-
-
-def test_a_law_that_is_certain_with_some_of_what_is_open() -> None:
-    """Measuring an open parameter may exclude the values with which the law is uncertain."""
-    laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0), ("settles", 7.1, False)))
-    assert laws.hunts("given") is None
-    assert laws.deciding("given") == [friction_law("gms").decided_by["friction.attraction"]]
-    wording(laws_sentences(laws)[0])
 
 
 def test_no_law_that_gives_one_answer() -> None:
@@ -141,42 +147,21 @@ def test_no_law_that_gives_one_answer() -> None:
     gms = under("gms", ("hunts", 9.1), ("settles", 7.0))
     (key,), trials = gms.conversion.open, gms.trials
     close = tuple(replace(trial, drawn={key: value}) for trial, value in zip(trials, (1.0, 1.0004), strict=True))
-    wording(laws_sentences(across(replace(gms, trials=close)))[0])
-
-
-def test_edges_that_were_given_up_are_not_told_as_absent() -> None:
-    lost = ("settles", None, True, True, ("other bandwidths",))
-    laws = across(under("lugre", ("settles", None)), under("gms", lost))
-    wording(laws_sentences(laws)[0])
-    assert dict(laws_rows(laws))["As given: edge"] == [NOTHING, "not determined"]
-    some = across(under("lugre", ("settles", 6.0)), under("gms", lost))
-    wording(laws_sentences(some)[0])
-    none = across(under("lugre", ("settles", None)), under("gms", ("settles", None)))
-    wording(laws_sentences(none)[0])
+    said = laws_sentences(across(replace(gms, trials=close)))[0]
+    assert "hunts with attraction 1.0000 N/s and settles with attraction 1.0004 N/s" in said
 
 
 def test_edges_as_factors_that_look_the_same_are_one_number() -> None:
     laws = across(under("lugre", ("settles", 8.0)), under("gms", ("settles", 8.001), ("settles", 8.08)))
     for trial in (trial for verdict in laws.verdicts for trial in verdict.trials):
         trial.cases["given"].judgement.margin.crossover = None
+    to_a_share = across(under("lugre", ("settles", 6.0)))
+    to_a_share.verdicts[0].trials[0].cases["given"].judgement.margin.reserve = 0.01
+    assert dict(laws_rows(to_a_share))["As given: edge"] == ["5.94 to 6.06 Hz"]
     gains = replace(laws, stage=PD)
     assert dict(laws_rows(gains))["As given: edge"] == ["at 2 times the bandwidth", "at 2 to 2.02 times the bandwidth"]
     several = replace(gains.verdicts[1], trials=gains.verdicts[1].trials[:1])
     assert "edge at 2 times the bandwidth." in laws_sentences(replace(gains, verdicts=(laws.verdicts[0], several)))[0]
-
-
-def test_an_edge_that_is_not_certain_says_so() -> None:
-    laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0, True, False)))
-    wording(laws_sentences(laws)[0])
-    assert dict(laws_rows(laws))["As given: edge"] == ["6.00 Hz", "7.00 to 9.33 Hz (not certain)"]
-    trial = laws_document(laws)["cases"]["given"]["laws"]["gms"]["trials"][0]
-    assert not trial["edge_certain"]
-
-
-def test_an_edge_that_is_known_up_to_a_share_is_a_range() -> None:
-    laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0)))
-    laws.verdicts[0].trials[0].cases["given"].judgement.margin.reserve = 0.01
-    assert dict(laws_rows(laws))["As given: edge"] == ["5.94 to 6.06 Hz", "7.00 Hz"]
 
 
 def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
@@ -199,10 +184,8 @@ def test_ends_that_only_some_machines_have_are_tried_and_laws_that_only_some_los
     machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((1.0, 1e-3), (3.0, 3.0))]
     laws = frictions_that_keep(machines)
     assert laws.lost == {"dahl": [0]}
-    least, most = (
-        laws.frictions[name]["friction.breakaway_deflection"]
-        for name in ("elasto_plastic", "elasto_plastic, most breakaway_deflection")
-    )
+    names = ("elasto_plastic", "elasto_plastic, most breakaway_deflection")
+    least, most = (laws.frictions[name]["friction.breakaway_deflection"] for name in names)
     assert most[0] == least[0]
     assert most[1] > least[1]
 
