@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shlex
-import sys
 from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
@@ -16,13 +15,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from inside import friso_inside
 from machines import Machine, drawn, moves
 from pages import Page
+from refusals import rows_of
 from snapshots import Snapshots
 from systems import posix
 
 import friso
-from friso.cli.app import main
 from friso.errors import InputError
 from friso.identification import method
 from friso.identification.estimate import Estimate
@@ -31,6 +31,7 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.stage_file import identified_stage, origins, with_unknown
 from friso.identification.stage_keys import fitting
+from friso.interface.answer import Answer
 from friso.stage.correlations import correlations_file, read_correlations
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
@@ -49,7 +50,6 @@ COUNT = 2000
 """Samples of the log that are used: the first two moves."""
 
 COLUMNS = {"time": "Time [s]", "reference": "SetPos [mm]", "position": "ActPos [mm]", "force": "Force [N]"}
-Said = tuple[int, str, str]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -76,40 +76,39 @@ def table(log: Log, count: int = COUNT, **changes: Any) -> pd.DataFrame:
     return pd.DataFrame({COLUMNS.get(role, role): value for role, value in values.items() if value is not None})
 
 
-def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> Said:
-    """Exit status, standard output and standard error of `friso identify`."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["friso", "identify", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-    shown = capsys.readouterr()
-    return int(left.value.code or 0), shown.out, shown.err
+@pytest.fixture
+def folder(tmp_path: Path, inputs: tuple[Path, Path]) -> Path:
+    """A folder with the log and the stage file."""
+    for path in inputs:
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    return tmp_path
+
+
+WITH_STAGE = ("log.csv", "--stage", "stage.toml")
 
 
 @pytest.fixture(scope="module")
 def inputs(machine: Machine, log: Log, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """The log and the stage file."""
-    folder = tmp_path_factory.mktemp("given")
+    folder = tmp_path_factory.mktemp("inputs")
     table(log).to_csv(folder / "log.csv", index=False)
     friso.save(machine.guess, folder / "stage.toml")
     return folder / "log.csv", folder / "stage.toml"
 
 
 @pytest.fixture(scope="module")
-def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+def done(inputs: tuple[Path, Path]) -> tuple[Path, dict[str, Any]]:
     """A run with --json and a prediction, its folder and its answer."""
-    out = tmp_path_factory.mktemp("done") / "out"
-    log, stage = inputs
-    arguments = ["identify", log, "--stage", stage, "--map", "force=Force", "--predict", log, "--json", "--out", out]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["friso", *map(str, arguments)])
-        answer = out.parent / "answer.json"
-        with answer.open("w") as stream:
-            patch.setattr(sys, "stdout", stream)
-            with pytest.raises(SystemExit) as left:
-                main()
-    assert not left.value.code
-    return out, json.loads(answer.read_text(), parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
+    options = ("--map", "force=Force", "--predict", "log.csv", "--json", "--out", "out")
+    answer = friso_inside(inputs[0].parent, "identify", *WITH_STAGE, *options)
+    assert answer.returncode == 0, answer.stderr
+    strict = json.loads(answer.stdout, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
+    return inputs[0].parent / "out", strict
+
+
+@pytest.fixture(scope="module")
+def without_stage(inputs: tuple[Path, Path]) -> Answer:
+    return friso.identify(inputs[0], map={"force": "Force"})
 
 
 def test_a_stage_file_may_leave_out_what_the_log_tells(
@@ -146,11 +145,12 @@ def test_a_stage_file_may_leave_out_what_the_log_tells(
 
 
 def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapshots: Snapshots) -> None:
-    out, answer = done
-    files = {Path(item) for item in answer["files"]}
+    out, answer = done[0].resolve(), done[1]
+    files = {out.parent / item for item in answer["files"]}
     assert {out / "identified.toml", out / "identify.html", correlations_file(out / "identified.toml")} <= files
     assert all(entry.stat().st_size > 0 for entry in files)
     assert {file.suffix for file in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
+    assert {one["key"] for one in answer["estimates"]} >= {"masses.cart", "friction.static", "friction.coulomb"}
     page = (out / "identify.html").read_text("utf-8")
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=.https?:", page)
     snapshots.check("identify", "page", Page(page).lines)
@@ -173,35 +173,22 @@ def test_the_stage_file_has_uncertain_keys_that_hold_the_truth(
 
 
 @pytest.mark.usefixtures("own_bandwidth")
-def test_friso_check_runs_on_what_was_identified(
-    done: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sys, "argv", ["friso", "check", str(done[0] / "identified.toml"), "--json"])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert not left.value.code
-    assert json.loads(capsys.readouterr().out)
+def test_friso_check_runs_on_what_was_identified(done: tuple[Path, dict[str, Any]]) -> None:
+    answer = friso_inside(done[0], "check", "identified.toml", "--json")
+    assert answer.returncode == 0, answer.stderr
+    assert json.loads(answer.stdout)
 
 
-def test_the_answer_has_everything(done: tuple[Path, dict[str, Any]]) -> None:
-    text = json.dumps(done[1])
-    for word in ("masses.cart", "friction.static", "friction.stribeck_velocity", "friction.coulomb", "log.csv"):
-        assert word in text, word
-
-
-def test_a_second_run_needs_no_options_again(
-    inputs: tuple[Path, Path], done: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+@pytest.mark.usefixtures("done")
+def test_a_second_run_needs_no_options_again(inputs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """The mapping beside the log is used; if it names a missing channel, it is refused by its name."""
-    kept = inputs[0].with_name("log.csv.friso.toml")
+    folder, kept = inputs[0].parent, inputs[0].with_name("log.csv.friso.toml")
     assert '"force" = "Force"' in kept.read_text()
     monkeypatch.setattr(method, "identify", _stopped)
     kept.write_text(kept.read_text().replace('"Force"', '"Kraft"'))
-    status, _, text = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
+    refused(folder, "Kraft", *WITH_STAGE, out="second")
     kept.write_text(kept.read_text().replace('"Kraft"', '"Force"'))
-    assert (status, "Kraft" in text) == (2, True)
-    assert run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")[0] == 130
+    assert friso_inside(folder, "identify", *WITH_STAGE, "--out", "second").returncode == 130
 
 
 def _stopped(*arguments: Any, **named: Any) -> None:
@@ -209,145 +196,117 @@ def _stopped(*arguments: Any, **named: Any) -> None:
 
 
 def test_one_message_holds_the_command_that_tells_all(
-    log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The log is copied and read; a refused run keeps nothing, neither options nor guesses."""
     bare = pd.DataFrame({"t": log.time[:COUNT], "x": log["position"][:COUNT] * 1e3, "u": log["force"][:COUNT]})
     bare.to_csv(tmp_path / "bare.csv", index=False)
     monkeypatch.setattr(method, "identify", _stopped)
-    first = ("bare.csv", "--unit", "u=N", "--out", "out")
-    monkeypatch.chdir(tmp_path)
-    status, _, text = run(capsys, *first)
-    assert status == 2
-    assert "--unit u=N" in text
+    first = friso_inside(tmp_path, "identify", "bare.csv", "--unit", "u=N", "--out", "out")
+    assert first.returncode == 2
     assert not (tmp_path / "out").exists()
-    command = next(line for line in text.splitlines() if "friso identify" in line).partition("friso identify")[2]
-    assert run(capsys, *shlex.split(command))[0] == 130
+    command = next(line for line in first.stderr.splitlines() if "friso identify" in line).partition("friso ")[2]
+    assert "--unit u=N" in command
+    assert friso_inside(tmp_path, *shlex.split(command)).returncode == 130
     assert [file.name for file in tmp_path.iterdir()] == ["bare.csv"]
 
 
-def test_a_kind_that_shows_nothing_is_not_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_kind_that_shows_nothing_is_not_kept(tmp_path: Path) -> None:
     """A body that hardly moves, said to go at constant speeds: the next run asks its kind anew."""
     time = np.arange(3000) * 1e-3
     table = pd.DataFrame({"t [s]": time, "x [m]": 1e-7 * np.sin(time), "u [N]": np.sin(time)})
     table.to_csv(tmp_path / "still.csv", index=False)
-    run(capsys, tmp_path / "still.csv", "--as", "constant-speed", "--out", tmp_path / "out")
+    friso_inside(tmp_path, "identify", "still.csv", "--as", "constant-speed", "--out", "out")
     assert not (tmp_path / "still.csv.friso.toml").exists()
 
 
-def test_ctrl_c_leaves_nothing(
-    inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_leaves_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(method, "identify", _stopped)
-    status, out, text = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
-    assert (status, out) == (130, "")
-    assert "interrupted" in text
-    assert not [*tmp_path.rglob("identified.toml"), *tmp_path.rglob("*.html")]
+    answer = friso_inside(folder, "identify", *WITH_STAGE, "--map", "force=Force", "--out", "out")
+    assert (answer.returncode, answer.stdout) == (130, "")
+    assert "interrupted" in answer.stderr
+    assert not [*folder.rglob("identified.toml"), *folder.rglob("*.html")]
 
 
-BAD_OPTIONS = [
-    (["--map", "position=Nowhere"], "Nowhere"),
-    (["--map", "speed=ActPos"], "one of time, reference"),
-    (["--map", "position"], "two texts separated by ="),
-    (["--as", "dance"], "one of break-away, constant-speed, frequency, hunting, moves"),
-    (["--unit", "ActPos=parrots"], "parrots"),
-    (["--scale", "force=heavy"], "heavy"),
-    (["--bandwidth", "20 kg"], "--bandwidth"),
-    (["--band", "20 Hz .. 3 Hz"], "--band"),
-    (["--period", "0 s"], "--period"),
-    (["--dt", "-1 ms"], "--dt"),
-    (["--predict", "nowhere.csv"], "nowhere.csv"),
-]
-
-
-@pytest.mark.parametrize(("options", "message"), BAD_OPTIONS, ids=lambda item: "".join(item[:2]))
-def test_options_that_do_not_fit_are_refused(
-    options: list[str], message: str, inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    log = tmp_path / "log.csv"
-    log.write_bytes(inputs[0].read_bytes())
-    refused(capsys, message, log, "--stage", inputs[1], *options, "--out", tmp_path / "out")
-
-
-def refused(capsys: pytest.CaptureFixture[str], message: str, *arguments: object) -> None:
+def refused(folder: Path, words: str, *arguments: object, out: str = "out") -> None:
     """Exit 2 with one message, and nothing written."""
-    status, out, text = run(capsys, *arguments)
-    plain = " ".join(text.split())
-    assert status == 2, plain
-    assert out == ""
-    assert message in plain
-    assert "Traceback" not in text
-    assert text.count("expected") == 1
-    places = [Path(str(argument)) for argument in arguments]
-    assert not any((place / "identified.toml").exists() for place in places if place.name == "out")
-
-
-def _bad(log: Log) -> dict[str, tuple[pd.DataFrame, str]]:
-    position, force = log["position"][:COUNT] * 1e3, log["force"][:COUNT]
-    holed = np.where(np.arange(COUNT) == 700, np.nan, force)
-    time = log.time[:COUNT].copy()
-    time[500] = time[400]
-    return {
-        "short": (table(log, 30), "at least 50 samples"),
-        "constant": (table(log, position=np.full(COUNT, 1.0)), "a constant signal"),
-        "nan": (table(log, force=holed), "force"),
-        "two candidates": (table(log, **{"ActPos2 [mm]": position * 1.01}), "position"),
-        "no units": (table(log).rename(columns={"ActPos [mm]": "ActPos"}), "ActPos"),
-        "no force": (table(log, force=None), "force"),
-        "no position": (table(log, position=None), "position"),
-        "backwards": (table(log, time=time), "time"),
-    }
+    answer = friso_inside(folder, "identify", *arguments, "--out", out)
+    assert answer.returncode == 2, answer.stderr
+    assert answer.stdout == ""
+    assert words in " ".join(answer.stderr.split())
+    assert rows_of(answer.stderr)
+    assert not (folder / out / "identified.toml").exists()
 
 
 @pytest.mark.parametrize(
-    "case", ["short", "constant", "two candidates", "no units", "no force", "no position", "backwards"]
+    ("arguments", "words"),
+    [
+        ([*WITH_STAGE, "--map", "position=Nowhere"], "Nowhere"),
+        ([*WITH_STAGE, "--map", "speed=ActPos"], "one of time, reference"),
+        ([*WITH_STAGE, "--map", "position"], "two texts separated by ="),
+        ([*WITH_STAGE, "--as", "dance"], "one of break-away, constant-speed, frequency, hunting, moves"),
+        ([*WITH_STAGE, "--unit", "ActPos=parrots"], "parrots"),
+        ([*WITH_STAGE, "--scale", "force=heavy"], "heavy"),
+        ([*WITH_STAGE, "--bandwidth", "20 kg"], "--bandwidth"),
+        ([*WITH_STAGE, "--band", "20 Hz .. 3 Hz"], "--band"),
+        ([*WITH_STAGE, "--period", "0 s"], "--period"),
+        ([*WITH_STAGE, "--dt", "-1 ms"], "--dt"),
+        ([*WITH_STAGE, "--predict", "nowhere.csv"], "nowhere.csv"),
+        (["log.csv", "--set", "friction.static=2 N"], "a stage whose keys to override"),
+        (["nowhere.csv"], "nowhere.csv"),
+        (["empty.csv"], "empty.csv"),
+    ],
 )
-def test_bad_logs_are_refused(
-    case: str, log: Log, inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    data, message = _bad(log)[case]
-    data.to_csv(tmp_path / "bad.csv", index=False)
-    refused(capsys, message, tmp_path / "bad.csv", "--stage", inputs[1], "--out", tmp_path / "out")
+def test_options_that_do_not_fit_are_refused(arguments: list[str], words: str, folder: Path) -> None:
+    (folder / "empty.csv").write_text("")
+    refused(folder, words, *arguments)
 
 
-def test_missing_and_empty_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "empty.csv").write_text("")
-    refused(capsys, "nowhere.csv", tmp_path / "nowhere.csv", "--out", tmp_path / "out")
-    refused(capsys, "empty.csv", tmp_path / "empty.csv", "--out", tmp_path / "out")
+@pytest.mark.parametrize(
+    ("count", "changes", "words"),
+    [
+        (30, {}, "at least 50 samples"),
+        (COUNT, {"position": np.full(COUNT, 1.0)}, "a constant signal"),
+        (COUNT, {"ActPos2 [mm]": np.sin(np.arange(COUNT))}, "position"),
+        (COUNT, {"position": None, "ActPos": np.sin(np.arange(COUNT))}, "ActPos"),
+        (COUNT, {"force": None}, "force"),
+        (COUNT, {"position": None}, "position"),
+        (COUNT, {"time": np.where(np.arange(COUNT) == 500, 0.8, 2e-3 * np.arange(COUNT))}, "time"),
+    ],
+    ids=["short", "constant", "two candidates", "no units", "no force", "no position", "backwards"],
+)
+def test_bad_logs_are_refused(count: int, changes: dict[str, Any], words: str, log: Log, folder: Path) -> None:
+    table(log, count, **changes).to_csv(folder / "bad.csv", index=False)
+    refused(folder, words, "bad.csv", "--stage", "stage.toml")
 
 
-def test_set_without_stage(inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = (inputs[0], "--set", "friction.static=2 N", "--out", tmp_path / "out")
-    refused(capsys, "a stage whose keys to override", *arguments)
-
-
-def test_a_foreign_stage_file_is_not_overwritten(
-    inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    own = tmp_path / "identified.toml"
-    own.write_bytes(inputs[1].read_bytes())
-    for stage, options, remedy in ((inputs[1], (), "--overwrite"), (own, ("--overwrite",), "another folder")):
-        status, out, message = run(capsys, inputs[0], "--stage", stage, "--out", tmp_path, *options)
-        assert (status, out) == (2, "")
-        assert remedy in " ".join(message.split())
-    assert own.read_bytes() == inputs[1].read_bytes()
+def test_a_foreign_stage_file_is_not_overwritten(folder: Path) -> None:
+    own, stage = folder / "identified.toml", folder / "stage.toml"
+    own.write_bytes(stage.read_bytes())
+    for name, options, remedy in (
+        ("stage.toml", (), "--overwrite"),
+        ("identified.toml", ("--overwrite",), "another folder"),
+    ):
+        answer = friso_inside(folder, "identify", "log.csv", "--stage", name, "--out", ".", *options)
+        assert (answer.returncode, answer.stdout) == (2, "")
+        assert remedy in " ".join(answer.stderr.split())
+    assert own.read_bytes() == stage.read_bytes()
 
 
 @posix
 @pytest.mark.skipif(getattr(os, "geteuid", int)() == 0, reason="nothing is kept from a superuser")
-def test_a_folder_that_cannot_be_written(
-    inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_folder_that_cannot_be_written(folder: Path) -> None:
+    folder.chmod(0o500)
+    answer = friso_inside(folder, "identify", *WITH_STAGE, "--out", ".")
+    folder.chmod(0o700)
+    assert (answer.returncode, "can be written" in answer.stderr) == (2, True)
+
+
+def test_a_placeholder_for_the_controller_is_noted_in_the_file(
+    without_stage: Answer, inputs: tuple[Path, Path]
 ) -> None:
-    tmp_path.chmod(0o500)
-    status, _, text = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path)
-    tmp_path.chmod(0o700)
-    assert (status, "can be written" in text) == (2, True)
-
-
-def test_a_placeholder_for_the_controller_is_noted_in_the_file(inputs: tuple[Path, Path]) -> None:
-    answer = friso.identify(inputs[0], map={"force": "Force"})
-    assert "[controller]" in answer.stage.note
-    assert friso.loads(answer.stage.to_toml()).note in answer.sentences()
+    assert "[controller]" in without_stage.stage.note
+    assert friso.loads(without_stage.stage.to_toml()).note in without_stage.sentences()
     assert not friso.load(inputs[1]).note
 
 
@@ -359,13 +318,15 @@ def shown_or_unknown(stage: friso.Stage) -> bool:
     return keys <= {*stage.uncertain(), *stage.unknown_keys}
 
 
-def test_values_that_the_log_does_not_show_are_listed_as_unknown(inputs: tuple[Path, Path]) -> None:
+def test_values_that_the_log_does_not_show_are_listed_as_unknown(
+    without_stage: Answer, inputs: tuple[Path, Path]
+) -> None:
     """No plain number stands in the file for what nobody knows: our choices, or estimates without ends."""
-    answer = friso.identify(inputs[0], map={"force": "Force"})
-    assert shown_or_unknown(answer.stage)
-    assert "controller" in answer.stage.unknown_keys
-    assert not {one.name for one in answer.estimates if one.determined} & {*answer.stage.unknown_keys}
-    assert friso.bode(answer.stage).sentences()[0].startswith("If ")
+    stage = without_stage.stage
+    assert shown_or_unknown(stage)
+    assert "controller" in stage.unknown_keys
+    assert not {one.name for one in without_stage.estimates if one.determined} & {*stage.unknown_keys}
+    assert friso.bode(stage).sentences()[0].startswith("If ")
     tables = {"controller": friso.load(inputs[1]).as_written()["controller"]}
     own = friso.identify(inputs[0], stage=tables, map={"force": "Force"}).stage
     assert shown_or_unknown(own)
