@@ -19,37 +19,26 @@ from friso.stage.plausible import implausible_values
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")
 LEAVES = friso.load(EXAMPLES / "thesis_leaves.toml")
+DEEP = ".".join(["a"] * 10_000)
 SPECIFICATION = EXAMPLES / "specs" / "thesis.toml"
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "expected"),
-    [
-        ("controller.anti_windup", "backcalculation", '"back_calculation"'),
-        ("name", 5, "a text"),
-        ("joint.locked", "maybe", "true or false"),
-    ],
-)
-def test_keys_that_may_be_left_out_say_what_they_take(key: str, value: object, expected: str) -> None:
-    with pytest.raises(InputError) as error:
-        loads(RIG).replace({key: value})
-    assert expected in error.value.expected
-    assert "class" not in error.value.expected + error.value.example
-
-
-def test_leaf_springs_that_no_float_holds() -> None:
-    with refused("flexure"):
-        LEAVES.replace({"flexure.length": "1e-30 m"})
-
-
-@pytest.mark.parametrize(
     ("key", "value"),
-    [("flexure.spacing", "1e200 m"), ("controller.crossover", "1e-300 Hz"), ("friction.static", "1e300 N")],
+    [
+        ("flexure.spacing", "1e200 m"),
+        ("controller.crossover", "1e-300 Hz"),
+        ("friction.static", "1e300 N"),
+        ("flexure.length", "1e-30 m"),
+        ("controller.anti_windup", "backcalculation"),
+    ],
 )
 def test_values_that_no_machine_has(key: str, value: str) -> None:
     """If squares of them overflowed, a check would end in a traceback."""
-    with refused(key):
+    with refused() as error:
         LEAVES.replace({key: value})
+    assert error.value.key in key
+    assert "class" not in error.value.expected + error.value.example
 
 
 @pytest.mark.parametrize(
@@ -60,9 +49,7 @@ def test_values_that_no_machine_has(key: str, value: str) -> None:
         RIG.replace('"1.2 kg"', f'"{"1" * 40_000} kg"'),
         f"a = {'[' * 3000}{']' * 3000}",
         f"a = {'{b = ' * 3000}1{'}' * 3000}",
-        f"{RIG}\n{'.'.join(['a'] * 10_000)} = 1",
-        f"{RIG}\n[{' . '.join(['a'] * 10_000)}]",
-        f'{RIG}\n"a"{".a" * 10_000} = 1',
+        *(f"{RIG}\n{text}" for text in (f"{DEEP} = 1", f"[{' . '.join(['a'] * 10_000)}]", f'"a"{".a" * 10_000} = 1')),
     ],
 )
 def test_what_is_too_long_or_too_deep(text: str) -> None:
@@ -70,9 +57,9 @@ def test_what_is_too_long_or_too_deep(text: str) -> None:
         loads(text)
 
 
-def test_a_value_nested_too_deeply_on_the_command_line() -> None:
-    key, value = parse_set(f"masses.cart={{{'.'.join(['a'] * 10_000)} = 1}}")
-    with pytest.raises(InputError, match=r"masses\.cart"):
+def test_a_value_nested_too_deeply() -> None:
+    key, value = parse_set(f"masses.cart={{{DEEP} = 1}}")
+    with refused("masses.cart"):
         loads(RIG).replace({key: value})
     deep: dict[str, object] = {}
     for _ in range(5000):
@@ -114,12 +101,6 @@ def test_a_specification_given_as_a_stage_is_recognised_and_the_reverse(tmp_path
     done = friso_inside(tmp_path, "design", rig, rig)
     assert done.returncode == 2
     assert "a stage file" in done.stderr
-
-
-def test_missing_keys_of_a_table_are_named_together() -> None:
-    text = RIG.replace('static = "3 N"\n', "").replace('coulomb = "1 N"\n', "").replace('viscous = "0.5 N*s/m"\n', "")
-    with pytest.raises(InputError, match=r"static[\s\S]*also missing: coulomb"):
-        loads(text)
 
 
 def test_what_is_wrong_in_several_tables_is_told_at_once() -> None:
@@ -182,12 +163,14 @@ def test_a_sample_time_beyond_all_measure_is_refused(time: str) -> None:
         ("twincat_cascade", "controller.filters.1.frequency", "300 kHz", "Hz"),
         ("twincat_cascade", "drive.delay", "125 s", "us"),
         ("thesis_drive", "drive.encoder_resolution", "1 mm", "nm"),
+        ("thesis_rig_gms", "friction.element_stiffness.3", "20.5 N/m", "N/um"),
+        ("emps_axis", "masses.cart", "12 g", "kg"),
     ],
 )
 def test_a_value_that_is_hardly_meant_is_questioned(stage: str, key: str, value: str, meant: str) -> None:
+    """In one sentence, even if it is that of the mass, by which friction and gains are judged."""
     (doubt,) = implausible_values(friso.load(EXAMPLES / f"{stage}.toml").replace({key: value}))
-    assert key in doubt
-    assert value in doubt
+    assert doubt.startswith(f"{key} = {value} ")
     assert doubt.endswith(f"was {meant} meant?")
 
 
@@ -196,13 +179,6 @@ def test_rows_of_an_array_are_no_tables() -> None:
     assert len(parsed(f"rows = [\n{rows}]\n", "a stage")["rows"]) == 1100
     with pytest.raises(InputError, match="tables"):
         parsed("".join(f'[ a . "b {k}" ] # a, b\n' for k in range(1100)), "a stage")
-
-
-def test_an_element_of_an_array_is_questioned() -> None:
-    stage = friso.load(EXAMPLES / "thesis_rig_gms.toml")
-    stiffness = ["40.4 N/mm", "30.9 N/mm", "20.5 N/m", "8.2 N/mm"]
-    (doubt,) = implausible_values(stage.replace({"friction.element_stiffness": stiffness}))
-    assert doubt.startswith("friction.element_stiffness.3 = 20.5 N/m ")
 
 
 def test_a_doubt_is_said_before_the_answer(tmp_path: Path) -> None:
@@ -215,18 +191,11 @@ def test_usual_stages_raise_no_doubts(path: Path) -> None:
     assert not [*implausible_values(friso.load(path))]
 
 
-@pytest.mark.parametrize("key", ["friction.static", "masses.cart"])
-def test_one_wrong_unit_is_questioned_in_one_sentence(key: str) -> None:
-    """The wrong unit is that of the mass, by which friction and gains are judged, or of one friction."""
-    value = {"masses.cart": "12 g"}.get(key, "40 kN")
-    (doubt,) = implausible_values(friso.load(EXAMPLES / "emps_axis.toml").replace({key: value}))
-    assert doubt.startswith(f"{key} = {value} ")
-    assert ("was kg meant?" in doubt) == (key == "masses.cart")
-
-
-def test_two_frictions_in_a_wrong_unit_are_not_blamed_on_the_mass() -> None:
-    heavy = friso.load(EXAMPLES / "emps_axis.toml").replace({"friction.static": "40 kN", "friction.coulomb": "35 kN"})
-    assert [doubt.partition(" ")[0] for doubt in implausible_values(heavy)] == ["friction.static", "friction.coulomb"]
+def test_frictions_in_a_wrong_unit_are_not_blamed_on_the_mass() -> None:
+    axis = friso.load(EXAMPLES / "emps_axis.toml")
+    for heavy in ({"friction.static": "40 kN"}, {"friction.static": "40 kN", "friction.coulomb": "35 kN"}):
+        doubts = implausible_values(axis.replace(heavy))
+        assert [doubt.partition(" ")[0] for doubt in doubts] == [*heavy]
 
 
 @pytest.mark.parametrize("empty", [(3,), (9,), (7, 8, 9), (0, 4)])

@@ -13,7 +13,7 @@ import pytest
 import friso
 from friso.errors import InputError
 from friso.platform import extras
-from friso.platform.extras import EXTRAS, need
+from friso.platform.extras import EXTRAS
 
 ROOT = Path(__file__).parents[1]
 
@@ -78,8 +78,3 @@ def test_what_needs_an_extra_says_so_before_it_computes(
         asked()
     assert refused.value.example == f'pip install "friso[{extra}]"'
     assert all(package in refused.value.actual for package in EXTRAS[extra])
-
-
-def test_where_an_extra_is_installed_nothing_is_refused() -> None:
-    for extra in EXTRAS:
-        need(extra, "friso design")

@@ -3,10 +3,9 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import refused
 
 from friso.errors import InputError
-from friso.intervals import Interval, Span
+from friso.intervals import Span
 from friso.quantities import Bound, Number, Quantity, positive
 
 FORCE = Span(Quantity("N", positive, "3 N"), "1 N .. 3 N")
@@ -81,7 +80,7 @@ def test_refused_quantities(given_text: object, said: str) -> None:
     "given_text", ["0.3 .. 1.8", "-0.1 .. 0.5", "0.8 .. 0.3", "a .. b", "0.5 N", True, None, "0.9 +/- 0.2"]
 )
 def test_refused_numbers(given_text: object) -> None:
-    with refused():
+    with pytest.raises(InputError):
         SHARE.read(given_text)
 
 
@@ -110,8 +109,3 @@ def test_tolerance(value: float, percent: float) -> None:
     result = FORCE.read(f"{value!r} N +/- {percent!r} %")
     assert result.centre == pytest.approx(value, rel=1e-12)
     assert result.high - result.low == pytest.approx(2 * value * percent / 100, rel=1e-9, abs=1e-12 * value)
-
-
-def test_interval_is_plain_data() -> None:
-    assert Interval(1.0, 3.0, "x") == Interval(1.0, 3.0, "x")
-    assert Interval(1.0, 3.0, "").centre == 2.0
