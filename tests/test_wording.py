@@ -4,13 +4,12 @@ Facts are tested elsewhere; a new wording is read once and kept by `pytest --ref
 their own tests, which keep their texts as well.
 """
 
-import ast
 from pathlib import Path
 
 import pytest
 from inside import friso_inside
 from pages import Page
-from snapshots import FOLDER, Snapshots, alike, masked, read
+from snapshots import Snapshots, alike, masked
 
 from friso.cli.command import COMMANDS
 
@@ -105,19 +104,3 @@ def test_what_is_compared() -> None:
     assert not alike("6 peaks", "7 peaks")
     assert alike("0.006 N", "0.007 N")
     assert not alike("hunts", "hunts not")
-
-
-def _keeps(arguments: str) -> bool:
-    """Whether a test keeps messages, by its arguments."""
-    return "" in arguments or "" in arguments
-
-
-def test_messages_are_those_of_tests_that_there_are() -> None:
-    """No message of a removed test is kept, and none is missing."""
-    kept = {name.partition("[")[0].partition(" ")[0] for name in read(FOLDER / "messages.txt")}
-    result = set()
-    for path in TESTS.rglob("test_*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef) and _keeps(ast.unparse(node.args)):
-                result.add(f"{path.relative_to(TESTS).as_posix()}::{node.name}")
-    assert kept == result
