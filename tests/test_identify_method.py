@@ -16,6 +16,7 @@ from friso.identification.combine import combined, correlations
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
+from friso.identification.output_error.problem import why_continuous
 from friso.identification.readings.common import record
 from friso.identification.readings.course import external
 from friso.identification.readings.friction_velocity import friction_velocity
@@ -39,11 +40,27 @@ def base() -> Stage:
 # several estimates of one key
 
 
-def test_estimates_far_beyond_their_intervals_disagree() -> None:
+def test_estimates_and_bounds_of_one_key_are_combined() -> None:
+    """Estimates far beyond their intervals disagree, as does a value beyond what another leaves possible."""
     (one,), text = combined([normal("k", "N", 1.0, 0.0102, "a"), normal("k", "N", 1.07, 0.0102, "b")])
     assert len(text) == 1
-    assert one.low == pytest.approx(0.98, abs=1e-3)
-    assert one.high == pytest.approx(1.09, abs=1e-3)
+    assert (one.low, one.high) == pytest.approx((0.98, 1.09), abs=1e-3)
+    (one,), text = combined([normal(STATIC, "N", 3.0, 0.1, "moves"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
+    assert (one.value, len(text)) == (3.0, 1)
+    (one,), text = combined([unknown(STATIC, "N", "moves", "no"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
+    assert (one.low, one.high, one.reason, text) == (5.0, np.inf, "stops", [])
+    (both,), text = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 8.0)])
+    assert (both.low, both.high, text) == (5.0, 8.0, [])
+    (hull,), text = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 4.0)])
+    assert (hull.low, hull.high, len(text)) == (2.0, np.inf, 1)
+
+
+def test_what_is_systematic_does_not_average_out() -> None:
+    """Nine readings whose intervals of 0.3 are by a third noise: the noise becomes a third, the rest stays."""
+    item = Estimate("k", "N", 5.0, 4.7, 5.3, "a", systematic=0.2)
+    (one,), _ = combined([item] * 9)
+    assert one.half_width == pytest.approx(0.2 + 0.1 / 3)
+    assert one.systematic == pytest.approx(0.2)
 
 
 @given(st.integers(0, 2**31), st.integers(3, 8))
@@ -60,14 +77,6 @@ def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -
     assert np.median(wider) == pytest.approx(1, abs=0.02)
 
 
-def test_what_is_systematic_does_not_average_out() -> None:
-    """Nine readings whose intervals of 0.3 are by a third noise: the noise becomes a third, the rest stays."""
-    item = Estimate("k", "N", 5.0, 4.7, 5.3, "a", systematic=0.2)
-    (one,), _ = combined([item] * 9)
-    assert one.half_width == pytest.approx(0.2 + 0.1 / 3)
-    assert one.systematic == pytest.approx(0.2)
-
-
 @given(st.integers(0, 2**31), st.integers(2, 6))
 @settings(max_examples=20)
 def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, count: int) -> None:
@@ -78,21 +87,6 @@ def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, co
     answers = [combined(case) for case in cases]
     assert sum(bool(text) for _, text in answers) <= 14
     assert sum(result[0].holds(5) for result, _ in answers) > 170
-
-
-def test_bounds_of_what_is_not_shown_are_kept() -> None:
-    (one,), text = combined([unknown(STATIC, "N", "moves", "no"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
-    assert (one.low, one.high, one.reason, text) == (5.0, np.inf, "stops", [])
-    (both,), text = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 8.0)])
-    assert (both.low, both.high, text) == (5.0, 8.0, [])
-    (hull,), text = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 4.0)])
-    assert (hull.low, hull.high, len(text)) == (2.0, np.inf, 1)
-
-
-def test_a_value_beyond_what_another_leaves_possible_is_told() -> None:
-    (one,), text = combined([normal(STATIC, "N", 3.0, 0.1, "moves"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
-    assert one.value == 3.0
-    assert len(text) == 1
 
 
 # how they hang together
@@ -123,8 +117,7 @@ def test_masses_shared_out_of_one_stay_so() -> None:
         [normal("masses.cart", "kg", m, 0.01 * m, "a"), normal("masses.stage", "kg", m / 2, 0.005 * m, "a")]
         for m in (2.0, 2.01)
     ]
-    every = [one for log in logs for one in log]
-    matrix = correlations(every, [(log, np.ones((2, 2))) for log in logs])[1]
+    matrix = correlations([one for log in logs for one in log], [(log, np.ones((2, 2))) for log in logs])[1]
     assert matrix == pytest.approx(np.ones((2, 2)))
 
 
@@ -157,23 +150,25 @@ def test_the_stage_is_always_written(case: str, base: Stage) -> None:
         assert draw(stage, Correlations(), 16, 1).count == 16
 
 
-def test_ranges_begin_above_zero(base: Stage) -> None:
+def test_what_the_stage_file_takes_of_ranges_and_bounds(base: Stage) -> None:
+    """Ranges begin above zero, static friction moves along with Coulomb friction, and is no less than its bound."""
     (speed,) = fitting(base, ODD["Stribeck velocity from 0"]).estimates
     assert (speed.low, speed.high) == pytest.approx((1.5e-5, 0.015))
-
-
-def test_static_friction_moves_along_with_coulomb(base: Stage) -> None:
     fit = fitting(base, ODD["Coulomb above the static friction of the stage"])
     assert dict(fit.follows) == {STATIC: COULOMB}
     assert {estimate.name: estimate.value for estimate in fit.estimates} == {COULOMB: 25.0, STATIC: 25.0}
-
-
-def test_static_friction_is_no_less_than_its_bound(base: Stage) -> None:
     stage = identified_stage(base, fitting(base, ODD["static at least"]).estimates, ["log"])
     assert stage.uncertain()[STATIC].low == 35.0
     fit = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])
     assert fit.estimates == ()
-    wording(fit.notes[0])
+    assert "at least 15 N" in fit.notes[0]
+
+
+def test_the_drive_of_a_stage_is_simulated_in_a_log_at_its_rate_alone(base: Stage) -> None:
+    sampled = base.replace({"drive.sample_time": "1 ms"}).flat()
+    assert why_continuous(sampled, 0.99998e-3) == ""
+    assert "every 1 ms, the log every 2 ms" in why_continuous(sampled, 2e-3)
+    assert why_continuous(base.flat(), 1e-3) == ""
 
 
 def steady(speeds: list[float], rng: np.random.Generator) -> Log:
