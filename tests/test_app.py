@@ -99,6 +99,12 @@ class Served:
         assert status == 200, content
         return [*parts(content)]
 
+    def keep(self, name: str, log: bytes) -> str:
+        """The name under which the server keeps a log."""
+        status, _, content = self.request("POST", f"/logs/{name}", log)
+        assert status == 200, content
+        return json.loads(content)["file"]
+
 
 def parts(content: bytes) -> Iterator[Any]:
     """The values of frames; arrays as NumPy has them."""
@@ -300,32 +306,25 @@ def test_the_port_takes_connections_before_the_browser_opens_and_is_free_again_a
     listening("127.0.0.1", port).close()
 
 
-def test_at_the_usual_port_browsers_leave_it_out() -> None:
-    access = Access.at("127.0.0.1", 80)
-    assert access.is_host("localhost")
-    assert access.is_origin("http://127.0.0.1")
+def test_which_names_are_the_server_s() -> None:
+    """Browsers leave out the usual port, and send names in small letters, whatever was typed."""
+    usual, named = Access.at("127.0.0.1", 80), Access.at("RIG-PC", 8741)
+    assert usual.is_host("localhost")
+    assert usual.is_origin("http://127.0.0.1")
     assert not Access.at("127.0.0.1", 8741).is_host("localhost")
-
-
-def test_a_name_in_capitals_is_the_same_name() -> None:
-    """Browsers send it in small letters, whatever was typed."""
-    access = Access.at("RIG-PC", 8741)
-    assert access.is_host("rig-pc:8741")
-    assert access.is_host("Rig-PC:8741")
-    assert access.is_origin("http://rig-pc:8741")
+    assert named.is_host("rig-pc:8741")
+    assert named.is_host("Rig-PC:8741")
+    assert named.is_origin("http://rig-pc:8741")
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
-def test_a_foreign_page_is_refused(served: Served, origin: str) -> None:
+def test_a_foreign_page_is_refused_and_one_of_its_own_let_in(served: Served, origin: str) -> None:
     assert served.request("POST", "/ask/machine", b"{}", Origin=origin)[0] == 403
     for site in ("cross-site", "same-site"):  # the same name with another port is the same site
-        assert served.request("GET", "/begin", Sec_Fetch_Site=site)[0] == 403
-        assert served.request("GET", "/main.js", Sec_Fetch_Site=site)[0] == 403
-
-
-def test_a_page_of_its_own_is_let_in(served: Served) -> None:
-    for origin in (f"http://127.0.0.1:{served.port}", f"http://localhost:{served.port}"):
-        assert served.request("GET", "/begin", Origin=origin)[0] == 200
+        for path in ("/begin", "/main.js"):
+            assert served.request("GET", path, Sec_Fetch_Site=site)[0] == 403
+    for name in ("127.0.0.1", "localhost"):
+        assert served.request("GET", "/begin", Origin=f"http://{name}:{served.port}")[0] == 200
 
 
 @pytest.mark.parametrize("path", ["/", "/begin", "/nothing"])
@@ -387,17 +386,20 @@ def test_options_name_no_file(served: Served) -> None:
             assert served.ask(question, RIG, {}, **options)[-1]["kind"] == "refused"
 
 
+LOG = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
+
+
 def test_logs_are_kept_under_names_of_the_server_and_no_others_are_read(served: Served) -> None:
-    log = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
-    status, _, content = served.request("POST", "/logs/..%5C..%5Cmy%20log.csv", log)
-    kept = json.loads(content)["file"]
-    assert (status, kept.partition("/")[2]) == (200, "my log.csv")
+    kept = served.keep("..%5C..%5Cmy%20log.csv", LOG)
+    assert kept.partition("/")[2] == "my log.csv"
     part = served.ask("logs", RIG, files=[kept])[-1]
     assert part["channels"] == ["time", "position"]
     assert "position" in part["roles"]
     for name in ("/etc/passwd", f"../{kept}", str(RIG), 3):
         assert served.ask("identify", RIG, files=[name])[0]["kind"] == "refused"
-    assert served.request("POST", "/logs/x.csv", log, Origin="http://evil.example")[0] == 403
+    assert served.request("POST", "/logs/x.csv", LOG, Origin="http://evil.example")[0] == 403
+    for letters in ("ä", "x"):
+        assert served.keep(quote(f"{letters * 300}.csv"), b"1").endswith(".csv")
 
 
 def test_no_mapping_of_the_user_s_has_a_say_in_what_was_dropped(
@@ -407,10 +409,11 @@ def test_no_mapping_of_the_user_s_has_a_say_in_what_was_dropped(
     for place in (tmp_path / "mine.csv.friso.toml", sidecar(tmp_path / "elsewhere" / "mine.csv", tmp_path)):
         place.write_text('not = "a mapping"', encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    log = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "mine.csv").write_bytes(LOG)
     with pytest.raises(LogError, match=r"mine\.csv\..*friso\.toml"):
-        identify_logs(tmp_path, log)
-    kept = json.loads(served.request("POST", "/logs/mine.csv", log)[2])["file"]
+        friso.identify(tmp_path / "elsewhere" / "mine.csv")
+    kept = served.keep("mine.csv", LOG)
     for question in ("logs", "identify"):
         assert "friso.toml" not in str(served.ask(question, RIG, files=[kept]))
 
@@ -437,21 +440,19 @@ def log_that_crashes(folder: Path) -> bytes:
 def test_a_hostile_log_is_refused_and_the_server_goes_on(
     served: Served, tmp_path: Path, made: Callable[[Path], bytes]
 ) -> None:
-    kept = json.loads(served.request("POST", "/logs/a.mat", made(tmp_path))[2])["file"]
+    kept = served.keep("a.mat", made(tmp_path))
     assert served.ask("logs", RIG, files=[kept])[-1]["kind"] == "refused"
     assert served.ask("machine", RIG)[-1]["kind"] != "refused"
 
 
-def identify_logs(folder: Path, log: bytes) -> None:
-    """Do what the command line does with a log in another folder."""
-    (folder / "elsewhere").mkdir()
-    (folder / "elsewhere" / "mine.csv").write_bytes(log)
-    friso.identify(folder / "elsewhere" / "mine.csv")
-
-
-def test_logs_that_come_at_the_same_time_are_both_kept() -> None:
+@pytest.fixture
+def kept() -> Iterator[uploads.Uploads]:
     kept = uploads.Uploads()
+    yield kept
+    kept.remove()
 
+
+def test_logs_that_come_at_the_same_time_are_both_kept(kept: uploads.Uploads) -> None:
     async def half(text: bytes, other: asyncio.Event, own: asyncio.Event) -> AsyncIterator[bytes]:
         own.set()
         await other.wait()
@@ -459,50 +460,41 @@ def test_logs_that_come_at_the_same_time_are_both_kept() -> None:
 
     async def both() -> list[str]:
         one, other = asyncio.Event(), asyncio.Event()
-        return await asyncio.gather(
-            kept.keep("a.csv", half(b"1", other, one)), kept.keep("a.csv", half(b"2", one, other))
-        )
+        halves = half(b"1", other, one), half(b"2", one, other)
+        return await asyncio.gather(*(kept.keep("a.csv", part) for part in halves))
 
-    try:
-        assert [kept.path(name).read_bytes() for name in asyncio.run(both())] == [b"1", b"2"]
-    finally:
-        kept.remove()
+    assert [kept.path(name).read_bytes() for name in asyncio.run(both())] == [b"1", b"2"]
 
 
 async def one_byte() -> AsyncIterator[bytes]:
     yield b"1"
 
 
-def test_a_name_means_no_other_file_to_a_later_server() -> None:
+def test_a_name_means_no_other_file_to_a_later_server(kept: uploads.Uploads) -> None:
     """A page that was left open would identify it in place of its own, or twice."""
-    first, second = uploads.Uploads(), uploads.Uploads()
-    try:
-        names = [asyncio.run(kept.keep("log.csv", one_byte())) for kept in (first, second)]
-        assert second.path(names[1]).read_bytes() == b"1"
-        with pytest.raises(InputError, match="while this server ran"):
-            second.path(names[0])
-    finally:
-        first.remove()
-        second.remove()
+    first = uploads.Uploads()
+    names = [asyncio.run(server.keep("log.csv", one_byte())) for server in (first, kept)]
+    first.remove()
+    assert kept.path(names[1]).read_bytes() == b"1"
+    with pytest.raises(InputError, match="while this server ran"):
+        kept.path(names[0])
 
 
-def test_a_log_that_is_let_go_gives_its_place_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = uploads.Uploads()
+def test_a_log_that_is_let_go_gives_its_place_to_another(
+    kept: uploads.Uploads, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(uploads, "MOST_FILES", 1)
-    try:
-        name = asyncio.run(kept.keep("a.csv", one_byte()))
-        with pytest.raises(InputError, match="Other files"):
-            asyncio.run(kept.keep("b.csv", one_byte()))
-        kept.let_go(name)
-        other = asyncio.run(kept.keep("b.csv", one_byte()))
-        assert [path.name for path in kept.folder.glob("*/*")] == ["b.csv"]
-        assert kept.path(other).is_file()
-    finally:
-        kept.remove()
+    name = asyncio.run(kept.keep("a.csv", one_byte()))
+    with pytest.raises(InputError, match="Other files"):
+        asyncio.run(kept.keep("b.csv", one_byte()))
+    kept.let_go(name)
+    other = asyncio.run(kept.keep("b.csv", one_byte()))
+    assert [path.name for path in kept.folder.glob("*/*")] == ["b.csv"]
+    assert kept.path(other).is_file()
 
 
 def test_the_page_lets_logs_go_by_their_names_alone(served: Served) -> None:
-    kept = json.loads(served.request("POST", "/logs/a%20log.csv", b"1")[2])["file"]
+    kept = served.keep("a%20log.csv", b"1")
     names = [quote(kept), quote(kept), "..%2f/a.csv", "x/y"]
     assert [served.request("DELETE", f"/logs/{name}")[0] for name in names] == [204, 404, 404, 404]
     assert served.ask("logs", RIG, files=[kept])[0]["kind"] == "refused"
@@ -522,27 +514,17 @@ def test_what_a_killed_server_left_goes_with_the_next(tmp_path: Path, monkeypatc
     assert [*tmp_path.iterdir()] == []
 
 
-@pytest.mark.parametrize("name", ["ä" * 300 + ".csv", "x" * 300 + ".csv"])
-def test_a_long_name_is_shortened(served: Served, name: str) -> None:
-    status, _, content = served.request("POST", f"/logs/{quote(name)}", b"1")
-    assert status == 200
-    assert json.loads(content)["file"].endswith(".csv")
-
-
-def test_a_disk_that_is_full_is_said_so(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_that_is_too_large_or_finds_no_room_is_refused(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     async def full(*_: object) -> str:
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    with monkeypatch.context() as patch:
+        patch.setattr(uploads, "MOST_BYTES", 100)
+        status, _, content = served.request("POST", "/logs/large.csv", 1000 * b"1")
+        assert (status, "friso identify" in json.loads(content)["text"]) == (413, True)
     monkeypatch.setattr(uploads.Uploads, "keep", full)
     status, _, content = served.request("POST", "/logs/x.csv", b"1")
     assert (status, "space" in json.loads(content)["text"]) == (507, True)
-
-
-def test_a_log_that_is_too_large_is_refused_and_not_kept(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uploads, "MOST_BYTES", 100)
-    status, _, content = served.request("POST", "/logs/large.csv", 1000 * b"1")
-    assert status == 413
-    assert "friso identify" in json.loads(content)["text"]
 
 
 @pytest.mark.parametrize("path", ["/logs/x.csv", "/ask/machine"])
@@ -568,16 +550,15 @@ def test_a_browser_that_leaves_in_the_middle_of_a_request_is_no_error(path: str)
 def test_a_machine_has_the_keys_of_its_file_with_what_they_take(served: Served) -> None:
     (part,) = served.ask("machine", RIG, {"masses.cart": "1.5 kg"})
     keys = {key["path"]: key for table in part["tables"] for key in table["keys"]}
-    assert (keys["masses.cart"]["value"], keys["masses.cart"]["si"], keys["masses.cart"]["unit"]) == (
-        "1.5 kg",
-        1.5,
-        "kg",
-    )
+    cart, alpha = keys["masses.cart"], keys["controller.alpha"]["range"]
+    assert (cart["value"], cart["si"], cart["unit"]) == ("1.5 kg", 1.5, "kg")
     assert keys["joint.locked"]["kind"] == "switch"
     assert keys["friction.model"]["options"] == ["lugre"]
     assert keys["controller.crossover"]["range"] == {"low": 0.8, "high": 80.0, "log": True}
-    assert 0 < keys["controller.alpha"]["range"]["low"] < keys["controller.alpha"]["range"]["high"] < 1
+    assert 0 < alpha["low"] < alpha["high"] < 1
     assert friso.loads(part["toml"]) == friso.load(RIG).replace({"masses.cart": "1.5 kg"})
+    added = Machine.of({"text": RIG.read_text(encoding="utf-8"), "changes": {"controller.force_limit": None}})
+    assert added.stage == friso.load(RIG)  # a key added on the page can be taken away again
 
 
 def test_the_schema_is_read_by_one_thread_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -629,12 +610,6 @@ def test_every_example_is_shown(name: str) -> None:
         assert values == written[table["name"]]
 
 
-def test_a_key_added_on_the_page_can_be_taken_away_again() -> None:
-    text = RIG.read_text(encoding="utf-8")
-    machine = Machine.of({"text": text, "changes": {"controller.force_limit": None}})
-    assert machine.stage == friso.loads(text)
-
-
 def test_a_run_is_that_of_friso(served: Served) -> None:
     """The picture comes before it is measured for its sentence."""
     part, words = (part for part in served.ask("run", STICK_SLIP) if part["kind"] != "message")
@@ -659,12 +634,6 @@ def test_the_loops_of_the_limit_cases_come_before_those_of_the_family(served: Se
     assert (words["sentences"], "figures" in words) == ([*answer.sentences()], False)
     *_, last = served.ask("loops", RIG)
     assert (last["names"], last["sentences"]) == (family["names"], [])
-
-
-def test_a_cell_of_a_map_shows_the_error_of_its_run(served: Served) -> None:
-    part = served.ask("cell", STICK_SLIP, {"masses.stage": "1.1 kg"})[-1]
-    assert part["sentences"] == [*friso.simulate(STICK_SLIP, set={"masses.stage": "1.1 kg"}).sentences()]
-    assert [trace.get("name") for trace in part["figures"][0]["data"]] == ["error"]
 
 
 def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -769,7 +738,12 @@ def test_what_is_pinned_stands_behind_what_is_alike(own: str, other: str, alike:
 
 
 def test_a_cell_of_a_map_and_the_leaf_springs_have_what_is_pinned(served: Served) -> None:
-    part = served.ask("cell", STICK_SLIP, {"masses.stage": "1.1 kg"}, pinned=True)[-1]
+    """A cell shows the error of its run."""
+    heavier = {"masses.stage": "1.1 kg"}
+    part = served.ask("cell", STICK_SLIP, heavier)[-1]
+    assert part["sentences"] == [*friso.simulate(STICK_SLIP, set=heavier).sentences()]
+    assert [trace.get("name") for trace in part["figures"][0]["data"]] == ["error"]
+    part = served.ask("cell", STICK_SLIP, heavier, pinned=True)[-1]
     assert "pinned" in [trace["name"] for trace in part["figures"][0]["data"]]
     leaves = Path(friso.example("thesis_leaves"))
     part = served.ask("flexure", leaves, {"flexure.thickness": "0.2 mm"}, pinned=True)[-1]
@@ -787,26 +761,23 @@ def test_a_report_has_page_figures_document_and_stage_file(served: Served, undra
 
 
 def test_changes_become_the_command_that_gives_the_same(served: Served) -> None:
+    """Of a machine made on the page the lines are those of the file saved there."""
     part = served.ask("run", STICK_SLIP, {"masses.stage": "1.1 kg"})[-1]
     assert part["command"] == 'friso simulate lugre_stick_slip.toml --set masses.stage="1.1 kg"'
     assert part["python"] == "friso.simulate('lugre_stick_slip.toml', set={'masses.stage': '1.1 kg'})"
-
-
-def test_of_a_machine_made_on_the_page_the_lines_are_those_of_the_file_saved_there(served: Served) -> None:
     assert served.ask("run", STICK_SLIP, {"motion.jerk": None})[-1]["of"] == "the stage file saved here"
-    text = STICK_SLIP.read_text(encoding="utf-8")
-    opened = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg"}})
+    plain = "friso check a.toml", "friso.check('a.toml')"
+    text, heavier = STICK_SLIP.read_text(encoding="utf-8"), {"masses.stage": "2 kg"}
+    machine = {"text": text, "name": "a.toml"}
+    opened = Machine.of(machine | {"changes": heavier})
     assert command_line("check", [opened.name], opened.to_set) == 'friso check a.toml --set masses.stage="2 kg"'
-    made = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg"}, "made": True})
-    without = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg", "motion.jerk": None}})
-    for machine in (made, without):
-        assert command_line("check", [machine.name], machine.to_set) == "friso check a.toml"
-        assert python_line("check", [machine.name], machine.to_set) == "friso.check('a.toml')"
+    for own in ({"changes": heavier, "made": True}, {"changes": {"motion.jerk": None}}):
+        saved = Machine.of(machine | own)
+        assert tuple(line("check", [saved.name], saved.to_set) for line in (command_line, python_line)) == plain
 
 
 def test_the_lines_of_logs_name_what_was_said_of_them(served: Served) -> None:
-    log = b"t,x\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
-    kept = json.loads(served.request("POST", "/logs/my%20log.csv", log)[2])["file"]
+    kept = served.keep("my%20log.csv", LOG.replace(b"time [s],position [m]", b"t,x"))
     part = served.ask("logs", RIG, files=[kept], map={"position": "x", "time": "t"}, dt="1 ms", assumed=True)[-1]
     assert part["command"] == 'friso logs "my log.csv" --map position=x --map time=t --dt "1 ms"'
     python = "friso.logs('my log.csv', map={'position': 'x', 'time': 't'}, dt='1 ms')"
@@ -827,15 +798,13 @@ def test_the_name_of_a_machine_is_that_of_a_file(name: str, plain: str) -> None:
     assert Machine.of({"text": "", "name": name}).name == plain
 
 
-def test_an_uncertain_value_is_shown_as_one(served: Served) -> None:
-    (part,) = served.ask("machine", STICK_SLIP, {"masses.stage": "1 kg .. 1.2 kg"})
+def test_an_uncertain_value_is_shown_as_one_and_warned_of_every_time(served: Served) -> None:
+    uncertain = {"masses.stage": "1 kg .. 1.2 kg"}
+    (part,) = served.ask("machine", STICK_SLIP, uncertain)
     key = next(key for table in part["tables"] for key in table["keys"] if key["path"] == "masses.stage")
     assert (key["plain"], key["si"], key["unit"]) == (False, pytest.approx(1.1), "kg")
-
-
-def test_warnings_go_with_the_answer_every_time(served: Served) -> None:
     for _ in range(2):
-        part = served.ask("run", STICK_SLIP, {"masses.stage": "1 kg .. 1.2 kg"})[-1]
+        part = served.ask("run", STICK_SLIP, uncertain)[-1]
         assert any("masses.stage" in note for note in part["notes"])
     assert served.ask("run", STICK_SLIP)[-1]["notes"] == []
 
@@ -927,17 +896,19 @@ def test_what_is_compiled_is_told_to_those_that_wait_for_it_and_to_nobody_else(m
     assert not any(work.notes for work in works)
 
 
+async def frames(workshop: Workshop, lane: str, number: int, job: Any, quick: bool = False) -> list[bytes]:
+    """The answer to one question."""
+    return [frame async for frame in workshop.answer("", lane, number, job, quick)]
+
+
 def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> None:
     async def asked() -> list[bytes]:
         workshop, go = Workshop(), threading.Event()
-        waiting = [
-            asyncio.create_task(anext(workshop.answer("", str(k), 0, lambda _: iter([{}][: go.wait(60)]))))
-            for k in range(20)
-        ]
+        slow = [frames(workshop, str(k), 0, lambda _: iter([{}][: go.wait(60)])) for k in range(20)]
+        waiting = [asyncio.create_task(one) for one in slow]
         try:
-            return [
-                frame async for frame in workshop.answer("", "quick", 0, lambda _: iter([{"kind": "answer"}]), True)
-            ]
+            await asyncio.sleep(0)
+            return await frames(workshop, "quick", 0, lambda _: iter([{"kind": "answer"}]), True)
         finally:
             go.set()
             await asyncio.gather(*waiting)
@@ -970,10 +941,7 @@ def test_at_the_end_answers_end_before_what_computes_notices() -> None:
             go.wait(60)
             yield {}
 
-        async def answer() -> list[bytes]:
-            return [frame async for frame in workshop.answer("", "tune", 1, job)]
-
-        answered = asyncio.create_task(answer())
+        answered = asyncio.create_task(frames(workshop, "tune", 1, job))
         try:
             while not begun.is_set():
                 await asyncio.sleep(0.001)
@@ -1048,17 +1016,14 @@ def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:
     async def asked() -> list[list[bytes]]:
         workshop, go = Workshop(), threading.Event()
 
-        async def answer(number: int) -> list[bytes]:
-            def job(work: Work) -> Iterator[dict[str, Any]]:
-                assert go.wait(60)
-                go_on()
-                yield {"kind": f"answer {number}"}
+        def job(work: Work) -> Iterator[dict[str, Any]]:
+            assert go.wait(60)
+            go_on()
+            yield {"kind": "answer"}
 
-            return [frame async for frame in workshop.answer("", "run", number, job)]
-
-        newer = asyncio.create_task(answer(2))
+        newer = asyncio.create_task(frames(workshop, "run", 2, job))
         await asyncio.sleep(0)
-        late = await answer(1)
+        late = await frames(workshop, "run", 1, job)
         go.set()
         answers = [late, await newer]
         workshop.close()
@@ -1066,7 +1031,7 @@ def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:
 
     (late,), (newer,) = asyncio.run(asked())
     assert b"overtaken" in late
-    assert b"answer 2" in newer
+    assert b"answer" in newer
 
 
 def test_what_fails_once_it_is_overtaken_is_logged_alone(
