@@ -14,7 +14,6 @@ from scipy.signal import welch
 from scipy.stats import norm
 
 from friso.equations.rail import friction_factors, gaussian_field
-from friso.errors import InputError
 from friso.stage.rig import Floor
 from friso.virtual_rig.surroundings import floor_acceleration, variance_below
 
@@ -46,21 +45,13 @@ def spectrum(*points: tuple[float, float]) -> Floor:
 def test_factors_are_positive_and_follow_one_field(
     seed: int, length: float, static: float, coulomb: float, offset: float
 ) -> None:
-    flat = rail(
-        static_deviation=static,
-        coulomb_deviation=coulomb,
-        correlation_length=length,
-        rolling_pitch=4e-3,
-        first_harmonic=0.5,
-        second_harmonic=0.3,
-        third_harmonic=0.19,
-        offset=offset,
-    )
-    factors = friction_factors(flat, np.linspace(-0.2, 0.2, 501), seed)
+    shares = {"first_harmonic": 0.5, "second_harmonic": 0.3, "third_harmonic": 0.19, "rolling_pitch": 4e-3}
+    flat = rail(static_deviation=static, coulomb_deviation=coulomb, correlation_length=length, offset=offset, **shares)
+    places = np.linspace(-0.2, 0.2, 501)
+    factors = friction_factors(flat, places, seed)
     assert factors.shape == (2, 501)
     assert factors.min() > 0
-    even = {**flat, "rail.static_deviation": 0.0, "rail.coulomb_deviation": 0.0}
-    common = friction_factors(even, np.linspace(-0.2, 0.2, 501), seed)
+    common = friction_factors({**flat, "rail.static_deviation": 0.0, "rail.coulomb_deviation": 0.0}, places, seed)
     widths = np.sqrt(np.log1p(np.array([[static], [coulomb]]) ** 2))
     first, second = (np.log(factors / common) + widths**2 / 2) / widths
     np.testing.assert_allclose(first, second, atol=1e-9)
@@ -171,12 +162,12 @@ def test_a_rail_without_variation_is_even() -> None:
     np.testing.assert_array_equal(friction_factors(rail(offset=0.25), places), np.full((2, 5), 1.25))
 
 
-def test_a_field_too_fine_for_its_rail() -> None:
-    flat = rail(static_deviation=0.1, correlation_length=1e-9)
-    with pytest.raises(
-        InputError, match=r"rail\.correlation_length\n  given:    1e-09 m\n  expected: at least 2e-08 m"
-    ):
-        friction_factors(flat, np.linspace(0, 0.1, 100))
+def test_a_field_too_fine_for_its_rail_and_a_floor_faster_than_it_is_sampled() -> None:
+    with refused("rail.correlation_length") as caught:
+        friction_factors(rail(static_deviation=0.1, correlation_length=1e-9), np.linspace(0, 0.1, 100))
+    assert caught.value.expected.startswith("at least 2e-08 m")
+    with refused("floor.frequency"):
+        floor_acceleration(spectrum((1, 1e-4), (100, 1e-4)), 1.0, 0.01, 0)
 
 
 points = st.lists(
@@ -233,8 +224,3 @@ def test_a_floor_is_sampled_from_start_to_end(seed: int, steps: int, interval: f
     assert acceleration.shape == (steps + 1,)
     np.testing.assert_array_equal(acceleration, floor_acceleration(floor, steps * interval, interval, seed))
     assert np.any(acceleration != floor_acceleration(floor, steps * interval, interval, seed + 1))
-
-
-def test_a_floor_faster_than_it_is_sampled() -> None:
-    with refused("floor.frequency"):
-        floor_acceleration(spectrum((1, 1e-4), (100, 1e-4)), 1.0, 0.01, 0)

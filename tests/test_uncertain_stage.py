@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from refusals import refused
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
+from friso.design_method.spec import SpecMachine
+from friso.errors import InputError
 from friso.interface.inputs import read_stage
 from friso.intervals import NORMAL_COVERAGE, UncertainValue
 from friso.stage import Stage, load, numeric_keys, parse_set, save
@@ -56,13 +58,10 @@ def test_centre_and_interval(rig: Stage, text: str, centre: float, low: float, h
     assert (result[1].form, result[1].text) == (form, text)
 
 
-def test_a_plain_stage_is_not_uncertain(rig: Stage) -> None:
+def test_every_numeric_key_may_be_uncertain(rig: Stage) -> None:
+    """All keys of the rig are tried, dimensionless ones as a text; a plain stage is not uncertain."""
     assert rig.uncertain() == {}
     assert uncertain(rig, coulomb="1 N +/- 0 N", static="3 N .. 3 N").uncertain() == {}
-
-
-def test_every_numeric_key_may_be_uncertain(rig: Stage) -> None:
-    """All keys of the rig are tried, dimensionless ones as a text."""
     inputs, expected = rig.as_written(), numeric_keys(rig.flat())
     keys = [key for key in expected if key.split(".")[1] in inputs.get(key.split(".")[0], {})]
     assert len(keys) == sum(isinstance(value, float) for value in rig.flat().values())
@@ -100,41 +99,28 @@ def test_value_survives_pickling_and_set(rig: Stage) -> None:
     assert stage.replace({COULOMB: "2 N"}).uncertain() == {}
 
 
-@pytest.mark.parametrize(
-    ("key", "text"),
-    [
-        (COULOMB, "2 +/- 1 N"),
-        (COULOMB, "2 N +/- 1"),
-        (COULOMB, "2 N +/- 1 mm"),
-        (COULOMB, "2 N .. 1 N"),
-        (COULOMB, "-1 N .. 2 N"),
-        (COULOMB, "-1 N +/- 2 N"),
-        (COULOMB, "2 N +/- -1 N"),
-        (COULOMB, "2 N .. 5 N"),
-        ("controller.alpha", "0.5 .. 1"),
-        ("controller.alpha", "0.5 +/- nan"),
-        ("controller.kind", "pid .. pd"),
-        ("joint.locked", "0 .. 1"),
-        ("controller.alpha", "0.1"),
-    ],
-)
-def test_refused(rig: Stage, key: str, text: str) -> None:
-    with refused() as caught:
-        rig.replace({key: text})
-    assert key in caught.value.key
+WRONG = {
+    COULOMB: ["2 +/- 1 N", "2 N +/- 1", "2 N +/- 1 mm", "2 N .. 1 N", "-1 N .. 2 N", "-1 N +/- 2 N", "2 N +/- -1 N"],
+    f"{COULOMB}, {STATIC}": ["2 N .. 5 N"],
+    "controller.alpha": ["0.5 .. 1", "0.5 +/- nan", "0.1"],
+    "controller.kind": ["pid .. pd"],
+    "joint.locked": ["0 .. 1"],
+}
 
 
-def test_a_number_of_leaves_is_certain() -> None:
+@pytest.mark.parametrize("key", WRONG)
+def test_refused(rig: Stage, key: str) -> None:
+    for text in WRONG[key]:
+        with refused(key):
+            rig.replace({key.split(", ", maxsplit=1)[0]: text})
+
+
+def test_numbers_of_leaves_and_of_specifications_are_certain() -> None:
+    """A specification states one value or an allowed range, not the uncertainty of a machine."""
     leaves = load(EXAMPLE.parent / "thesis_leaves.toml")
     for text in ("2 +/- 1", "2 .. 4"):
         with refused("flexure.leaves"):
             leaves.replace({"flexure.leaves": text})
-
-
-def test_specifications_take_no_uncertain_value() -> None:
-    """A specification states one value or an allowed range, not the uncertainty of a machine."""
-    from friso.design_method.spec import SpecMachine
-
     with refused("crossover_limit"):
         SpecMachine(crossover_limit="48 Hz +/- 5 Hz")
 
@@ -149,7 +135,6 @@ def test_single_valued_commands_say_that_centres_are_used(
     caplog.clear()
     assert line.startswith("4 ")
     assert re.findall(r"[a-z]+\.[a-z]+", line) == ["masses.cart", "friction.static", "friction.coulomb"]
-    wording(line)
     assert "friso check --draws 1000" in line
     read_stage(path, None, uncertain_too=True)
     assert caplog.messages == []
@@ -158,12 +143,15 @@ def test_single_valued_commands_say_that_centres_are_used(
 # correlations
 
 
+UNCERTAIN = {"coulomb": "1 N +/- 0.1 N", "viscous": "0.5 N*s/m +/- 0.1 N*s/m"}
+
+
 def pair(value: float, keys: tuple[str, ...] = (COULOMB, VISCOUS)) -> Correlations:
     return Correlations(keys, np.array([[1, value], [value, 1]]))
 
 
 def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
-    stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m")
+    stage = uncertain(rig, **UNCERTAIN)
     path = correlations_file(tmp_path / "identified.toml")
     assert path.name == "identified.correlations.toml"
     path.write_text(correlations_text(pair(-0.8), stage))
@@ -173,41 +161,37 @@ def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
     assert correlations.among([VISCOUS]).keys == (VISCOUS,)
     assert correlations.among([VISCOUS]).matrix.tolist() == [[1.0]]
     assert correlations.among([]).over([COULOMB]).tolist() == [[1.0]]
+    with refused("keys"):
+        correlations_text(pair(0.5), uncertain(rig, coulomb="1 N +/- 0.1 N"))
+
+
+BOTH = 'keys = ["friction.coulomb", "friction.viscous"]'
+ONE = 'keys = ["friction.coulomb"]'
+MATRICES = "[[1,0.5],[0.4,1]] [[1,1.5],[1.5,1]] [[2,0.5],[0.5,1]] [[1]] [[1,0],[1]] [] [[1,nan],[nan,1]]"
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0.5], [0.4, 1]]',
-        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 1.5], [1.5, 1]]',
-        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[2, 0.5], [0.5, 1]]',
-        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1]]',
-        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0], [1]]',
-        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = []',
-        pytest.param(f'keys = ["friction.coulomb"]\nmatrix = [[{"9" * 400}]]', id="huge"),
-        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, nan], [nan, 1]]',
+        *(f"{BOTH}\nmatrix = {matrix}" for matrix in MATRICES.split()),
+        pytest.param(f"{ONE}\nmatrix = [[{'9' * 400}]]", id="huge"),
         'keys = ["friction.coulomb", "friction.coulomb"]\nmatrix = [[1, 0], [0, 1]]',
         'keys = ["friction.static"]\nmatrix = [[1]]',
         'keys = ["friction.colomb"]\nmatrix = [[1]]',
         'keys = "friction.coulomb"\nmatrix = [[1]]',
-        'keys = ["friction.coulomb"]\nmatrix = [["1"]]',
-        'keys = ["friction.coulomb"]',
-        'keys = []\nmatrices = []',
+        f'{ONE}\nmatrix = [["1"]]',
+        ONE,
+        "keys = []\nmatrices = []",
         "keys = [",
         "",
     ],
-)  # fmt: skip
+)
 def test_correlations_refused(rig: Stage, tmp_path: Path, text: str) -> None:
     stage, path = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0 N*s/m .. 1 N*s/m"), tmp_path / "c.toml"
     path.write_text(text)
     with refused() as caught:
         read_correlations(path, stage)
     assert str(path) in str(caught.value)
-
-
-def test_correlations_of_certain_keys_are_not_written(rig: Stage) -> None:
-    with refused("keys"):
-        correlations_text(pair(0.5), uncertain(rig, coulomb="1 N +/- 0.1 N"))
 
 
 # drawing
@@ -229,7 +213,7 @@ def test_correlations_are_those_of_the_file(rig: Stage, value: float) -> None:
 
     That one is 6/pi asin(rho/2).
     """
-    stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m", static="2.9 N .. 3.1 N")
+    stage = uncertain(rig, **UNCERTAIN, static="2.9 N .. 3.1 N")
     drawn = draw(stage, pair(value), 4096, seed=2)
     assert np.corrcoef(drawn.keys[COULOMB], drawn.keys[VISCOUS])[0, 1] == pytest.approx(value, abs=0.01)
     mixed = draw(stage, pair(value, (COULOMB, STATIC)), 4096, seed=2)
@@ -266,15 +250,13 @@ def test_draws_that_break_a_rule_are_left_out_and_told(rig: Stage) -> None:
     assert count / (count + 1000) == pytest.approx(0.5 / 1.2, rel=0.05)
 
 
-def test_nothing_to_draw(rig: Stage) -> None:
-    with refused():
-        draw(rig, Correlations(), 10, seed=0)
-
-
 def test_the_controller_does_not_know_the_mass_that_was_drawn(rig: Stage) -> None:
-    light = rig.replace({"controller.tuned_mass": None, "masses.cart": "1 kg .. 2 kg"})
-    drawn = draw(light, Correlations(), 8, seed=0)
-    assert laid_over(light, drawn.keys)["controller.tuned_mass"] == 2.0
-    unknown = light.replace({"controller.tuned_mass": "1 kg .. 2 kg"})
+    """A stage without uncertain keys is refused: there is nothing to draw."""
+    with pytest.raises(InputError, match="uncertain"):
+        draw(rig, Correlations(), 10, seed=0)
+    tuned = "controller.tuned_mass"
+    light = rig.replace({tuned: None, "masses.cart": "1 kg .. 2 kg"})
+    assert laid_over(light, draw(light, Correlations(), 8, seed=0).keys)[tuned] == 2.0
+    unknown = light.replace({tuned: "1 kg .. 2 kg"})
     own = draw(unknown, Correlations(), 8, seed=0)
-    assert np.array_equal(laid_over(unknown, own.keys)["controller.tuned_mass"], own.keys["controller.tuned_mass"])
+    assert np.array_equal(laid_over(unknown, own.keys)[tuned], own.keys[tuned])
