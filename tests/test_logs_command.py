@@ -64,6 +64,9 @@ def test_what_is_open_and_the_command_for_it(bare: Path) -> None:
         assert option in command
     options = from_options(["position=x", "force=u"], ["t=s", "x=mm", "u=N"])
     assert log_content(bare, options).kind == "moves"
+    path = log_files.write_text(bare, ["q", "x [mm]", "f"], [M["time"], M["position"], M["force"]])
+    content = log_content(path, from_options(["force=f"], ["f=N"], dt="1 ms"))
+    assert next_command(content) == f'friso identify {path} --map force=f --unit f=N --dt "0.001 s"'
 
 
 def test_a_log_that_no_option_completes_has_no_command(tmp_path: Path) -> None:
@@ -95,10 +98,8 @@ def test_a_multisine_in_volts_needs_no_newtons(tmp_path: Path) -> None:
 
 
 def test_a_frequency_response(tmp_path: Path) -> None:
-    hertz = np.arange(1.0, 101.0)
-    path = log_files.write_text(
-        tmp_path / "frf.csv", ["f [Hz]", "mag [m/N]", "phase [deg]"], [hertz, hertz**-2, np.full(100, -180.0)]
-    )
+    columns = [np.arange(1.0, 101.0), np.arange(1.0, 101.0) ** -2, np.full(100, -180.0)]
+    path = log_files.write_text(tmp_path / "frf.csv", ["f [Hz]", "mag [m/N]", "phase [deg]"], columns)
     content = log_content(path, Mapping())
     assert content.kind == "frequency"
     assert content.response is not None
@@ -109,15 +110,17 @@ def test_the_command(bare: Path, tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "logs", "bare.csv", "--out", "out")
     assert done.returncode == 0
     assert "▁" in done.stdout
-    assert "--map force=u" in done.stdout
     assert {file.name for file in (tmp_path / "out").iterdir()} >= {"logs.html", "logs_1.png"}
-    page = (tmp_path / "out" / "logs.html").read_text("utf-8")
-    assert "--map force=u" in page
+    for text in (done.stdout, (tmp_path / "out" / "logs.html").read_text("utf-8")):
+        assert "--map force=u" in text
     assert not (tmp_path / "bare.csv.friso.toml").exists()
     document = json.loads(friso_inside(tmp_path, "logs", "bare.csv", "--json").stdout)
     (log,) = document["logs"]
     assert [channel["name"] for channel in log["channels"]] == ["t", "x", "u"]
     assert {gap["about"] for gap in log["open"]} == {"position", "force", "time"}
+    nothing = np.full(1200, np.nan)
+    log_files.write_text(bare, ["t", "x", "u", "load"], [M["time"], M["position"], M["force"], nothing])
+    assert "left out: column 4 (load)" in friso_inside(tmp_path, "logs", "bare.csv").stdout
 
 
 @pytest.mark.parametrize("full", [False, True])
@@ -140,19 +143,13 @@ def test_one_bad_file_does_not_hide_the_others(
 
 
 def test_the_only_channel_of_times_that_rises_is_the_clock(tmp_path: Path) -> None:
-    names = ["Sekunde [ms]", "pos [mm]", "force [N]"]
-    path = log_files.write_text(tmp_path / "a.csv", names, [1e3 * M["time"], M["position"] * 1e3, M["force"]])
-    content = log_content(path, Mapping())
-    assert content.kind == "moves"
-    assert content.channels[0].role == "time"
-    falling = [-1e3 * M["time"], M["position"] * 1e3, M["force"]]
-    assert log_content(log_files.write_text(path, names, falling), Mapping()).kind == ""
-
-
-def test_the_command_says_what_was_said(tmp_path: Path) -> None:
-    path = log_files.write_text(tmp_path / "a.csv", ["q", "x [mm]", "f"], [M["time"], M["position"], M["force"]])
-    content = log_content(path, from_options(["force=f"], ["f=N"], dt="1 ms"))
-    assert next_command(content) == f'friso identify {path} --map force=f --unit f=N --dt "0.001 s"'
+    """Or one that is known by its name, in German as well."""
+    path, values = tmp_path / "a.csv", [M["position"] * 1e3, M["force"]]
+    for name, sign, kind in (("Sekunde", 1, "moves"), ("Uhrzeit", 1, "moves"), ("Sekunde", -1, "")):
+        names = [f"{name} [ms]", "pos [mm]", "force [N]"]
+        content = log_content(log_files.write_text(path, names, [sign * 1e3 * M["time"], *values]), Mapping())
+        assert content.kind == kind
+        assert (content.channels[0].role == "time") == (sign > 0)
 
 
 def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
@@ -160,35 +157,22 @@ def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
 
     No sample time is invented.
     """
+
+    def command(names: list[str], *values: np.ndarray) -> str:
+        path = log_files.write_text(tmp_path / "a.csv", names, [*values], "," if names else " ")
+        return (next_command(log_content(path, Mapping())) or "").replace(str(path), "LOG")
+
     noise = 1e-6 * np.random.default_rng(1).standard_normal(M["time"].size)
-    count = np.arange(M["time"].size)
-    plain = [M["position"], M["position"] + noise, M["force"]]
-    path = log_files.write_text(tmp_path / "a.txt", [], [count, *plain], " ")
-    command = next_command(log_content(path, Mapping()))
-    assert all(text in command for text in ('position="column 3"', 'force="column 4"', '--dt "NUMBER ms"'))
-    path = log_files.write_text(tmp_path / "b.txt", [], [M["time"], *plain], " ")
-    assert '--map time="column 1"' in next_command(log_content(path, Mapping()))
-    names = ["t [s]", "n_soll [rpm]", "n_ist [rpm]", "M [Nm]"]
-    path = log_files.write_text(tmp_path / "c.csv", names, [M["time"], *plain])
-    assert next_command(log_content(path, Mapping())) == f"friso identify {path} --axis rotary"
+    plain, time = [M["position"], M["position"] + noise, M["force"]], M["time"]
+    counted = command([], np.arange(time.size), *plain)
+    assert all(text in counted for text in ('position="column 3"', 'force="column 4"', '--dt "NUMBER ms"'))
+    assert '--map time="column 1"' in command([], time, *plain)
+    assert (
+        command(["t [s]", "n_soll [rpm]", "n_ist [rpm]", "M [Nm]"], time, *plain) == "friso identify LOG --axis rotary"
+    )
     names = ["Time", "header.stamp.secs", "header.stamp.nsecs", "position_0", "effort_0"]
-    stamps = [1e9 + M["time"], 1e9 + np.floor(M["time"]), 1e9 * (M["time"] % 1)]
-    path = log_files.write_text(tmp_path / "d.csv", names, [*stamps, M["position"], M["force"]])
-    assert "header" not in next_command(log_content(path, Mapping()))
-
-
-def test_a_german_clock_is_known_by_its_name(tmp_path: Path) -> None:
-    names = ["Uhrzeit [ms]", "pos [mm]", "force [N]"]
-    path = log_files.write_text(tmp_path / "a.csv", names, [1e3 * M["time"], M["position"] * 1e3, M["force"]])
-    content = log_content(path, Mapping())
-    assert content.kind == "moves"
-    assert content.channels[0].role == "time"
-
-
-def test_what_of_a_file_is_not_there_is_told(tmp_path: Path) -> None:
-    nothing = np.full(1200, np.nan)
-    log_files.write_text(tmp_path / "a.csv", ["t", "x", "u", "load"], [M["time"], M["position"], M["force"], nothing])
-    assert "left out: column 4 (load)" in friso_inside(tmp_path, "logs", "a.csv").stdout
+    stamps = [1e9 + time, 1e9 + np.floor(time), 1e9 * (time % 1)]
+    assert "header" not in command(names, *stamps, M["position"], M["force"])
 
 
 def test_the_command_asks_for_the_constant_of_a_motor(tmp_path: Path) -> None:

@@ -11,9 +11,9 @@ import pytest
 from variants import cascade, lugre, release, stage
 
 import friso
-from friso.frequency.bode import CascadeLoop, CascadeLoops, cascade_loops
+from friso.frequency.bode import CascadeLoop, cascade_loops
 from friso.frequency.loops import cut_over_period, poles, response, samples_controller
-from friso.frequency.margins import Margins, margins
+from friso.frequency.margins import margins
 from friso.frequency.members import Members, limit_cases
 from friso.frequency.parts import FORCE, RATED, STAGE, plant
 from friso.frequency.system import DriveTiming, waited, zero_order_hold
@@ -77,29 +77,20 @@ def test_poles_are_those_of_the_difference_equations() -> None:
     assert ours == pytest.approx(theirs, rel=1e-7)
 
 
-@pytest.fixture(scope="module")
-def of_machine() -> Margins:
-    return margins(machine().flat(), member_of(machine()))
-
-
 @pytest.mark.parametrize("which", ["gain_margin", "gain_reduction"])
-def test_gain_margins_are_where_it_becomes_unstable(of_machine: Margins, which: str) -> None:
-    edge = getattr(of_machine, which)
+def test_gain_margins_are_where_it_becomes_unstable(which: str) -> None:
+    edge = getattr(margins(machine().flat(), member_of(machine())), which)
     assert 0 < edge < np.inf
     sizes = [np.abs(np.linalg.eigvals(by_hand(machine(), edge * factor))).max() for factor in (0.999, 1.001)]
     assert min(sizes) < 1 < max(sizes)
     assert (sizes[0] < sizes[1]) == (which == "gain_margin")
 
 
-@pytest.fixture(scope="module")
-def of_loops() -> CascadeLoops:
-    return cascade_loops(machine().flat(), member_of(machine()), np.array([10.0]))
-
-
-def test_each_loop_of_a_cascade_opened_is_on_the_edge_at_its_gain_margin(of_loops: CascadeLoops) -> None:
+def test_each_loop_of_a_cascade_opened_is_on_the_edge_at_its_gain_margin() -> None:
     """Difference equations by hand: of the velocity loop with the position loop open, whose position is a pole at 1,
     and of both where the gain of the position loop alone is raised."""
-    inner, outer = (of_loops.margins[loop].gain_margin for loop in get_args(CascadeLoop))
+    loops = cascade_loops(machine().flat(), member_of(machine()), np.array([10.0]))
+    inner, outer = (loops.margins[loop].gain_margin for loop in get_args(CascadeLoop))
     for factor, stable in ((0.999, True), (1.001, False)):
         alone = np.linalg.eigvals(by_hand(machine(), inner * factor, 0.0))
         assert (np.abs(alone[np.abs(alone - 1) > 1e-6]).max() < 1) == stable
@@ -155,7 +146,7 @@ def test_two_encoders_at_several_rates() -> None:
     assert ours == pytest.approx(theirs, rel=1e-6)
 
 
-def test_with_all_loops_at_one_rate_the_loci_are_the_loop(of_machine: Margins) -> None:
+def test_with_all_loops_at_one_rate_the_loci_are_the_loop() -> None:
     """A period of four samples of a controller that is the same at all of them, against python-control."""
     case = machine("1 ms")
     flat, omega = case.flat(), np.geomspace(1.0, 0.98 * np.pi / FAST, 60)
@@ -169,22 +160,14 @@ def test_with_all_loops_at_one_rate_the_loci_are_the_loop(of_machine: Margins) -
     assert locus == pytest.approx(-np.asarray((one * law)(np.exp(1j * omega * FAST))), rel=1e-8)
 
 
-def test_slower_loops_leave_less() -> None:
-    """A position loop at half and at a sixteenth of the rate: phase is lost."""
+def test_slower_loops_leave_less_until_they_are_refused() -> None:
+    """A position loop at half and at a sixteenth of the rate: phase is lost; slowly, it is that in continuous time."""
     phases = [margins(machine(t).flat(), member_of(machine(t))).phase_margin for t in ("2 ms", "16 ms")]
     assert phases[0] > phases[1]
-
-
-def test_a_locus_is_the_response_where_aliases_do_not_matter() -> None:
-    """Slowly, the loop is that in continuous time."""
-    case = machine()
-    omega = np.array([2.0, 5.0])
-    continuous = case.replace({"drive": None})
-    theirs = response(continuous.flat(), member_of(case), DriveTiming(0.0, 0.0))(omega)
+    case, omega = machine(), np.array([2.0, 5.0])
+    continuous = case.replace({"drive": None}).flat()
+    theirs = response(continuous, member_of(case), DriveTiming(0.0, 0.0))(omega)
     ours = response(case.flat(), member_of(case), DriveTiming.of(case.flat()))(omega)
     assert ours == pytest.approx(theirs, rel=0.05)
-
-
-def test_a_period_that_is_too_long_is_refused() -> None:
     with pytest.raises(friso.InputError, match="at most 64 samples"):
         margins(machine("200 ms").flat(), member_of(machine()))
