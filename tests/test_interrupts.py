@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
@@ -100,54 +101,33 @@ def test_a_termination_in_code_from_a_text_has_its_own_status(tmp_path: Path) ->
 _TERMINATION = "import signal; signal.raise_signal(signal.SIGTERM)"
 
 
-def test_an_import_that_is_under_way_ends_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "half_there.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhole = True\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(KeyboardInterrupt), interrupts.raising():
-        _import_and_wait()
-    assert sys.modules["half_there"].whole
+HALF_THERE = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhole = True\n"
 
 
-def _import_and_wait() -> None:
-    import_module("half_there")
-    time.sleep(10)
-
-
-def test_ctrl_c_that_came_during_an_import_waits_for_what_must_be_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "half_there_too.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    done: list[str] = []
-    with pytest.raises(KeyboardInterrupt), interrupts.raising():
-        _import_and_write(done)
-    assert done == ["whole"]
-
-
-def _import_and_write(done: list[str]) -> None:
-    import_module("half_there_too")
-    with interrupts.hold_interrupts():
-        time.sleep(0.1)
-        done.append("whole")
-    time.sleep(10)
-    done.append("not interrupted")
-
-
-def test_ctrl_c_that_came_during_an_import_is_not_too_late_for_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Which are put in place at once after it."""
-    (tmp_path / "half_there_at_last.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+@pytest.mark.parametrize("then", ["wait", "whole", "file"])
+def test_ctrl_c_during_an_import(then: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The import ends first, and what must be whole after it; files that would be put in place after it are not."""
+    (tmp_path / f"half_there_{then}.py").write_text(HALF_THERE)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(interrupts, "IMPORT_CHECK_INTERVAL", 0.3)
+    done: list[str] = []
+
+    def import_and_go_on() -> None:
+        import_module(f"half_there_{then}")
+        if then == "file":
+            write_file("FILE", tmp_path / "a.txt", "a", False)
+        elif then == "whole":
+            with interrupts.hold_interrupts():
+                time.sleep(0.1)
+                done.append("whole")
+        time.sleep(10)
+        done.append("not interrupted")
+
     with pytest.raises(KeyboardInterrupt), interrupts.raising():
-        _import_and_put_in_place(tmp_path / "a.txt")
+        import_and_go_on()
+    assert sys.modules[f"half_there_{then}"].whole
+    assert done == ["whole"] * (then == "whole")
     assert not (tmp_path / "a.txt").exists()
-
-
-def _import_and_put_in_place(path: Path) -> None:
-    import_module("half_there_at_last")
-    write_file("FILE", path, "a", False)
 
 
 STUCK = """
@@ -190,27 +170,25 @@ with interrupts.raising():
 """
 
 
+CLOSED, FULL = "os.close(2)", "end, full = os.pipe(); os.dup2(full, 2); os.write(2, bytes(2**16))"
+
+
 @pytest.mark.parametrize(
-    "way", ["import endless", "pbkdf2_hmac('sha256', b'', b'', 2 * 10**9)", "swallow()", "write()"]
+    "way",
+    ["import endless", "pbkdf2_hmac('sha256', b'', b'', 2 * 10**9)", "swallow()", "write()"]
+    + [f"{closed}; swallow()" for closed in (CLOSED, FULL)],
 )
 def test_a_command_that_cannot_be_interrupted_is_ended(tmp_path: Path, way: str) -> None:
     """A command stuck in an import, in a library or in code that swallows the exception is ended.
 
-    A file that must be written completely is finished first.
+    A file that must be written completely is finished first. Its last word may go to a terminal that is closed, or into
+    a pipe that is full.
     """
     program = [sys.executable, "-c", STUCK.replace("WAY", way)]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)
-    assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "friso: terminated\n")
+    silent = way.startswith((CLOSED, FULL))
+    assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "" if silent else "friso: terminated\n")
     assert (tmp_path / "whole").exists() == (way == "write()")
-
-
-@pytest.mark.parametrize(
-    "closed", ["os.close(2)", "end, full = os.pipe(); os.dup2(full, 2); os.write(2, bytes(2**16))"]
-)
-def test_a_command_whose_last_word_nobody_takes_is_ended(tmp_path: Path, closed: str) -> None:
-    """The command writes to a terminal that is closed, or into a pipe that is full."""
-    program = [sys.executable, "-c", STUCK.replace("    WAY", f"    {closed}; swallow()")]
-    assert subprocess.run(program, cwd=tmp_path, timeout=50).returncode == 128 + signal.SIGTERM
 
 
 def test_a_signal_that_is_ignored_is_so_where_others_wait() -> None:
@@ -262,14 +240,6 @@ class Going:
         signal.raise_signal(signal.SIGINT)
 
 
-def test_ctrl_c_while_an_object_goes_is_not_lost(capsys: pytest.CaptureFixture[str]) -> None:
-    hook = sys.unraisablehook
-    with pytest.raises(KeyboardInterrupt), interrupts.raising():
-        _let_go_and_wait()
-    assert capsys.readouterr().err == ""
-    assert sys.unraisablehook is hook
-
-
 class Cut:
     """An object whose finalizer fails on what an interrupt has left undone."""
 
@@ -277,10 +247,9 @@ class Cut:
         raise ValueError("created in a different Context")
 
 
-def test_nothing_is_said_of_what_ctrl_c_has_cut_short(capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(KeyboardInterrupt), interrupts.raising():
-        _stumble()
-    assert capfd.readouterr().err == ""
+def _let_go_and_wait() -> None:
+    Going()
+    time.sleep(10)
 
 
 def _stumble() -> None:
@@ -290,9 +259,15 @@ def _stumble() -> None:
         Cut()
 
 
-def _let_go_and_wait() -> None:
-    Going()
-    time.sleep(10)
+@pytest.mark.parametrize("work", [_let_go_and_wait, _stumble])
+def test_ctrl_c_while_an_object_goes_is_not_lost_and_nothing_is_said(
+    work: Callable[[], None], capfd: pytest.CaptureFixture[str]
+) -> None:
+    hook = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), interrupts.raising():
+        work()
+    assert capfd.readouterr().err == ""
+    assert sys.unraisablehook is hook
 
 
 class Builder:
