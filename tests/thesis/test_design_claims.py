@@ -1,36 +1,16 @@
 """The judges of the claims on the thesis's leaf springs and on its rules of design."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
-import numpy as np
 import pytest
-import xarray as xr
+from made_maps import Cells, made
 
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.judges import design_rules
-from friso_thesis.studies.thesis.studies import STUDIES
-
-POINTS = 41
 
 
-def made(name: str, hunts: Callable[[np.ndarray, np.ndarray], Any]) -> xr.Dataset:
-    """A map of the study `name` that hunts where a function of both coordinates is true."""
-    spans = STUDIES[name].spans
-    x, y = (np.linspace(span.low, span.high, POINTS) for span in spans)
-    hunting = np.broadcast_to(hunts(x[:, None], y[None, :]), (POINTS, POINTS))
-    words, dims = np.where(hunting, "swings", "rests"), tuple(span.key for span in spans)
-    return xr.Dataset(
-        {
-            name: (tuple(span.key for span in spans), values)
-            for name, values in (("keeps_moving", hunting), ("outcome", words))
-        },
-        coords=dict(zip(dims, (x, y), strict=True)),
-    )
-
-
-def judged(maps: Mapping[str, Callable[[np.ndarray, np.ndarray], Any]]) -> Finding:
-    return registered()["D1"].judge(Evidence({name: made(name, hunts) for name, hunts in maps.items()}, {}))
+def judged(maps: Mapping[str, Cells]) -> Finding:
+    return registered()["D1"].judge(Evidence({name: made(name, hunts, points=41) for name, hunts in maps.items()}, {}))
 
 
 HOLD = {
@@ -58,7 +38,7 @@ def test_rules_of_design_hold_and_differ(monkeypatch: pytest.MonkeyPatch) -> Non
 @pytest.mark.parametrize(("below", "holds"), [(14.0, True), (16.0, False)])
 def test_the_parameter_study_against_the_experiment(below: float, holds: bool) -> None:
     """F25P: 14.3 Hz of the experiment, beside the limit of Fig. 11B at 1.7 kg."""
-    system = made("system", lambda f, m: f < below)
+    system = made("system", lambda f, m: f < below, points=41)
     assert registered()["F25P"].judge(Evidence({"system": system}, {})).pattern == (holds,)
 
 

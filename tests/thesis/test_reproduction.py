@@ -3,7 +3,7 @@
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from importlib import import_module
 from importlib.resources import files
@@ -15,6 +15,7 @@ from typing import Any, cast, get_type_hints
 import numpy as np
 import pytest
 import xarray as xr
+from made_maps import Cells, made
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Page
 from patched import patched
@@ -84,7 +85,6 @@ from friso_thesis.studies.thesis.studies import STUDIES, rig_gains, thesis_rig
 from friso_thesis.studies.thesis.verdicts import not_covered, verdict
 
 ROOT = Path(__file__).parents[2]
-POINTS = 21
 
 
 def module(name: str) -> Any:
@@ -264,25 +264,6 @@ def test_free_square() -> None:
 # --- judges on made maps ----------------------------------------------------------------------------------------------
 
 
-def made(name: str, count: Callable[[np.ndarray, np.ndarray], Any], points: int = POINTS) -> xr.Dataset:
-    """A map of the study `name` whose peak counts are a function of both coordinates; negative is invalid."""
-    spans = STUDIES[name].spans
-    x, y = (np.geomspace(s.low, s.high, points) if s.log else np.linspace(s.low, s.high, points) for s in spans)
-    peaks = np.broadcast_to(np.asarray(count(x[:, None], y[None, :]), dtype=float), (points, points))
-    words = np.where(peaks < 0, "invalid", np.where(peaks > 0, "swings", "rests"))
-    dims = tuple(span.key for span in spans)
-    return by_peak_count(
-        xr.Dataset(
-            {
-                "peaks": (dims, np.where(peaks < 0, np.nan, peaks)),
-                "peak_to_peak": (dims, np.where(peaks > 0, 1e-2, 1e-6)),  # halfway in the logarithm lies 0.1 mm
-                "outcome": (dims, words),
-            },
-            coords={dims[0]: x, dims[1]: y},
-        )
-    )
-
-
 def cell(peaks: int = 6, amplitude: float = 0.5e-3, period: float = 1.6) -> Response:
     values = {"peaks": peaks, "peak_to_peak": 2 * amplitude, "period": period}
     return Response(by_peak_count(xr.Dataset({**values, "outcome": "swings" if peaks else "rests"})), xr.Dataset())
@@ -300,7 +281,7 @@ def sticks(time: float, integral: float) -> Response:
     return Response(cell().cell, xr.Dataset(variables, coords={"time": t}))
 
 
-def friction_map(inner: Callable[[np.ndarray, np.ndarray], Any]) -> Callable[[np.ndarray, np.ndarray], Any]:
+def friction_map(inner: Cells) -> Cells:
     """Invalid where the thesis's model is none, else `inner` of static and Coulomb friction."""
     return lambda s, c: np.where((c > s) | (c == 0) | (s == 0), -1, inner(s, c))
 
@@ -308,7 +289,7 @@ def friction_map(inner: Callable[[np.ndarray, np.ndarray], Any]) -> Callable[[np
 def crossover_pair(stiff: float, soft: float, name: str = "isolator-crossover") -> dict[str, xr.Dataset]:
     """Limits that fall to the given ones [Hz] up to a stroke of 0.2 mm and stay there."""
 
-    def below(limit: float) -> Callable[[np.ndarray, np.ndarray], Any]:
+    def below(limit: float) -> Cells:
         return lambda f, s: 3 * (f < np.maximum(limit, 12 - (12 - limit) * s / 2e-4))
 
     return {name: made(name, below(stiff)), f"{name}-soft": made(f"{name}-soft", below(soft))}
@@ -319,12 +300,12 @@ F15B_MAPS = "isolator-friction", "friction"
 Case = tuple[dict[str, xr.Dataset], dict[str, Response]]
 
 
-def on(name: str, count: Callable[[np.ndarray, np.ndarray], Any], **cells: Response) -> Case:
+def on(name: str, count: Cells, **cells: Response) -> Case:
     """Evidence of one map."""
     return {name: made(name, count)}, cells
 
 
-def of_friction(free: Callable[[np.ndarray, np.ndarray], Any], locked: Callable[[np.ndarray, np.ndarray], Any]) -> Case:
+def of_friction(free: Cells, locked: Cells) -> Case:
     """Evidence of both maps of friction."""
     return {name: made(name, friction_map(count)) for name, count in zip(F15B_MAPS, (free, locked), strict=True)}, {}
 
@@ -587,7 +568,7 @@ def test_limits_do_not_depend_on_the_number_of_points() -> None:
     would be off by up to half of one, 1.95 Hz at 11."""
 
     def limit(points: int) -> float:
-        runs = made("system", lambda f, m: 3 * (f < 17.3) + 0 * m, points)
+        runs = made("system", lambda f, m: 3 * (f < 17.3) + 0 * m, points=points)
         swing = 1e-4 * 10 ** ((17.3 - runs["controller.crossover"]) / 4)
         moving, size = _read(by_peak_count(runs.assign(peak_to_peak=swing + 0 * runs["peaks"])))
         return float(ends(runs["controller.crossover"].values, moving, size)[0])
@@ -620,7 +601,7 @@ def test_trends_are_judged_over_all_cells_too() -> None:
 
 def test_the_locked_limit_is_that_of_the_mass_of_the_abstract() -> None:
     """D1: 15 Hz belongs to 2.5 kg, not to the 1.7 kg weighed."""
-    runs = {"system": made("system", lambda f, m: 4 * (f < 27 - 6.9 * m), 81)}
+    runs = {"system": made("system", lambda f, m: 4 * (f < 27 - 6.9 * m), points=81)}
     limits = [design_rules.locked_limit(Evidence(runs, {}), mass) for mass in (1.7, 2.5)]
     assert limits == pytest.approx([15.3, 9.75], abs=0.5)
 
@@ -629,7 +610,7 @@ def test_paths_longer_than_the_rig_do_not_decide_alone() -> None:
     """F11A: a block at rest among the paths that fit 160 mm is reported; with as long at constant speed as
     accelerating, fewer fit."""
 
-    def part(count: Callable[[np.ndarray, np.ndarray], Any], **changes: float) -> Part:
+    def part(count: Cells, **changes: float) -> Part:
         rig = thesis_rig().replace({f"motion.{key}": value for key, value in changes.items()})
         return registered()["F11A"].judge(Evidence(*on("path", count), rig=rig)).parts[1]
 
@@ -743,7 +724,7 @@ def test_runs_read_by_what_attracts() -> None:
 
 def test_limits_of_attraction_lie_on_the_curves() -> None:
     """A limit between two cells lies on the curve between them; without a curve, it lies halfway."""
-    runs = made("system", lambda f, m: 3 * (f < 20) + 0 * m, 14)
+    runs = made("system", lambda f, m: 3 * (f < 20) + 0 * m, points=14)
     axes = tuple(runs.dims)
     crossover, mass = (runs[name].values for name in axes)
     curve = Edge("flip", np.array([18.0, 21.0]), mass[[0, -1]])
@@ -967,7 +948,7 @@ def test_fig_14b_at_both_tolerances(thorough_study: Reproduction) -> None:
     loose, tight = thorough_study.tolerances.values()
     assert thorough_study.changed[0] == pytest.approx(float((loose.keeps_moving != tight.keeps_moving).mean()))
     assert thorough_study.changed[1] == pytest.approx(float((loose["count"] != tight["count"]).mean()))
-    loose = made("isolator-damping", lambda d, s: np.where(s < 1e-4, -1, 2 * (s < 1e-3)), 5)
+    loose = made("isolator-damping", lambda d, s: np.where(s < 1e-4, -1, 2 * (s < 1e-3)), points=5)
     assert np.isnan(loose["count"]).any()
     assert _changed({1e-4: loose, 1e-8: loose.copy()}) == (0.0, 0.0)
     other = loose.assign(count=loose["count"].fillna(1.0))

@@ -1,13 +1,13 @@
 """The judges of what the thesis argues in words, on evidence made to hold and to fail."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from made_maps import Cells, made
 
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Response, by_attraction, by_peak_count, registered
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Response, by_attraction, registered
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.judges import arguments, control_law
 from friso_thesis.studies.thesis.judges.arguments import HEAVIEST, HEAVY, HIGH_ALPHA, LIGHT, LOW_ALPHA, ArguedCycle
@@ -25,24 +25,6 @@ from friso_thesis.studies.thesis.space import draw
 from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 
 Y, N = True, False
-Cells = Callable[[np.ndarray, np.ndarray], Any]
-
-
-def made(name: str, peaks: Cells, words: Cells | None = None, swing: Cells | None = None) -> xr.Dataset:
-    """Return an invented map of 21 values per axis with these peak counts.
-
-    Runs swing where peaks are counted, unless `words` or `swing` say otherwise.
-    """
-    spans = STUDIES[name].spans
-    x, y = (np.geomspace(s.low, s.high, 21) if s.log else np.linspace(s.low, s.high, 21) for s in spans)
-    grid = x[:, None] + 0 * y, 0 * x[:, None] + y
-    counts, dims = np.asarray(peaks(*grid), float), tuple(span.key for span in spans)
-    ends = counts > 0 if words is None else words(*grid)
-    swings = np.where(counts > 0, 1e-3, 1e-9) if swing is None else swing(*grid)
-    values = {"peaks": counts, "outcome": np.where(ends, "swings", "rests"), "peak_to_peak": swings}
-    return by_peak_count(
-        xr.Dataset({key: (dims, value) for key, value in values.items()}, coords=dict(zip(dims, (x, y), strict=True)))
-    )
 
 
 def judged(claim: str, maps: dict[str, xr.Dataset] | None = None, **rig: Any) -> Finding:
@@ -126,24 +108,19 @@ def test_the_swing_over_the_crossover() -> None:
 
 
 def test_counted_peaks_that_die_out_are_no_cycles() -> None:
-    def judged_by(words: Cells) -> tuple[bool, ...]:
-        return judged("S5", {"control": made("control", lambda a, b: 1 + 0 * a * b, words)}).pattern
+    """By what attracts the decided cells count, whatever their runs do at their end."""
 
-    assert judged_by(lambda a, b: a > 0) == (Y,)
-    assert judged_by(lambda a, b: a > 0.2) == (N,)
+    def runs(words: Cells) -> xr.Dataset:
+        return made("control", lambda a, b: 1 + 0 * a * b, words)
 
-
-def test_by_what_attracts_the_decided_cells_count() -> None:
-    """Whatever their runs do at their end, and without the cells of which it is not certain."""
-    runs = made("control", lambda a, b: 1 + 0 * a * b, lambda a, b: a > 1)
-    shape = runs["peaks"].shape
-    attracts = np.ones(shape, bool)
-    attracts[3:] = False
-    decided = attracts.copy()
-    assert judged("S5", {"control": by_attraction(runs, attracts, decided, np.full(shape, np.inf))}).pattern == (Y,)
-    assert judged(
-        "S5", {"control": by_attraction(runs, attracts, np.ones(shape, bool), np.full(shape, np.inf))}
-    ).pattern == (N,)
+    assert judged("S5", {"control": runs(lambda a, b: a > 0)}).pattern == (Y,)
+    assert judged("S5", {"control": runs(lambda a, b: a > 0.2)}).pattern == (N,)
+    resting = runs(lambda a, b: a > 1)
+    everywhere = np.ones(resting["peaks"].shape, bool)
+    attracts = everywhere & (np.arange(len(everywhere)) < 3)[:, None]
+    for decided, pattern in ((attracts, (Y,)), (everywhere, (N,))):
+        read = by_attraction(resting, attracts, decided, np.full(attracts.shape, np.inf))
+        assert judged("S5", {"control": read}).pattern == pattern
 
 
 def test_the_solver_is_accurate_where_it_counts_and_swings_alike() -> None:
@@ -204,14 +181,15 @@ def test_the_ranks_of_influence() -> None:
 
 def test_other_solvers() -> None:
     own = {"peaks": 6, "swing_m": 1e-3, "steps": 100, "evaluations": 1000}
-    values = {f"{joint}_{name}_{key}": value for joint in ("locked", "free") for name in ("ode23s", "ode15s", "ode45")
-              for key, value in own.items()}  # fmt: skip
-    assert judged_solvers(values | {f"{joint}_ode15s_evaluations": 2000 for joint in ("locked", "free")}).pattern == (
-        Y,
-        N,
-    )
-    assert judged_solvers(values | {"locked_ode45_peaks": 0}).pattern == (N, Y)
-    assert judged_solvers(values | {"locked_ode45_swing_m": 2e-3}).pattern == (N, Y)
+    runs = [f"{joint}_{name}" for joint in ("locked", "free") for name in ("ode23s", "ode15s", "ode45")]
+    values = {f"{run}_{key}": value for run in runs for key, value in own.items()}
+    slow = {f"{joint}_ode15s_evaluations": 2000 for joint in ("locked", "free")}
+    for changes, pattern in (
+        (slow, (Y, N)),
+        ({"locked_ode45_peaks": 0}, (N, Y)),
+        ({"locked_ode45_swing_m": 2e-3}, (N, Y)),
+    ):
+        assert judged_solvers(values | changes).pattern == pattern
 
 
 def cycle(
