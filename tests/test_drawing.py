@@ -13,6 +13,7 @@ import sys
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 from threading import Event
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -25,14 +26,7 @@ from fontTools.ttLib import TTFont
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from made_up import (
-    both_joints,
-    digests,
-    mpl_arrays,
-    plotly_arrays,
-    same,
-    small_figure,
-)
+from made_up import both_joints, digests, mpl_arrays, plotly_arrays, same, small_figure
 from pages import packed_values
 
 from friso.axis import ROTARY, speaking_of
@@ -48,11 +42,17 @@ from friso.shown.drawing.prefixes import choose, plus_minus, pretty, range_with_
 # ---------------------------------------------------------------- plain data
 
 
-def test_arrays_of_different_length_are_refused():
-    with pytest.raises(ValueError, match=r"wave: x has the shape \(3,\), y \(2,\); expected one length"):
-        Series(np.zeros(3), np.zeros(2), "wave", "#000000")
-    with pytest.raises(ValueError, match=r"z has the shape \(2, 3\), expected \(len\(y\), len\(x\)\) = \(3, 2\)"):
-        Map(np.zeros(2), np.zeros(3), np.zeros((2, 3)), "peaks", "")
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (lambda: Series(np.zeros(3), np.zeros(2), "wave", "#000"), r"\(3,\), y \(2,\); expected one length"),
+        (lambda: Map(np.zeros(2), np.zeros(3), np.zeros((2, 3)), "peaks", ""), r"\(2, 3\), expected .* = \(3, 2\)"),
+        (lambda: images.save(small_figure(), Path("figure.gif")), "got 'gif', expected one of png, svg, pdf"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(asked, message):
+    with pytest.raises(ValueError, match=message):
+        asked()
 
 
 @pytest.mark.parametrize(
@@ -80,42 +80,37 @@ def test_prefix(values, unit, factor, text):
     assert choose(np.array(values), unit) == (pytest.approx(factor), text)
 
 
-def test_prefix_of_a_logarithmic_axis_suits_its_middle():
-    assert choose(np.array([1e-9, 0.1]), "m", log=True) == (pytest.approx(1e6), "µm")
-
-
 @given(st.floats(1e-9, 999.0))
 def test_prefixed_lengths_read_between_one_and_a_thousand(value):
+    assert choose(np.array([1e-9, 0.1]), "m", log=True) == (pytest.approx(1e6), "µm")  # of its middle
     factor, _ = choose(np.array([value]), "m")
     assert 1 - 1e-8 <= value * factor < 1000 * (1 + 1e-8)
 
 
-def test_values_in_sentences():
-    assert with_unit(1.04e-3, "m") == "1.04 mm"
-    assert with_unit(0.9996e-3, "m") in ("1000 µm", "1.00 mm")
-    assert with_unit(0.0, "m") == "0 m"
-    assert with_unit(None, "s") == "–"
-    assert with_unit(float("nan"), "s") == "–"
-    assert with_unit(1234.5, "s") == "1234 s"
-    assert with_unit(1e-15, "m") == "1.00e-06 nm"
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (1.04e-3, "m", "1.04 mm"),
+        (0.0, "m", "0 m"),
+        (None, "s", "–"),
+        (float("nan"), "s", "–"),
+        (1234.5, "s", "1234 s"),
+        (1e-15, "m", "1.00e-06 nm"),
+        (0.0496, "Hz", "0.0496 Hz"),
+    ],
+)
+def test_values_in_sentences(value: float | None, unit: str, text: str):
+    assert with_unit(value, unit) == text
+
+
+def test_ranges_and_shares_in_sentences():
     assert pretty("m/s**2") == "m/s²"
-    assert with_unit(0.0496, "Hz") == "0.0496 Hz"
     assert plus_minus(0.52e-3, "m") == "±0.52 mm"
     assert plus_minus(0.345e-3, "m") == "±345 µm"
     assert range_with_unit(0.233e-3, 2.07e-3, "m") == "0.233 to 2.07 mm"
     assert range_with_unit(520.1e-6, 520.4e-6, "m") == "520 µm"
-
-
-def test_shares_in_percent_have_no_exponents():
-    """A share of all is 100 %, not 1e+02 %."""
-    assert [percent(share) for share in (1.0, 0.954, 12.3, 0.00012, 1.9e-7, float("nan"))] == [
-        "100 %",
-        "95 %",
-        "1200 %",
-        "0.012 %",
-        "0.000019 %",
-        "–",
-    ]
+    shares = {1.0: "100 %", 0.954: "95 %", 12.3: "1200 %", 0.00012: "0.012 %", 1.9e-7: "0.000019 %", np.nan: "–"}
+    assert [percent(share) for share in shares] == [*shares.values()]
 
 
 # ---------------------------------------------------------------- thinning
@@ -179,39 +174,28 @@ def test_both_renderers_draw_the_same_arrays(figure):
 
 
 def test_both_renderers_write_the_same_labels_and_ranges():
-    for figure in (small_figure(), *check_figures(both_joints())):
-        axes = [a for a in matplotlib_renderer.render(figure).axes if a.get_label() != "<colorbar>"]
-        layout = plotly_renderer.render(figure).layout
-        for number, (panel, paper) in enumerate(zip(drawable(figure).panels, axes, strict=True)):
-            suffix = number + 1 if number else ""
-            for declared, label, page in (
-                (panel.x, paper.get_xlabel(), layout[f"xaxis{suffix}"]),
-                (panel.y, paper.get_ylabel(), layout[f"yaxis{suffix}"]),
-            ):
-                assert label == page.title.text == declared.label
-            if panel.x.limits:
-                assert paper.get_xlim() == pytest.approx(layout[f"xaxis{suffix}"].range)
-
-
-def test_no_axis_of_any_figure_has_an_offset_text():
+    """No axis has an offset text."""
     far = np.linspace(0, 1, 50)
     narrow = Panel("Far", Axis("Time", "s"), Axis("Position", "m"), (Series(far, 100 + 1e-7 * far, "y", "#000000"),))
-    for figure in (Figure("far", "Far", "", (narrow,)), *check_figures(both_joints())):
-        canvas = matplotlib_renderer.render(figure)
+    for figure in (Figure("far", "Far", "", (narrow,)), small_figure(), *check_figures(both_joints())):
+        canvas, layout = matplotlib_renderer.render(figure), plotly_renderer.render(figure).layout
         canvas.draw_without_rendering()
-        for axes in canvas.axes:
-            assert axes.xaxis.get_offset_text().get_text() == axes.yaxis.get_offset_text().get_text() == ""
+        axes = [a for a in canvas.axes if a.get_label() != "<colorbar>"]
+        for number, (panel, paper) in enumerate(zip(drawable(figure).panels, axes, strict=True)):
+            x, y = (layout[f"{name}axis{number + 1 if number else ''}"] for name in "xy")
+            assert paper.get_xlabel() == x.title.text == panel.x.label
+            assert paper.get_ylabel() == y.title.text == panel.y.label
+            assert paper.xaxis.get_offset_text().get_text() == paper.yaxis.get_offset_text().get_text() == ""
+            if panel.x.limits:
+                assert paper.get_xlim() == pytest.approx(x.range)
 
 
 def test_colour_bar_and_units_of_a_map():
-    panel = drawable(small_figure()).panels[1]
+    once = drawable(small_figure())
+    panel = once.panels[1]
     assert panel.x.label == "Stiffness [kN/m]"
     assert panel.y.label == "Stroke [mm]"
     assert panel.maps[0].x[-1] == pytest.approx(4.0)
-
-
-def test_drawing_twice_changes_nothing():
-    once = drawable(small_figure())
     assert [p.x for p in drawable(once).panels] == [p.x for p in once.panels]
 
 
@@ -266,11 +250,6 @@ def test_what_is_drawn_at_the_end_is_given_up(monkeypatch):
     asked.wait()
     artists.end()
     assert len(artists.processes) == 1
-
-
-def test_unknown_format_is_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"got 'gif', expected one of png, svg, pdf"):
-        images.save(small_figure(), tmp_path / "figure.gif")
 
 
 def test_dollars_and_markup_in_names_are_text():
@@ -382,6 +361,19 @@ def places(path: str) -> np.ndarray:
     return np.array(ends)
 
 
+def with_lines(*labels: str, title: str = "", x: Axis | None = None) -> Panel:
+    """Return a panel with a line for each of these labels."""
+    lines = tuple(Series(np.arange(1.0, 3.0), np.arange(2.0), label, GREY) for label in labels)
+    return Panel(title, x or Axis("x", ""), Axis("y", ""), lines)
+
+
+def layouts(*panels: Panel, columns: int = 1, note: str = "") -> tuple[dict, dict]:
+    """Return the layout of a figure on a narrow page and on a wide one."""
+    figure = Figure("f", "", "", panels, columns=columns, note=note)
+    narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
+    return narrow, wide
+
+
 @pytest.mark.parametrize(
     ("limits", "readable"),
     [
@@ -391,12 +383,8 @@ def places(path: str) -> np.ndarray:
         ((7.0, 13.0), ["8", "10", "12"]),
     ],
 )
-def test_a_log_axis_of_less_than_two_decades_has_whole_numbers(
-    limits: tuple[float, float], readable: list[str]
-) -> None:
-    panel = Panel(
-        "", Axis("Factor", "", limits, True), Axis("y", ""), (Series(np.arange(1.0, 3.0), np.zeros(2), "", GREY),)
-    )
+def test_a_log_axis_of_less_than_two_decades_has_whole_numbers(limits, readable):
+    panel = with_lines("", x=Axis("Factor", "", limits, True))
     axis = plotly_renderer.render(Figure("f", "", "", (panel,))).layout.xaxis
     assert {*readable} <= {*axis.ticktext}
     assert len(axis.ticktext) == len(axis.tickvals)
@@ -404,26 +392,20 @@ def test_a_log_axis_of_less_than_two_decades_has_whole_numbers(
 
 def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
     """The higher what stands above the axes, the higher the figure; no line is wider than the axes."""
-    lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"a line with a long name, {k}", GREY) for k in range(4))
-    panel = Panel("A title that is too long for the width of a telephone", Axis("x", ""), Axis("y", ""), lines)
-    figure = Figure("f", "", "", (panel, panel), columns=2, note="a long note, " * 8)
-    narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
+    labels = [f"a line with a long name, {k}" for k in range(4)]
+    panel = with_lines(*labels, title="A title that is too long for the width of a telephone")
+    narrow, wide = layouts(panel, panel, columns=2, note="a long note, " * 8)
     (note,) = (text["text"].split("<br>") for text in narrow["annotations"])
     assert all(len(narrow[name]["title"]["text"].split("<br>")) > 1 for name in ("legend", "legend2"))
     assert max(map(len, note)) < plotly_renderer.NARROW_PAGE_WIDTH / 6
     assert narrow["height"] > wide["height"]
-    assert (
-        narrow["height"] - 2 * (plotly_renderer.PLOT_HEIGHT + plotly_renderer.FOOTER_HEIGHT) >= 8 * plotly_maps.KEY_ROW
-    )
+    axes = 2 * (plotly_renderer.PLOT_HEIGHT + plotly_renderer.FOOTER_HEIGHT)
+    assert narrow["height"] - axes >= 8 * plotly_maps.KEY_ROW
 
 
 def test_a_title_stands_upon_the_legend_or_upon_the_axes() -> None:
     """However many rows the legend takes: on a wide page they are fewer."""
-    lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"line {k}", GREY) for k in range(2))
-    with_legend, alone = (
-        plotly_renderer.parts(Figure("f", "", "", (Panel("A title", Axis("x", ""), Axis("y", ""), some),)))["layout"]
-        for some in (lines, lines[:1])
-    )
+    (_, with_legend), (_, alone) = (layouts(with_lines(*labels, title="A title")) for labels in ("ab", "a"))
     assert (with_legend["legend"]["title"]["text"], with_legend["annotations"]) == ("<b>A title</b>", [])
     assert [text["text"] for text in alone["annotations"]] == ["<b>A title</b>"]
     assert "legend" not in alone
@@ -432,9 +414,8 @@ def test_a_title_stands_upon_the_legend_or_upon_the_axes() -> None:
 @pytest.mark.parametrize(("columns", "lines", "orientation"), [(1, 6, "h"), (2, 2, "h"), (2, 6, "v")])
 def test_legends_beside_each_other_stay_above_their_axes(columns: int, lines: int, orientation: str) -> None:
     """Plotly breaks the rows of a legend at the width of the figure: two that are wider than their axes overlap."""
-    series = tuple(Series(np.arange(2.0), np.arange(2.0), f"tuned to {k} Hz", GREY) for k in range(lines))
-    panel = Panel("model", Axis("x", ""), Axis("y", ""), series)
-    layout = plotly_renderer.parts(Figure("f", "", "", (panel,) * columns, columns))["layout"]
+    panel = with_lines(*(f"tuned to {k} Hz" for k in range(lines)), title="model")
+    _, layout = layouts(*(panel,) * columns, columns=columns)
     assert [layout[f"legend{name}"]["orientation"] for name in ("", "2")[:columns]] == [orientation] * columns
 
 
@@ -442,14 +423,13 @@ def test_the_note_of_a_map_stands_below_all_rows_of_its_key() -> None:
     """On a narrow page four entries take two rows; without title and key, no space is kept above."""
     categories = tuple(Category(f"a category {k}", GREY) for k in range(4))
     codes = np.array([np.arange(4.0)] * 2)
-    nothing = np.full(codes.shape, np.nan)
-    field = Map(np.arange(4.0), np.arange(2.0), nothing, "", "", categories=categories, codes=codes)
-    figure = Figure("f", "", "", (Panel("", Axis("x", ""), Axis("y", ""), maps=(field,)),), note="a note")
-    narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
+    field = Map(np.arange(4.0), np.arange(2.0), codes * np.nan, "", "", categories=categories, codes=codes)
+    panel = Panel("", Axis("x", ""), Axis("y", ""), maps=(field,))
+    narrow, wide = layouts(panel, note="a note")
     rows = [-layout["annotations"][0]["yshift"] // plotly_maps.KEY_ROW for layout in (wide, narrow)]
     assert rows == [1, 2]
     assert narrow["height"] - wide["height"] == plotly_maps.KEY_ROW
-    titled = plotly_renderer.parts(replace(figure, panels=(replace(figure.panels[0], title="A title"),)))["layout"]
+    _, titled = layouts(replace(panel, title="A title"), note="a note")
     assert titled["height"] - wide["height"] == plotly_renderer.TITLE_HEIGHT
 
 
