@@ -55,23 +55,18 @@ def csv(path: Path, heads: str, *columns: np.ndarray) -> Path:
 
 
 def test_a_position_is_the_integral_of_a_velocity_alone(tmp_path: Path) -> None:
+    """Each stretch between gaps is integrated from 0."""
     log = axis()
-    path = csv(
-        tmp_path / "speed.csv", "time [s],velocity [mm/s],force [N]", log.time, 1e3 * log["velocity"], log["force"]
-    )
+    names, velocity = "time [s],velocity [mm/s],force [N]", 1e3 * log["velocity"]
+    path = csv(tmp_path / "speed.csv", names, log.time, velocity, log["force"])
     (file,) = read_all([path], Mapping(experiment="moves"), tmp_path)
     assert isinstance(file.source, Log)
     assert NOTE in file.source.warnings
     assert file.source["position"] == pytest.approx(log["position"] - log["position"][0], abs=DT**2)
     masses = [inverse_model(one, 5.0).value("mass") for one in (log, file.source)]
     assert masses[1] == pytest.approx(masses[0], rel=0.01)
-
-
-def test_each_stretch_between_gaps_is_integrated_from_0(tmp_path: Path) -> None:
-    log = axis()
     keep = np.r_[0:1000, 1500:2500]
-    path = csv(tmp_path / "gap.csv", "time [s],velocity [m/s]", log.time[keep], log["velocity"][keep])
-    read = read_log(path)
+    read = read_log(csv(tmp_path / "gap.csv", "time [s],velocity [m/s]", log.time[keep], log["velocity"][keep]))
     assert [read["position"][part.start] for part in read.segments] == [0.0, 0.0]
     assert read["position"][999] == pytest.approx(log["position"][999] - log["position"][0], abs=DT**2)
 
@@ -91,13 +86,10 @@ def test_a_velocity_is_not_integrated_beside_what_may_be_the_position(tmp_path: 
 
 
 def test_units_of_mechanics_with_volts_in_place_of_newtons() -> None:
-    log = axis()
-    volts = record("axis", DT, position=log["position"], force=log["force"] / PER_VOLT)
-    volts = Log(volts.name, volts.time, DT, volts.signals, volts.segments, {"force": "V"})
-    assert [unit_of(unit, volts) for unit in ("kg", "N*s/m", "N", "N/m", "m/s", "")] == [
-        "V*s^2/m", "V*s/m", "V", "V/m", "m/s", "",
-    ]  # fmt: skip
-    assert unit_of("kg", log) == "kg"
+    volts = replace(axis(), units={"force": "V"})
+    units = {"kg": "V*s^2/m", "N*s/m": "V*s/m", "N": "V", "N/m": "V/m", "m/s": "m/s", "": ""}
+    assert {unit: unit_of(unit, volts) for unit in units} == units
+    assert unit_of("kg", axis()) == "kg"
 
 
 @pytest.fixture(scope="module")
@@ -136,21 +128,17 @@ def test_what_needs_newtons_is_not_written_and_says_so(volts: tuple[Path, Identi
     assert "mass_v_s2_per_m" in document["experiments"][0]["inverse_model"]
 
 
-def test_a_stage_file_in_newtons_needs_a_scale(volts: tuple[Path, Identification]) -> None:
+def test_newtons_of_a_stage_and_moves_too_quick_for_one_are_refused(volts: tuple[Path, Identification]) -> None:
+    """A log in volts needs a scale for a stage file; and milliseconds were taken for seconds."""
     (experiment,) = volts[1].experiments
     with refused("force"):
         identify([(experiment.logs[0], "moves")], friso.load("examples/emps_axis.toml"))
+    log = axis()
+    with refused("position"):
+        identify([(record("hasty", 1e-3 * DT, position=log["position"], force=log["force"]), "moves")])
 
 
 # --- a time in another unit -------------------------------------------------------------------------------------------
-
-
-def test_moves_that_end_before_a_stage_can_follow_them_are_refused() -> None:
-    """Milliseconds taken for seconds."""
-    log = axis()
-    hasty = record("hasty", 1e-3 * DT, position=log["position"], force=log["force"])
-    with refused("position"):
-        identify([(hasty, "moves")])
 
 
 # --- what following the log costs -------------------------------------------------------------------------------------

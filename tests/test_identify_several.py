@@ -10,7 +10,6 @@ from refusals import refused
 from test_identify_experiments import DT, FLAT, LUGRE, ramps, travels
 
 import friso
-from friso.errors import InputError
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.kind import as_set_up
 from friso.identification.kinds import KINDS
@@ -28,8 +27,13 @@ def piece(log: Log, part: slice, name: str) -> Log:
     return record(name, log.sample_time, **signals)
 
 
-def test_ramps_of_one_break_away_each_are_one_experiment() -> None:
-    whole = ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3))
+@pytest.fixture(scope="module")
+def whole() -> Log:
+    return ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3))
+
+
+def test_ramps_of_one_break_away_each_are_one_experiment(whole: Log) -> None:
+    """A log that says enough alone stays alone."""
     single = [piece(whole, part, f"ramp {i}") for i, part in enumerate(whole.segments)]
     assert not any(static_from_ramps(log).static.determined for log in single)
     result = identify([(log, "break-away") for log in single])
@@ -38,12 +42,17 @@ def test_ramps_of_one_break_away_each_are_one_experiment() -> None:
     assert len(experiment.result.ramps.times) == 4
     assert estimate.value == pytest.approx(static_from_ramps(whole).static.value, rel=1e-3)
     assert estimate.holds(LUGRE[0])
+    assert [len(group) for group in KINDS["break-away"].groups([whole, whole, single[0]])] == [1, 1, 1]
 
 
-def test_a_log_that_says_enough_alone_stays_alone() -> None:
-    logs = [ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(seed)) for seed in (1, 2)]
-    single = piece(logs[0], logs[0].segments[0], "single")
-    assert [len(group) for group in KINDS["break-away"].groups([*logs, single])] == [1, 1, 1]
+def claims(kind: str, *courses: Course) -> bool:
+    """Whether logs are of a kind: one by itself, or several together."""
+    alone, together = KINDS[kind].claimed, KINDS[kind].claims_together
+    assert alone is not None
+    if len(courses) == 1:
+        return bool(alone(courses[0]))
+    assert together is not None
+    return bool(together([*courses]))
 
 
 def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
@@ -54,49 +63,36 @@ def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
         log = travels([*speeds], FLAT, np.random.default_rng(1))
         return Course(replace(log, signals={role: log[role] for role in ("position", "force")}))
 
-    courses = [course(speed) for speed in speeds]
-    alone, together = KINDS["constant-speed"].claimed, KINDS["constant-speed"].claims_together
-    moves = KINDS["moves"].claimed
-    assert alone is not None
-    assert together is not None
-    assert moves is not None
-    assert together(courses)
-    assert together([Course(replace(one.log, units={"force": "A"})) for one in courses])
-    assert not together(courses[:2])
-    assert not alone(courses[0])
-    assert moves(courses[0])
-    several = course(*speeds)
-    assert alone(several)
-    assert not moves(several)
+    courses, several = [course(speed) for speed in speeds], course(*speeds)
+    assert claims("constant-speed", *courses)
+    assert claims("constant-speed", *(Course(replace(one.log, units={"force": "A"})) for one in courses))
+    assert not claims("constant-speed", *courses[:2])
+    assert (claims("constant-speed", courses[0]), claims("moves", courses[0])) == (False, True)
+    assert (claims("constant-speed", several), claims("moves", several)) == (True, False)
 
 
 def test_runs_that_stick_and_slip_are_of_the_same_experiment_and_moves_are_not() -> None:
     time, random = DT * np.arange(4000), np.random.default_rng(1)
-    speeds = (0.02, 0.05, 0.1)
 
     def course(position: np.ndarray) -> Course:
         force = 2 + 1e-3 * random.standard_normal(time.size)
         return Course(record("run", DT, position=position + 1e-8 * random.standard_normal(time.size), force=force))
 
-    steady = [course(speed * time) for speed in speeds]
-    together = KINDS["constant-speed"].claims_together
+    steady, together = [course(speed * time) for speed in (0.02, 0.05, 0.1)], KINDS["constant-speed"].claims_together
+    slipping = 1e-3 * np.floor(time / 0.4)
+    assert claims("constant-speed", *steady)
+    assert claims("constant-speed", *steady, course(slipping + 1e-3 * np.clip(time % 0.4 / 0.05, 0, 1)))
+    assert not claims("constant-speed", *steady, course(0.05 * np.sin(2 * np.pi * time)))
     assert together is not None
-    assert together(steady)
-    assert together([*steady, course(1e-3 * np.floor(time / 0.4) + 1e-3 * np.clip(time % 0.4 / 0.05, 0, 1))])
-    assert not together([*steady, course(0.05 * np.sin(2 * np.pi * time))])
-    assert not together([course(1e-3 * np.floor(time / 0.4))])
+    assert not together([course(slipping)])
 
 
 def test_a_body_within_its_bristles_goes_at_no_constant_speed() -> None:
     """A force that rises and falls moves it as a spring does, at constant speeds."""
-    time = DT * np.arange(12000)
-    random = np.random.default_rng(1)
+    time, random = DT * np.arange(12000), np.random.default_rng(1)
     force = np.concatenate([size * np.abs(4 * (time[:4000] / 2 % 1) - 2) - size for size in (1.0, 2.0, 3.0)])
-    position = force / 1e6 + 1e-9 * random.standard_normal(time.size)
-    log = record("loops", DT, position=position, force=force)
-    claims = KINDS["constant-speed"].claimed
-    assert claims is not None
-    assert claims(Course(log)) is None
+    log = record("loops", DT, position=force / 1e6 + 1e-9 * random.standard_normal(time.size), force=force)
+    assert not claims("constant-speed", Course(log))
     assert not friction_velocity(log).both.coulomb.determined
 
 
@@ -115,18 +111,13 @@ def test_logs_of_one_speed_each_are_one_curve_of_friction() -> None:
     assert curve.both.viscous.holds(4.0)
 
 
-def test_logs_that_are_not_alike_are_not_joined() -> None:
-    """Logs with another sample time or from another setup of the stage stay apart."""
-    whole = ramps(LUGRE, [1.0, 1.0, 1.0], 1.0, np.random.default_rng(3))
-    one, two, three = (piece(whole, part, f"{i}") for i, part in enumerate(whole.segments))
-    other = replace(three, setup={"joint.stroke": "8 mm"})
-    groups = KINDS["break-away"].groups([one, two, other])
+def test_logs_that_are_not_alike_are_not_joined(whole: Log) -> None:
+    """Logs with another sample time or from another setup of the stage stay apart; others join with gaps."""
+    one, two, three = (piece(whole, part, f"{i}") for i, part in enumerate(whole.segments[:3]))
+    groups = KINDS["break-away"].groups([one, two, replace(three, setup={"joint.stroke": "8 mm"})])
     assert [group[0].name for group in groups] == ["0, 1", "2"]
     slow = replace(two, sample_time=2 * DT, time=2 * two.time)
     assert len(KINDS["break-away"].groups([one, slow])) == 2
-
-
-def test_a_joined_log_has_a_gap_between_its_parts() -> None:
     log = record("a", 0.1, position=np.arange(5.0))
     both = join_logs([log, replace(log, name="b")])
     assert both.segments == (slice(0, 5), slice(5, 10))
@@ -160,13 +151,8 @@ def test_a_controller_of_its_own(axis: Stage) -> None:
     gain = as_set_up(axis, replace(log, setup={"controller.kp": "1e6 N*s/m"}))
     assert gain["controller.kp"] == 1e6
     assert gain["controller.kv"] == axis.flat()["controller.kv"]
-    form = {
-        "controller.kind": "pid",
-        "controller.crossover": "20 Hz",
-        "controller.alpha": "0.1",
-        "controller.beta": "2",
-    }
-    other = as_set_up(axis, replace(log, setup=form))
+    keys = {"kind": "pid", "crossover": "20 Hz", "alpha": "0.1", "beta": "2"}
+    other = as_set_up(axis, replace(log, setup={f"controller.{key}": text for key, text in keys.items()}))
     assert other["controller.crossover"] == 20
     assert "controller.kp" not in other
     with refused("controller.kpp"):
@@ -178,13 +164,13 @@ def test_predictions_that_cannot_be_made_are_refused_before_the_fit(axis: Stage)
     bare, moved = record("bare", 1e-3, **signals), record("moved", 1e-3, reference=np.arange(100.0), **signals)
     check_predictions([(moved, "moves")], [moved], axis)
     check_predictions([(bare, "moves"), (moved, "moves")], [moved], axis)
-    with refused("--predict"):
-        check_predictions([(moved, "moves")], [moved], None)
-    with refused("reference"):
-        check_predictions([(moved, "moves")], [bare], axis)
-    with refused("--predict"):
-        check_predictions([(bare, "moves")], [moved], axis)
-    with refused("--predict"):
-        check_predictions([(moved, "break-away")], [moved], axis)
-    with pytest.raises(InputError, match="kpp"):
-        check_predictions([(moved, "moves")], [replace(moved, setup={"controller.kpp": "1 N/m"})], axis)
+    wrong = replace(moved, setup={"controller.kpp": "1 N/m"})
+    for logs, predicted, stage, key in (
+        ([(moved, "moves")], moved, None, "--predict"),
+        ([(moved, "moves")], bare, axis, "reference"),
+        ([(bare, "moves")], moved, axis, "--predict"),
+        ([(moved, "break-away")], moved, axis, "--predict"),
+        ([(moved, "moves")], wrong, axis, "controller.kpp"),
+    ):
+        with refused(key):
+            check_predictions(logs, [predicted], stage)
