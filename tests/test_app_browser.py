@@ -612,16 +612,6 @@ def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_th
     assert float(page.input_value(FIELD).split()[0]) > 15
 
 
-def test_places_on_a_map_are_seen_in_the_dark(browsed: Browsed) -> None:
-    page = browsed.page
-    page.click("#tab-map")
-    page.wait_for_function("() => document.querySelector('.plot')?.data?.some((one) => one.z?.length === 41)")
-    page.emulate_media(color_scheme="dark")
-    marker = "document.querySelector('.plot').data.find((one) => one.name === 'this machine').marker"
-    page.wait_for_function("() => document.querySelector('.plot').layout.font.color !== '#222222'")
-    assert page.evaluate(f"[{marker}.color, {marker}.line.color]") == [INK, "white"]
-
-
 def test_an_answer_that_comes_once_another_machine_is_shown_is_not_taken_for_it(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/machine", lambda route: route.continue_() if held else held.append(route))
@@ -1037,18 +1027,6 @@ def test_what_takes_too_long_is_overtaken_without_being_asked_again(browsed: Bro
         }"""
     )
     assert sentence == friso.simulate(RIG, set={"controller.crossover": "11 Hz"}).sentences()[0]
-
-
-@pytest.mark.parametrize("width", [400, 900, 1600])
-def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
-    """Pictures neither: they are drawn anew some time after the page has another width."""
-    browsed.page.set_viewport_size({"width": width, "height": 900})
-    browsed.page.wait_for_function(
-        """width => document.documentElement.scrollWidth <= width
-        && [...document.querySelectorAll('.plot .main-svg')].every((one) =>
-            one.getBoundingClientRect().right <= document.getElementById('right').getBoundingClientRect().right + 1)""",
-        arg=width,
-    )
 
 
 def long_report() -> str:

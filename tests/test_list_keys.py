@@ -61,31 +61,27 @@ def test_the_whole_array_or_one_element_is_set(three: Stage) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "parts"),
+    ("changes", "key", "words"),
     [
-        ({STIFFNESS: "40 N/um"}, [STIFFNESS, '"40 N/um" (not an array)', "an array of 1 to 12", '["40 N/um", "30']),
-        ({STIFFNESS: []}, ["(of 0)", "an array of 1 to 12"]),
-        ({STIFFNESS: ["1 N/um"] * 13}, ["(of 13)", "an array of 1 to 12"]),
-        ({STIFFNESS: ["1 N/um", 2, "3 N/um"]}, [f"{STIFFNESS}.2", "a bare number", "convertible to N/m"]),
-        ({STIFFNESS: ["1 N/um", "2 N/um", "3 um"]}, [f"{STIFFNESS}.3", "um is not convertible to N/m"]),
-        ({f"{STIFFNESS}.2": "-1 N/um"}, [f"{STIFFNESS}.2", '"-1 N/um"', "greater than 0"]),
-        ({f"{STIFFNESS}.2": "1 N/um .. -1 N/um"}, [f"{STIFFNESS}.2", "LOW .. HIGH"]),
-        ({f"{STIFFNESS}.4": "1 N/um"}, [f"{STIFFNESS}.4", "1 to 3"]),
-        ({f"{STIFFNESS}.0": "1 N/um"}, [f"{STIFFNESS}.0", "1 to 3"]),
-        ({f"{STIFFNESS}.first": "1 N/um"}, [f"{STIFFNESS}.first", "1 to 3"]),
-        ({f"{STIFFNESS}.2": None}, [f"{STIFFNESS}.2"]),
-        (
-            {STIFFNESS: ["1 N/um", "2 N/um"]},
-            [STIFFNESS, 'element_stiffness = ["1 N/um", "2 N/um"]', "one strength for"],
-        ),
-        ({STIFFNESS: [["1 N/um"], "2 N/um", "1 N/um"]}, [f"{STIFFNESS}.1", "an array"]),
-        ({"friction.viscous": ["1 N*s/m"]}, ["friction.viscous", "an array"]),
+        ({STIFFNESS: "40 N/um"}, STIFFNESS, "not an array"),
+        ({STIFFNESS: []}, STIFFNESS, "of 0"),
+        ({STIFFNESS: ["1 N/um"] * 13}, STIFFNESS, "1 to 12"),
+        ({STIFFNESS: ["1 N/um", 2, "3 N/um"]}, f"{STIFFNESS}.2", "a bare number"),
+        ({STIFFNESS: ["1 N/um", "2 N/um", "3 um"]}, f"{STIFFNESS}.3", "um is not convertible to N/m"),
+        ({f"{STIFFNESS}.2": "-1 N/um"}, f"{STIFFNESS}.2", "greater than 0"),
+        ({f"{STIFFNESS}.2": "1 N/um .. -1 N/um"}, f"{STIFFNESS}.2", "LOW .. HIGH"),
+        *(({f"{STIFFNESS}.{place}": "1 N/um"}, f"{STIFFNESS}.{place}", "1 to 3") for place in ("4", "0", "first")),
+        ({f"{STIFFNESS}.2": None}, f"{STIFFNESS}.2", ""),
+        ({STIFFNESS: ["1 N/um", "2 N/um"]}, STIFFNESS, "one strength for"),
+        ({STIFFNESS: [["1 N/um"], "2 N/um", "1 N/um"]}, f"{STIFFNESS}.1", "an array"),
+        ({"friction.viscous": ["1 N*s/m"]}, "friction.viscous", "an array"),
     ],
 )
-def test_what_is_wrong_is_told(three: Stage, changes: dict, parts: list[str]) -> None:
+def test_what_is_wrong_is_told(three: Stage, changes: dict, key: str, words: str) -> None:
     with pytest.raises(StageError) as refused:
         three.replace(changes)
-    assert all(part in str(refused.value) for part in parts), str(refused.value)
+    assert key in refused.value.key
+    assert words in str(refused.value)
 
 
 def test_an_element_is_swept_and_linked(three: Stage) -> None:

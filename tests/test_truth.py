@@ -18,7 +18,7 @@ from benchmarks.truth import refute
 from benchmarks.truth.attack import GIVEN_UP, STOOD, WRONG, _outcomes
 from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, checked
 from benchmarks.truth.classes import classes_of
-from benchmarks.truth.draws import FORMS, SERIES, draw
+from benchmarks.truth.draws import SERIES, draw
 from benchmarks.truth.kept import KeptAttacks
 from benchmarks.truth.refute import ALL, Refutation, _different, _edge, _kicks, _verdict, attempts, may_attract
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
@@ -28,7 +28,6 @@ from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import bandwidth, faster
 from friso.hunting import Kick, find_swings
 from friso.stage.files import loads
-from friso.stage.tables import FRICTION
 
 END = 1000.0
 
@@ -100,11 +99,6 @@ def test_stages_are_those_that_the_documentation_counts() -> None:
     """Whatever other series draw besides."""
     assert draw(1, 18).flat()["motion.displacement"] == pytest.approx(0.679328, rel=1e-5)
     assert draw(2, 5).flat()["motion.displacement"] == pytest.approx(0.0217155, rel=1e-5)
-
-
-def test_stages_of_every_friction_law_are_drawn() -> None:
-    laws = {name for name, law in FRICTION.classes.items() if law.__module__.startswith("friso.")}
-    assert {form.friction for form in FORMS} == laws
 
 
 def test_a_stage_that_runs_away_is_said_to_and_another_that_is_said_to_is_refuted() -> None:
@@ -276,18 +270,6 @@ def test_a_run_that_was_stopped_goes_on_and_ends_like_an_unbroken_one(run: Attac
     assert run.run() == [3, 4]
     assert run.file.read_text() == unbroken
     assert run.run() == []
-
-
-@pytest.mark.parametrize("damage", [b"", b"\n", b"\xff\x00\n"])
-def test_a_line_that_was_cut_off_is_told_and_its_stage_attacked_again(
-    run: Attacked, damage: bytes, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run.run()
-    unbroken = KeptAttacks(run.file).records
-    run.file.write_bytes(run.file.read_bytes()[:-40] + damage)
-    assert run.run() == [4]
-    assert "line 5, is damaged" in capsys.readouterr().err
-    assert KeptAttacks(run.file).records == unbroken
 
 
 def test_attacks_by_other_code_are_shown_and_made_again_on_request_alone(
