@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 from variants import VARIANTS
 
 import friso
@@ -21,31 +22,15 @@ pytestmark = pytest.mark.xdist_group("rig")
 
 
 @pytest.fixture(scope="module")
-def rig() -> Stage:
-    return friso.load(EXAMPLES / "thesis_rig.toml")
-
-
-@pytest.fixture(scope="module")
 def checked(rig: Stage) -> CheckAnswer:
     return friso.check(rig)
 
 
-def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer) -> None:
-    """Issue 2 and references.md, section 2: 6 peaks, amplitude about 0.52 mm; none with the free joint."""
-    _hunts_locked_and_settles_free(checked)
-
-
-def test_the_readme_shows_what_its_first_line_prints(checked: CheckAnswer) -> None:
-    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
-    assert [*checked.sentences()] == readme.partition("```text\n")[2].partition("\n```")[0].splitlines()
-
-
 @pytest.mark.usefixtures("own_bandwidth")
-def test_a_tighter_tolerance_changes_no_verdict(rig: Stage) -> None:
-    _hunts_locked_and_settles_free(friso.check(rig, rtol=1e-8))
-
-
-def _hunts_locked_and_settles_free(cases: CheckAnswer) -> None:
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer, rig: Stage, rtol: float) -> None:
+    """Issue 2 and references.md, section 2: 6 peaks, amplitude about 0.52 mm; none with the free joint."""
+    cases = checked if rtol == 1e-6 else friso.check(rig, rtol=rtol)
     assert list(cases) == ["given", "locked", "free"]
     locked, free = cases["locked"], cases["free"]
     assert (locked.verdict, locked.peaks) == ("hunts", 6)
@@ -57,16 +42,21 @@ def _hunts_locked_and_settles_free(cases: CheckAnswer) -> None:
     assert cases["given"].solver == free.solver
 
 
+def test_the_readme_shows_what_its_first_line_prints(rig: Stage, checked: CheckAnswer) -> None:
+    """What a stage file notes is repeated."""
+    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+    assert [*checked.sentences()] == readme.partition("```text\n")[2].partition("\n```")[0].splitlines()
+    noted = friso.loads(rig.replace({"note": "The controller is a placeholder."}).to_toml())
+    answer = CheckAnswer(checked.result, stage=noted, draws=None, laws=None, cut=False)
+    assert "The controller is a placeholder." in answer.sentences()
+
+
 @pytest.mark.usefixtures("own_bandwidth")
 def test_verdicts_are_mentioned_before_kicks_and_other_bandwidths(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:
-    seen: list[tuple[str, bool]] = []
+    seen: list[str] = []
     with caplog.at_level(logging.INFO, "friso"):
-        friso.check(rig, progress=lambda done, total, label: seen.append((caplog.text, done < total)))
-    assert {record.getMessage() for record in caplog.records if record.levelno == logging.INFO} >= {
-        "Locked: hunts",
-        "Free (as given): does not hunt",
-    }
-    assert any("Locked: hunts" in text and "Free" in text for text, unfinished in seen if unfinished)
+        friso.check(rig, progress=lambda done, total, label: seen.extend([caplog.text] * (done < total)))
+    assert any("Locked: hunts" in text and "Free (as given): does not hunt" in text for text in seen)
 
 
 @pytest.mark.usefixtures("own_bandwidth")
@@ -88,11 +78,6 @@ def test_measures_agree_with_the_trace(rig: Stage) -> None:
                 assert settled == pytest.approx(last - 5.06, abs=2e-3)
 
 
-def test_without_a_joint_there_is_one_case() -> None:
-    cases = friso.check(friso.load(EXAMPLES / "lugre_stick_slip.toml"))
-    assert list(cases) == ["given"]
-
-
 @pytest.mark.usefixtures("own_bandwidth")
 def test_locked_without_stiffness_has_no_free_case(rig: Stage) -> None:
     held = {"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None}
@@ -100,7 +85,7 @@ def test_locked_without_stiffness_has_no_free_case(rig: Stage) -> None:
 
 
 def test_unusable_tolerance(rig: Stage) -> None:
-    with pytest.raises(friso.InputError, match="a number from 1e-12 to 1e-2"):
+    with refused("rtol"):
         friso.check(rig, rtol=1.0)
 
 
@@ -165,24 +150,22 @@ def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
 
 @pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.parametrize(
-    ("crossover", "joint", "verdict", "attracts"),
-    [
-        ("10 Hz", "locked", "transient", False),
-        ("12 Hz", "locked", "settles", False),
-        ("5 Hz", "free", "bistable", True),
-    ],
+    ("crossover", "locked", "verdict"),
+    [("10 Hz", True, "transient"), ("12 Hz", True, "settles"), ("5 Hz", False, "bistable")],
 )
-def test_verdicts_by_the_cycle(rig: Stage, crossover: str, joint: str, verdict: str, attracts: bool) -> None:
+def test_verdicts_by_the_cycle(rig: Stage, crossover: str, locked: bool, verdict: str) -> None:
     """Just above the edge a move still swings for minutes; below the free rig's edge only a kick starts hunting."""
-    stage = rig.replace({"controller.crossover": crossover, "joint.locked": joint == "locked"})
+    stage = rig.replace({"controller.crossover": crossover, "joint.locked": locked})
     judgement = check_given(stage, 1e-6).judgement
     assert judgement.verdict == verdict
     assert judgement.cycle is not None
-    assert judgement.cycle.attracts == attracts
+    assert judgement.cycle.attracts == (verdict == "bistable")
 
 
-def test_without_integral_action_there_is_a_reason() -> None:
-    case = friso.check(friso.load(EXAMPLES / "lugre_stick_slip.toml"))["given"]
+def test_without_a_joint_there_is_one_case_and_without_integral_action_a_reason() -> None:
+    cases = friso.check(friso.load(EXAMPLES / "lugre_stick_slip.toml"))
+    assert list(cases) == ["given"]
+    case = cases["given"]
     assert (case.verdict, case.judgement.cycle) == ("transient", None)
     assert "no integral action" in case.judgement.hunting.reason
 
@@ -237,14 +220,6 @@ def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved()
     time = f"{1e3 * last:.0f} ms"
     assert f"in {time} without breaking away" in answers["15 um"].sentences()[0]
     assert [row[1:] for row in answers["15 um"].tables()[0].rows if "into 10 µm" in row[0]] == [([time],)]
-
-
-def test_what_the_stage_file_notes_is_repeated(rig: Stage, checked: CheckAnswer) -> None:
-    noted = rig.replace({"note": "The controller is a placeholder."})
-    assert noted.to_toml() != rig.to_toml()
-    answer = CheckAnswer(checked.result, stage=friso.loads(noted.to_toml()), draws=None, laws=None, cut=False)
-    assert noted.note in answer.sentences()
-    assert noted.note not in checked.sentences()
 
 
 def test_a_bare_number_is_echoed_with_its_unit(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:

@@ -74,14 +74,17 @@ def best_of_a_grid(flat: dict[str, float], wanted: float) -> float:
     return best
 
 
-def test_a_joint_too_stiff_for_the_sheets_has_none() -> None:
-    stiff = joint("100 kN/m", "20 um")
-    assert leaves_for_joint(stiff, stiff) is None
-
-
-def test_a_name_with_quotes_is_a_name() -> None:
-    rig = joint("2.4 kN/m", "1 mm").replace({"name": 'the "old" rig \\ 2'})
-    assert leaves_for_joint(rig, rig) is not None
+@pytest.mark.parametrize(
+    ("changed", "present", "has"),
+    [
+        ({"joint.stiffness": "100 kN/m", "joint.stroke": "20 um"}, None, False),  # too stiff for the sheets
+        ({"name": 'the "old" rig \\ 2'}, None, True),
+        ({}, {"flexure.thickness": "2 mm", "flexure.load": "3 kN"}, False),  # no leaves stand under this load
+    ],
+)
+def test_which_joints_have_leaves(changed: dict, present: dict | None, has: bool) -> None:
+    rig = joint("2.4 kN/m", "1 mm").replace(changed)
+    assert (leaves_for_joint(rig, LEAVES.replace(present) if present else rig) is not None) == has
 
 
 def test_a_coulomb_friction_close_to_a_static_one_that_is_known_well_is_outlined() -> None:
@@ -103,11 +106,6 @@ def test_other_leaves_guide_and_carry_what_those_of_the_file_do(load: float) -> 
     assert (flat["flexure.inertia_y"], flat["flexure.load"]) == (1e-3, load)
     assert flat["joint.stiffness"] == pytest.approx(present.flat()["joint.stiffness"], rel=0.01)
     assert closed_forms.buckling_load(Mechanism.of(flat)) > 3 * load
-
-
-def test_a_load_under_which_no_leaves_stand_has_none() -> None:
-    present = LEAVES.replace({"flexure.thickness": "2 mm", "flexure.load": "3 kN"})
-    assert leaves_for_joint(joint("2.4 kN/m", "1 mm"), present) is None
 
 
 @pytest.fixture(scope="module")
@@ -174,15 +172,8 @@ def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pyt
     (isolator, _), tried = tuning.outcomes, []
     monkeypatch.setattr(_Session, "_verified", lambda self, search, shares: isolator)
     monkeypatch.setattr(_Session, "tries", lambda self, remedy: tried.append(remedy.makes))
-    session = _Session(
-        tuning.stage,
-        tuning.stage,
-        tuning.goal,
-        *[None] * 4,
-        Budget(),
-        None,
-        outcomes=[isolator],
-    )
+    stage, fleets = tuning.stage, [None] * 4
+    session = _Session(stage, stage, tuning.goal, *fleets, Budget(), None, outcomes=[isolator])
     search = SimpleNamespace(remedy=isolator.remedy, tried=[], attracted=0, cut=False, looked_at=iter)
     session._ended(search, iter([np.zeros(0)]))
     session.makes_leaves()

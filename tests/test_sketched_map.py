@@ -1,12 +1,14 @@
 """Maps of verdicts by sketches, and axes that make the controller faster or scale all friction."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from refusals import refused
 
 import friso
 from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import with_friction
-from friso.errors import InputError
 from friso.hunting import check, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, SWINGS
 from friso.hunting.return_map.settings import ReturnMapSettings
@@ -71,37 +73,44 @@ def test_gains_are_scaled_with_the_speed() -> None:
     )
 
 
-def test_a_stage_without_friction_has_none_to_scale(locked: Stage) -> None:
-    with pytest.raises(InputError, match="friction"):
-        friso.sweep(locked.replace({"friction": {"model": "none"}}), {"friction": [0.5, 2.0]}, metric="outcome")
+@pytest.mark.parametrize(
+    ("changed", "axes", "options"),
+    [
+        ({"friction": {"model": "none"}}, {"friction": [0.5, 2.0]}, {"metric": "outcome"}),
+        ({}, {"speed": "-1,0,1"}, {}),
+        ({}, {"speed": [0.5, 1.0]}, {"metric": "outcome", "confirm": True}),
+    ],
+)
+def test_what_cannot_be_scaled_or_confirmed_is_refused(locked: Stage, changed: Any, axes: Any, options: Any) -> None:
+    with refused():
+        friso.sweep(locked.replace(changed), axes, **options)
 
 
 def test_the_edge_lies_between_cells_that_hunt_and_cells_that_do_not(sketched: SweepAnswer) -> None:
     (panel,) = map_figure(sketched.data, "sketch").panels
     (edge,) = panel.series
-    attracted = np.isin(sketched.data["sketch"].values, ATTRACTED)  # (speed, friction)
-    row = attracted[:, 1]
+    row = np.isin(sketched.data["sketch"].values, ATTRACTED)[:, 1]
     at = int(np.flatnonzero(row[:-1] & ~row[1:])[-1])
     crossing = edge.x[np.isclose(edge.y, 1.0)]
     assert np.any((crossing > SPEEDS[at]) & (crossing < SPEEDS[at + 1]))
     assert not map_figure(sketched.data, "outcome").panels[0].series
+    x, y = page_data(sketched.data, "sketch", "{indices}")["edge"]
+    assert [value is None for value in x] == [*np.isnan(edge.x)]
+    assert np.nanmax(np.array(y, float)) == pytest.approx(np.nanmax(edge.y), rel=1e-4)
+    assert page_data(sketched.data, "outcome", "{indices}")["edge"] is None
 
 
-def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(sketched: SweepAnswer) -> None:
+def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(locked: Stage, sketched: SweepAnswer) -> None:
+    """The nearest cell is not called the stage."""
     (sentence,) = own_place(sketched.data, "sketch")
     assert "hunts" in sentence
     assert "1.0 to 1.3" in sentence or "1 to 1.3" in sentence
     assert not own_place(sketched.data, "outcome")
-    page = map_html(sketched.data, "sketch", "{indices}")
-    assert sentence.split(";")[0] in page
-
-
-def test_the_page_has_the_edge_of_the_figure(sketched: SweepAnswer) -> None:
-    (curve,) = map_figure(sketched.data, "sketch").panels[0].series
-    x, y = page_data(sketched.data, "sketch", "{indices}")["edge"]
-    assert [value is None for value in x] == [*np.isnan(curve.x)]
-    assert np.nanmax(np.array(y, float)) == pytest.approx(np.nanmax(curve.y), rel=1e-4)
-    assert page_data(sketched.data, "outcome", "{indices}")["edge"] is None
+    assert sentence.split(";")[0] in map_html(sketched.data, "sketch", "{indices}")
+    beside = friso.sweep(locked, {"controller.crossover": ["5 Hz", "9.9 Hz", "14 Hz"]})
+    (sentence,) = own_place(beside.data, "sketch")
+    assert "nearest" in sentence
+    assert "is transient" in sentence
 
 
 def test_a_cycle_longer_than_the_run_is_told(locked: Stage) -> None:
@@ -130,20 +139,6 @@ def test_cells_without_a_verdict_are_on_no_side_of_an_edge(locked: Stage) -> Non
     assert "ends" not in sentence
 
 
-def test_the_nearest_cell_is_not_called_the_stage(locked: Stage) -> None:
-    runs = friso.sweep(locked, {"controller.crossover": ["5 Hz", "9.9 Hz", "14 Hz"]})
-    (sentence,) = own_place(runs.data, "sketch")
-    assert "nearest" in sentence
-    assert "is transient" in sentence
-
-
-def test_factors_are_above_zero_and_a_name_that_links_use_is_free(locked: Stage) -> None:
-    with pytest.raises(InputError, match="above 0"):
-        friso.sweep(locked, {"speed": "-1,0,1"})
+def test_a_name_that_links_use_is_free(locked: Stage) -> None:
     linked = friso.sweep(locked, {"speed": [0.5, 1.0]}, link={"controller.crossover": "8*speed"}, metric="outcome")
     assert linked.cell(0).controller.crossover == pytest.approx(4.0)
-
-
-def test_confirming_what_is_no_verdict_is_refused(locked: Stage) -> None:
-    with pytest.raises(InputError, match="confirm"):
-        friso.sweep(locked, {"speed": [0.5, 1.0]}, metric="outcome", confirm=True)

@@ -7,6 +7,7 @@ from typing import Any
 import control
 import numpy as np
 import pytest
+from refusals import refused
 from scipy import signal
 from scipy.io import savemat
 from variants import VARIANTS
@@ -44,6 +45,19 @@ def response(flat: Mapping[str, Any], s: np.ndarray) -> np.ndarray:
     return np.array([(c @ np.linalg.solve(place * np.eye(len(a)) - a, b) + d)[0, 0] for place in s])
 
 
+def is_transfer(stage: Stage, *factors: tuple[list[float], list[float]]) -> bool:
+    """Tell whether the controller of a stage is the product of transfer functions."""
+    by_hand = np.prod([np.polyval(n, 1j * OMEGA) / np.polyval(d, 1j * OMEGA) for n, d in factors], axis=0)
+    return bool(np.abs(response(stage.flat(), 1j * OMEGA) / by_hand - 1).max() < 1e-9)
+
+
+def sampled(transfer: tuple[Any, Any], step: float, **keys: Any) -> dict[str, Any]:
+    """Return the keys of a controller for samples that Tustin makes of a transfer function."""
+    numerator, denominator, _ = signal.cont2discrete(transfer, step, "bilinear")
+    coefficients = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
+    return {**coefficients, "sample_time": f"{step!r} s", **keys}
+
+
 def matlab(matrix: np.ndarray) -> str:
     return "; ".join(" ".join(repr(float(number)) for number in row) for row in np.atleast_2d(matrix))
 
@@ -72,9 +86,7 @@ TRANSFERS = {
 @pytest.mark.parametrize("way", ["coefficients", "roots", "matrices"])
 @pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
 def test_the_controller_is_its_transfer_function(transfer: tuple[list[float], list[float]], way: str) -> None:
-    by_hand = np.polyval(transfer[0], 1j * OMEGA) / np.polyval(transfer[1], 1j * OMEGA)
-    ours = response(controlled(ways(*transfer)[way]).flat(), 1j * OMEGA)
-    assert np.abs(ours / by_hand - 1).max() < 1e-9
+    assert is_transfer(controlled(ways(*transfer)[way]), transfer)
 
 
 @pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
@@ -91,22 +103,18 @@ def test_loops_are_those_of_python_control(transfer: tuple[list[float], list[flo
     assert np.abs(ours / theirs(1j * OMEGA) - 1).max() < 1e-6
 
 
-def test_sections_are_factors() -> None:
+def test_sections_are_factors_and_matrices_of_a_file_have_names(tmp_path: Path) -> None:
+    """A pole and a zero at 0 cancel."""
     sections = [
         {"numerator": [500.0, 6e4], "denominator": [1.0, 0.0]},
         {"numerator": [1.0, 40.0, 4e4], "denominator": [1.0, 300.0, 4e4]},
     ]
-    factors = [np.polyval(s["numerator"], 1j * OMEGA) / np.polyval(s["denominator"], 1j * OMEGA) for s in sections]
-    by_hand = factors[0] * factors[1]
-    assert np.abs(response(controlled({"sections": sections}).flat(), 1j * OMEGA) / by_hand - 1).max() < 1e-9
-
-
-def test_matrices_are_read_from_a_file_by_name(tmp_path: Path) -> None:
-    names = dict(zip("ABCD", signal.tf2ss(NUMERATOR, DENOMINATOR), strict=True))
-    savemat(tmp_path / "controller.mat", names)
+    assert is_transfer(controlled({"sections": sections}), *((s["numerator"], s["denominator"]) for s in sections))
+    savemat(tmp_path / "controller.mat", dict(zip("ABCD", signal.tf2ss(NUMERATOR, DENOMINATOR), strict=True)))
     keys = {"kind": "state_space", "file": str(tmp_path / "controller.mat"), "a": "A", "b": "B", "c": "C", "d": "D"}
-    by_hand = np.polyval(NUMERATOR, 1j * OMEGA) / np.polyval(DENOMINATOR, 1j * OMEGA)
-    assert np.abs(response(controlled(keys).flat(), 1j * OMEGA) / by_hand - 1).max() < 1e-9
+    assert is_transfer(controlled(keys), (NUMERATOR, DENOMINATOR))
+    both = controlled({"numerator": [2e5, 2.4e7, 0.0], "denominator": [1.0, 400.0, 0.0]})
+    assert is_transfer(both, ([2e5, 2.4e7], [1.0, 400.0]))
 
 
 @pytest.mark.parametrize("factor", [0.5, 3.0])
@@ -142,12 +150,10 @@ def test_it_hunts_as_the_pid_controller_that_it_is() -> None:
 @pytest.mark.parametrize("divided", [1, 4])
 @pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
 def test_coefficients_for_samples_run_as_they_are(transfer: tuple[list[float], list[float]], divided: int) -> None:
-    numerator, denominator, _ = signal.cont2discrete(transfer, SAMPLE, "bilinear")
-    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
-    drive = {"drive": {"sample_time": f"{SAMPLE / divided!r} s"}}
-    answer = friso.simulate(controlled({**keys, "sample_time": f"{SAMPLE!r} s"}, **drive), sample_time=SAMPLE / divided)
+    keys, drive = sampled(transfer, SAMPLE), {"drive": {"sample_time": f"{SAMPLE / divided!r} s"}}
+    answer = friso.simulate(controlled(keys, **drive), sample_time=SAMPLE / divided)
     error = (answer["reference"] - answer["measured_position"]).to_numpy()[::divided]
-    by_hand = np.repeat(signal.lfilter(numerator.ravel(), denominator, error), divided)
+    by_hand = np.repeat(signal.lfilter(keys["numerator"], keys["denominator"], error), divided)
     command = answer["command"].to_numpy()
     assert command == pytest.approx(by_hand[: len(command)], abs=1e-8 * np.abs(by_hand).max())
 
@@ -175,12 +181,6 @@ def test_the_integral_unwinds_by_its_own_samples(divided: int) -> None:
     by_hand = np.repeat(np.clip(force, -limit, limit), divided)
     command = answer["command"].to_numpy()
     assert command == pytest.approx(by_hand[: len(command)], abs=1e-8)
-
-
-def test_a_pole_and_a_zero_at_zero_cancel() -> None:
-    by_hand = np.polyval([2e5, 2.4e7], 1j * OMEGA) / np.polyval([1.0, 400.0], 1j * OMEGA)
-    flat = controlled({"numerator": [2e5, 2.4e7, 0.0], "denominator": [1.0, 400.0, 0.0]}).flat()
-    assert np.abs(response(flat, 1j * OMEGA) / by_hand - 1).max() < 1e-9
 
 
 @pytest.mark.parametrize("pole", [0.0, 1e-3, 0.1])
@@ -214,9 +214,11 @@ def test_filters_of_controllers_without_integral_are_no_lags(name: str) -> None:
 
 @pytest.mark.inner
 def test_a_filter_that_lags_winds_up() -> None:
+    """A stage without stiffness hides no lag beside it."""
     lag = {"kind": "lead_lag", "zero_frequency": "0.5 Hz", "pole_frequency": "0.005 Hz"}
-    stage = Stage(**{**TABLES, "controller": {**PID, "ki": "0 N/(m*s)", "filters": [lag]}})
-    assert lags(Ensemble.held(stage.flat(), 1)).all()
+    flat = Stage(**{**TABLES, "controller": {**PID, "ki": "0 N/(m*s)", "filters": [lag]}}).flat()
+    both = {**flat, "controller.kp": np.array([0.0, flat["controller.kp"]])}
+    assert lags(Ensemble.held(both, 2)).tolist() == [False, True]
 
 
 @pytest.mark.inner
@@ -224,54 +226,33 @@ def test_a_lag_of_a_tenth_hunts_where_hardly_any_coulomb_friction_brakes() -> No
     """Two poles at 0.5 1/s, and a static gain 1.11 times that which slip needs: +-0.98 mm every 2.2 s."""
     slow, fast = np.poly([-0.5, -0.5]), np.poly([-0.5 / np.sqrt(0.9)] * 2)
     friction = {**TABLES["friction"], "static": "1 N", "coulomb": "0.02 N", "stribeck_velocity": "1 mm/s"}
-    friction |= {
-        "bristle_stiffness": "1e7 N/m",
-        "bristle_damping": "6000 N*s/m",
-        "viscous": "0 N*s/m",
-        "stribeck_exponent": 2,
-    }
-    controller = {
-        "kind": "transfer_function",
-        "numerator": [*map(float, 1000 * np.polymul(fast, [1.9e-4, 1.0]))],
-        "denominator": [*map(float, np.polymul(slow, [9.5e-6, 1.0]))],
-    }
-    masses, motion = {"cart": "1 kg"}, {"kind": "release", "displacement": "1.3 mm", "duration": "300 s"}
-    stage = Stage(masses=masses, friction=friction, controller=controller, motion=motion)
+    friction |= {"bristle_stiffness": "1e7 N/m", "bristle_damping": "6000 N*s/m", "viscous": "0 N*s/m"}
+    numerator, denominator = 1000 * np.polymul(fast, [1.9e-4, 1.0]), np.polymul(slow, [9.5e-6, 1.0])
+    keys = {"numerator": [*map(float, numerator)], "denominator": [*map(float, denominator)]}
+    motion = {"kind": "release", "displacement": "1.3 mm", "duration": "300 s"}
+    friction |= {"stribeck_exponent": 2}
+    stage = controlled(keys, masses={"cart": "1 kg"}, friction=friction, motion=motion)
     assert lags(Ensemble.held(stage.flat(), 1)).all()
     assert not hunting(stage).certain
     assert "swings" in friso.simulate(stage).sentences()[0]
 
 
-@pytest.mark.inner
-def test_a_stage_without_stiffness_hides_no_lag_beside_it() -> None:
-    lag = {"kind": "lead_lag", "zero_frequency": "0.5 Hz", "pole_frequency": "0.005 Hz"}
-    flat = Stage(**{**TABLES, "controller": {**PID, "ki": "0 N/(m*s)", "filters": [lag]}}).flat()
-    both = {**flat, "controller.kp": np.array([0.0, flat["controller.kp"]])}
-    assert lags(Ensemble.held(both, 2)).tolist() == [False, True]
-
-
-def test_a_verdict_says_that_it_is_on_the_continuous_equivalent() -> None:
-    numerator, denominator, _ = signal.cont2discrete((NUMERATOR, DENOMINATOR), SAMPLE, "bilinear")
-    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
-    stage = controlled({**keys, "sample_time": "0.5 ms"})
-    by_hand = np.polyval(NUMERATOR, 1j * OMEGA) / np.polyval(DENOMINATOR, 1j * OMEGA)
-    flat = stage.flat()
-    assert np.abs(response(flat, 1j * OMEGA) / by_hand - 1).max() < 1e-9
-    assert "continuous equivalent (Tustin)" in stage.controller.note(flat)
-    assert "samples of 0.0005 s" in stage.controller.note(flat)
-
-
 def test_a_loop_of_samples_is_that_of_the_plant_at_them() -> None:
-    """Without friction: the zero-order hold of a free mass, times the controller's transfer function in z."""
-    numerator, denominator, _ = signal.cont2discrete((NUMERATOR, DENOMINATOR), SAMPLE, "bilinear")
-    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
-    stage = controlled({**keys, "sample_time": "0.5 ms"}, friction={"model": "none"})
+    """Without friction: the zero-order hold of a free mass, times the controller's transfer function in z.
+
+    A verdict says that it is on the continuous equivalent.
+    """
+    keys = sampled((NUMERATOR, DENOMINATOR), SAMPLE)
+    stage = controlled(keys, friction={"model": "none"})
+    assert is_transfer(stage, (NUMERATOR, DENOMINATOR))
+    assert "continuous equivalent (Tustin)" in stage.controller.note(stage.flat())
+    assert "samples of 0.0005 s" in stage.controller.note(stage.flat())
     members = next(iter(limit_cases(stage.flat()).values()))
     loop = poles(stage.flat(), members, DriveTiming.of(stage.flat()))
     omega = np.geomspace(1, 3000, 40)
     z = np.exp(1j * omega * SAMPLE)
     plant = SAMPLE**2 / 2 / 1.7 * (z + 1) / (z - 1) ** 2
-    by_hand = plant * np.polyval(numerator.ravel(), z) / np.polyval(denominator, z)
+    by_hand = plant * np.polyval(keys["numerator"], z) / np.polyval(keys["denominator"], z)
     assert np.abs(loop.loop(omega)[0] / by_hand - 1).max() < 1e-6
 
 
@@ -291,6 +272,10 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
         {"numerator": [5e4, -4.9e4], "denominator": [1.0, -1.8182, 0.81819999], "sample_time": "1 ms"},
         "all their digits",
     ),
+    "samples that do not divide": (
+        {"numerator": [6e4, -5.9e4], "denominator": [1.0, -0.5], "sample_time": "1 ms"},
+        "whole number of samples of the drive",
+    ),
     "no gain": ({"zeros": [-6.0], "poles": [0.0, -400.0]}, "gain before"),
     "two integrals": ({"numerator": [100.0, 200.0], "denominator": [1.0, 0.0, 0.0]}, "one integral"),
     "at z = -1": ({"numerator": [5.0, 4.0], "denominator": [1.0, 1.0], "sample_time": "1 ms"}, "z = -1"),
@@ -307,17 +292,10 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
 
 @pytest.mark.parametrize(("keys", "words"), BAD.values(), ids=BAD)
 def test_a_transfer_function_that_cannot_be_is_refused(keys: dict[str, Any], words: str) -> None:
-    with pytest.raises(friso.InputError) as caught:
-        controlled(keys)
-    assert caught.value.key.startswith("controller")
-    assert words in caught.value.expected
-
-
-def test_samples_that_do_not_divide_are_refused() -> None:
-    keys = {"numerator": [6e4, -5.9e4], "denominator": [1.0, -0.5], "sample_time": "1 ms"}
-    with pytest.raises(friso.InputError) as caught:
+    with refused() as caught:
         controlled(keys, drive={"sample_time": "300 us"})
-    assert "whole number of samples of the drive" in caught.value.expected
+    assert caught.value.key.startswith(("controller", "drive"))
+    assert words in caught.value.expected
 
 
 @pytest.mark.parametrize("step", [0.5e-3, 8e-3])
@@ -326,14 +304,12 @@ def test_what_only_samples_make_unstable_is_told_first(step: float, own_bandwidt
 
     They are those of the free mass behind a zero-order hold, and of the controller in z.
     """
-    transfer = ([6e4 * 1e-3 + 500, 6e4 + 6e5 * 1e-3, 6e5], [1e-3, 1.0, 0.0])
-    numerator, denominator, _ = signal.cont2discrete(transfer, step, "bilinear")
-    hold = step**2 / 2 / 1.7
-    closed = np.polyadd(np.convolve(denominator, [1.0, -2.0, 1.0]), hold * np.convolve(numerator.ravel(), [1.0, 1.0]))
+    keys = sampled(([6e4 * 1e-3 + 500, 6e4 + 6e5 * 1e-3, 6e5], [1e-3, 1.0, 0.0]), step)
+    hold = step**2 / 2 / 1.7 * np.convolve(keys["numerator"], [1.0, 1.0])
+    closed = np.polyadd(np.convolve(keys["denominator"], [1.0, -2.0, 1.0]), hold)
     diverges = bool(np.abs(np.roots(closed)).max() > 1)
     assert diverges == (step > 1e-3)
-    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
-    answer = friso.check(controlled({**keys, "sample_time": f"{step} s"}))
+    answer = friso.check(controlled(keys))
     case = answer.result["given"]
     assert bool(case.unstable_as_built) == diverges
     assert case.judgement.hunting.certain != diverges
