@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from friso.errors import InputError
-from friso.identification.doubt import KeyCase
+from friso.identification.doubt import KeyCase, RaisedDoubt
 from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
 from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
@@ -39,13 +40,12 @@ def case_of(estimates: tuple[Estimate, ...], **seen: Any) -> KeyCase:
     return KeyCase(**rest | {"estimates": estimates} | seen)
 
 
-def shown(estimates: tuple[Estimate, ...], top: float) -> set[str]:
-    """Return the names of the estimates that remain for a motion with this highest speed [m/s]."""
-    case = case_of(estimates, velocity=np.array([0.0, -top]))
-    for finding in slow_motion.find(case):
+def judged(find: Callable[[KeyCase], Iterable[RaisedDoubt]], case: KeyCase) -> KeyCase:
+    """The case with the answers of a doubt."""
+    for finding in find(case):
         case = case.with_answers(finding)
     assert len(case.correlation) == len(case.determined)
-    return set(case.determined)
+    return case
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,8 @@ def shown(estimates: tuple[Estimate, ...], top: float) -> set[str]:
     [(UNKNOWN, 1e-3, False), (UNKNOWN, 0.1, True), (STRIBECK, 1.5e-3, False), (STRIBECK, 2.1e-3, True)],
 )
 def test_friction_at_slow_speeds_alone_is_no_coulomb_friction(stribeck: Estimate, top: float, left: bool) -> None:
-    kept = shown((MASSES, COULOMB, stribeck), top)
+    case = case_of((MASSES, COULOMB, stribeck), velocity=np.array([0.0, -top]))
+    kept = judged(slow_motion.find, case).determined
     assert (COULOMB.name in kept) == left
     assert "masses.cart" in kept
 
@@ -63,9 +64,7 @@ def test_all_friction_at_the_highest_slow_speed_may_be_dry() -> None:
     viscous = Estimate.normal("friction.viscous", "N*s/m", 4e3, 100.0, "drawn")
     static = Estimate.unknown("friction.static", "N", "drawn", "not covered", 7.8, 16.0)
     case = case_of((MASSES, COULOMB, viscous, static, UNKNOWN), velocity=np.array([1e-3]))
-    for finding in slow_motion.find(case):
-        case = case.with_answers(finding)
-    coulomb, rest, static = case.estimates[1:4]
+    coulomb, rest, static = judged(slow_motion.find, case).estimates[1:4]
     assert {one.determined for one in (coulomb, rest, static)} == {False}
     assert coulomb.high == pytest.approx(COULOMB.high + viscous.high * 1e-3)
     assert (static.low, static.high) == pytest.approx((coulomb.low, 4 * coulomb.high))
@@ -104,23 +103,20 @@ def test_stiffer_bristles_beside_errors_of_the_position(
     monkeypatch.setattr(stiffer_bristles, "refine_fit", lambda *arguments, **named: refitted)
     monkeypatch.setattr(stiffer_bristles, "simulated_log", lambda *arguments: own)
     case = case_of((stiffness,), fit=fit, inverse=SimpleNamespace(bandwidth=20.0))
-    for finding in stiffer_bristles.find(case):
-        case = case.with_answers(finding)
-    assert (stiffness.name in case.determined) == left
+    assert (stiffness.name in judged(stiffer_bristles.find, case).determined) == left
 
 
 @pytest.mark.parametrize(("share", "off"), [(0.01, MASSES.half_width), (0.9, 0.81 * 3.0), (1.1, None)])
 def test_what_is_left_passes_for_inertia(share: float, off: float | None) -> None:
     """Little of it does nothing, much of it makes the mass uncertain, and beyond the inertia there is no mass."""
     case = case_of((MASSES,), acceleration=np.array([0.5, -0.5]), unexplained=share * 3.0 * 0.5)
-    for finding in lost_inertia.find(case):
-        case = case.with_answers(finding)
-    (mass,) = case.estimates
+    (mass,) = judged(lost_inertia.find, case).estimates
     assert mass.determined == (off is not None)
     assert off is None or mass.half_width == pytest.approx(off)
 
 
 def test_machines_are_drawn_from_intervals_and_from_what_is_left() -> None:
+    """A parameter that is withdrawn, or known only to lie above zero, is not drawn near its fitted value."""
     static = Estimate.unknown("friction.static", "N", "drawn", "not covered", 8.0, 32.0)
     parameters = [
         FitParameter(MASS, "kg", 3.0, 0.6, 15.0),
@@ -135,17 +131,9 @@ def test_machines_are_drawn_from_intervals_and_from_what_is_left() -> None:
     assert MASSES.low <= np.exp(rows[:, 0]).min() <= np.exp(rows[:, 0]).max() <= MASSES.high
     assert rows[:, 2].min() < 1.5
     assert rows[:, 2].max() > 2.5
-
-
-def test_what_nothing_is_known_of_is_drawn_from_all_of_its_range() -> None:
-    """A parameter that is withdrawn, or known only to lie above zero, is not drawn near its fitted value."""
     nothing = Estimate.unknown("masses.cart", "kg", "drawn", "withdrawn")
     viscous = Estimate.unknown("friction.viscous", "N*s/m", "drawn", "not bounded", 0.0, 20.0)
-    parameters = [
-        FitParameter(MASS, "kg", 3.0, 0.6, 15.0),
-        FitParameter("friction.viscous", "N*s/m", 5.0, 0.0, 50.0, logarithmic=False),
-    ]
-    rows = drawn_from((nothing, viscous), np.zeros((0, 0)), parameters, np.array([np.log(3.0), 5.0]))
+    rows = drawn_from((nothing, viscous), np.zeros((0, 0)), [parameters[0], parameters[3]], inner[[0, 3]])
     assert np.exp(np.ptp(rows[:, 0])) > 5
     assert 10 < np.ptp(rows[:, 1]) <= 20.0
 
