@@ -40,11 +40,21 @@ def cluster() -> Iterator[LocalCluster]:
         yield cluster
 
 
-def test_the_same_bits_as_in_one_process(rig: Stage, cluster: LocalCluster) -> None:
+def test_the_same_bits_as_in_one_process(rig: Stage, cluster: LocalCluster, caplog: pytest.LogCaptureFixture) -> None:
+    """Each worker compiles a kernel once; a scheduler without TLS is said to let everybody in."""
+
+    def loaded() -> int:
+        from friso.engine.kernel import _kernels
+
+        return len(_kernels)
+
     with connected(cluster.scheduler_address) as crew:
         assert crew.size == 2
-        (result,) = run_in_memory([Request(rig, AXES).study()], crew)
+        for _ in range(2):
+            (result,) = run_in_memory([Request(rig, AXES).study()], crew)
+            assert {*crew.executor._client.run(loaded).values()} == {1}
     xr.testing.assert_identical(result, sweep(rig, AXES))
+    assert f"{cluster.scheduler_address} can run code" in caplog.text
 
 
 def authority(folder: Path) -> dict[str, str]:
@@ -79,14 +89,6 @@ def test_a_scheduler_with_tls_is_reached_by_dask_s_configuration_alone(
             ):
                 assert crew.size == 1
     assert not [record for record in caplog.records if record.name == "friso"]
-
-
-def test_a_scheduler_without_tls_is_said_to_let_everybody_in(
-    cluster: LocalCluster, caplog: pytest.LogCaptureFixture
-) -> None:
-    with connected(cluster.scheduler_address):
-        pass
-    assert f"{cluster.scheduler_address} can run code" in caplog.text
 
 
 def test_a_worker_uses_no_more_threads_than_it_was_given(rig: Stage, cluster: LocalCluster) -> None:
@@ -144,18 +146,28 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
     xr.testing.assert_identical(stage, whole)
 
 
-def test_a_worker_with_another_friso_is_refused(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(execute, "equations_version", lambda: "9.9.9 (0123456789ab)")
-    with refused() as error, connected(cluster.scheduler_address):
-        pass
-    assert "9.9.9 (0123456789ab)" in str(error.value)
-
-
-def test_a_worker_that_joins_later_with_another_friso_is_refused(rig: Stage, cluster: LocalCluster) -> None:
+def test_a_worker_with_another_friso_is_refused(
+    rig: Stage, cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also one that joins later."""
+    other = "9.9.9 (0123456789ab)"
     with connected(cluster.scheduler_address) as crew:
-        crew.arguments["expected"] = "9.9.9 (0123456789ab)"
+        crew.arguments["expected"] = other
         with refused():
             run_in_memory([Request(rig, AXES).study()], crew)
+    monkeypatch.setattr(execute, "equations_version", lambda: other)
+    with refused() as error, connected(cluster.scheduler_address):
+        pass
+    assert other in str(error.value)
+
+
+def test_a_scheduler_that_does_not_answer_or_has_no_workers() -> None:
+    with StudySettings(scheduler_timeout=0.3).in_use():
+        for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
+            with refused(), connected(address):
+                pass
+    with LocalCluster(n_workers=0, dashboard_address=":0") as empty, refused(), connected(empty.scheduler_address):
+        pass
 
 
 def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
@@ -169,36 +181,6 @@ def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
         connected(scheduler.scheduler_address) as crew,
     ):
         run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, 0.0, close)
-
-
-def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster) -> None:
-    def loaded() -> int:
-        from friso.engine.kernel import _kernels
-
-        return len(_kernels)
-
-    with connected(cluster.scheduler_address) as crew:
-        run_in_memory([Request(rig, AXES).study()], crew)
-        before = crew.executor._client.run(loaded)
-        run_in_memory([Request(rig, AXES).study()], crew)
-        assert crew.executor._client.run(loaded) == before
-        assert all(count == 1 for count in before.values())
-
-
-def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    with StudySettings(scheduler_timeout=0.3).in_use():
-        for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
-            with refused(), connected(address):
-                pass
-
-
-def test_a_scheduler_without_workers() -> None:
-    with (
-        LocalCluster(n_workers=0, dashboard_address=":0") as empty,
-        refused(),
-        connected(empty.scheduler_address),
-    ):
-        pass
 
 
 def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None:

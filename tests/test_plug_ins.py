@@ -33,16 +33,18 @@ class Oil(FrictionSection):
         return Friction(key("friction.damping") * velocity, key("friction.damping"), Component())
 '''
 
-SCRIPT = """
-import friso
-
-if __name__ == "__main__":
-    stage = friso.loads('''
+STAGE = """stage = friso.loads('''
 masses.cart = "1 kg"
 friction = {model = "oil", damping = "2 N*s/m"}
 controller = {kind = "pid", kp = "101 N/m"}
 motion = {kind = "release", displacement = "1 mm", duration = "1 s"}
-''')
+''')"""
+
+SCRIPT = """
+import friso
+
+if __name__ == "__main__":
+    STAGE
     run = friso.simulate(stage, 1e-9)
     print(run.position.values[-1])
 """
@@ -55,19 +57,14 @@ from friso.equations.structure import structure
 
 if __name__ == "__main__":
     building.usable_cores = lambda: 1
-    stage = friso.loads('''
-masses.cart = "1 kg"
-friction = {model = "oil", damping = "2 N*s/m"}
-controller = {kind = "pid", kp = "101 N/m"}
-motion = {kind = "release", displacement = "1 mm", duration = "1 s"}
-''')
+    STAGE
     form = structure(stage.flat())
     print(len(kernels([KernelRequest(form, variational) for variational in (False, True)])))
 """
 
 
 def run(folder: Path, source: str, **more: str) -> str:
-    (folder / "script.py").write_text(source)
+    (folder / "script.py").write_text(source.replace("STAGE", STAGE))
     paths = os.pathsep.join([str(Path(__file__).parent.parent), *more.values()])
     command = [sys.executable, str(folder / "script.py")]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": paths}, timeout=300)
