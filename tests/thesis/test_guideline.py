@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,11 +12,11 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import refused
+from inside import friso_inside
+from refusals import refused, rows_of
 from snapshots import Snapshots
 from variants import VARIANTS
 
-from friso.cli import main
 from friso.equations.model import assemble
 from friso.equations.structure import structure
 from friso.hunting import Ensemble, find_cycles
@@ -177,17 +176,6 @@ def test_edge_of_the_free_rig() -> None:
     assert edge.crossover[0] == pytest.approx(5.60, abs=0.05)
 
 
-@RIGID
-def test_simulation_agrees_where_hunting_ends() -> None:
-    """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz."""
-    flat = rigid().flat()
-    swinging, expected = swings_from_any_distance(
-        Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2)
-    )
-    assert swinging.tolist() == [True, False]
-    assert expected.all()
-
-
 def sample(*values: float) -> dict[str, np.ndarray]:
     """A sample of the locked sweep, as in docs/evidence/guideline_edges.csv."""
     return {name: np.array([value]) for name, value in zip(sweeps.LOCKED_BOX, values, strict=True)}
@@ -215,8 +203,14 @@ def swept(values: dict[str, np.ndarray]) -> Edges:
 
 
 @RIGID
-def test_simulation_sees_small_cycles() -> None:
-    """At a gap of 0.12 a cycle swings by less than a tenth of the deflection by the break-away force."""
+def test_simulation_agrees_where_hunting_ends() -> None:
+    """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz; at a gap of 0.12 one
+    swings by less than a tenth of the deflection by the break-away force, which is seen as well."""
+    flat = rigid().flat()
+    crossovers = {"controller.crossover": np.array([9.0, 11.2])}
+    swinging, expected = swings_from_any_distance(Ensemble.held(flat | crossovers, 2))
+    assert swinging.tolist() == [True, False]
+    assert expected.all()
     stages = at(SMALL_CYCLE, 0.9 * 0.02619)
     cycles = find_cycles(stages)
     assert cycles.attracting[0]
@@ -225,7 +219,12 @@ def test_simulation_sees_small_cycles() -> None:
 
 
 @RIGID
-def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_edge_stays_where_simulations_settle_above_but_not_where_they_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cycle that repels far above does not tell of the edge; a failed simulation is not one that settles."""
+    runs = swept(FAR_FLIP)
+    assert runs.kind[0] == LOST
+    assert runs.crossover[0] == pytest.approx(0.0985, abs=3e-4)
+
     def failing(stages: Ensemble, begin: Any, periods: float) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(stages.count, bool), np.arange(stages.count) > 0
 
@@ -234,14 +233,6 @@ def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPat
     runs = swept(FAR_FLIP)
     assert runs.kind[0] == UNKNOWN
     assert not runs.located[0]
-
-
-@RIGID
-def test_edge_stays_where_simulations_settle_above() -> None:
-    """A cycle that repels far above does not tell of the edge."""
-    runs = swept(FAR_FLIP)
-    assert runs.kind[0] == LOST
-    assert runs.crossover[0] == pytest.approx(0.0985, abs=3e-4)
 
 
 @RIGID
@@ -268,6 +259,7 @@ def made(count: int, seed: int, noise: float) -> tuple[dict[str, np.ndarray], np
 
 
 def test_law_finds_known_numbers_and_leaves_out_the_rest() -> None:
+    """Whatever outliers there are; held-out errors tell a law of the wrong shape."""
     values, edges = made(256, 1, 0.02)
     law = fit_law(LOCKED_LAW, values, edges)
     assert law.factors == pytest.approx((1.5, 0.4), rel=0.02)
@@ -280,19 +272,10 @@ def test_law_finds_known_numbers_and_leaves_out_the_rest() -> None:
     assert errors.rms == pytest.approx(0.02, rel=0.15)
     assert errors.median < errors.usual < errors.worst < 0.1
     assert errors.least < 1 < errors.safe < errors.most
-
-
-def test_law_is_not_led_astray_by_outliers() -> None:
-    values, edges = made(256, 1, 0.02)
+    wrong = fit_law(EdgeLaw((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(rates_in_series, 1.0)), values, edges)
+    assert Errors.between(wrong.edge(others), held_out).rms > 0.5
     edges[::40] *= 5
     assert fit_law(LOCKED_LAW, values, edges).factors == pytest.approx((1.5, 0.4), rel=0.05)
-
-
-def test_held_out_errors_tell_a_law_of_the_wrong_shape() -> None:
-    values, edges = made(256, 1, 0.0)
-    wrong = fit_law(EdgeLaw((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(rates_in_series, 1.0)), values, edges)
-    others, held_out = made(256, 2, 0.0)
-    assert Errors.between(wrong.edge(others), held_out).rms > 0.5
 
 
 @pytest.mark.thorough
@@ -337,29 +320,31 @@ def as_claimed(name: str, flat: dict[str, Any]) -> float:
     }[name]
 
 
+def judgements(edge: Any, kind: str = FLIP) -> list[str]:
+    return [item.judgement for item in judged_claims(studied(edge, kind))]
+
+
 def test_claims_hold_differ_or_are_unknown() -> None:
-    holds = judged_claims(studied(as_claimed))
-    assert [hold.judgement for hold in holds] == ["holds"] * 6
-    differs = judged_claims(
-        studied(lambda name, flat: 30.0 if name in ("share", "friction") else as_claimed(name, flat))
-    )
-    assert [differ.judgement for differ in differs] == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
-    lost = judged_claims(studied(lambda name, flat: np.nan, UNKNOWN))
-    assert {item.judgement for item in lost} == {"unknown"}
-    assert all("unknown" in entry.result for entry in lost)
-
-
-def test_edges_below_the_grid_are_good_ones() -> None:
     """An edge below the grid is neither unknown nor the worst."""
+
+    def as_claimed_but(value: float, *names: str) -> Any:
+        return lambda name, flat: value if name in names else as_claimed(name, flat)
+
+    assert judgements(as_claimed) == ["holds"] * 6
+    differs = judgements(as_claimed_but(30.0, "share", "friction"))
+    assert differs == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
+    lost = judged_claims(studied(lambda name, flat: np.nan, UNKNOWN))
+    assert all((item.judgement, "unknown" in item.result) == ("unknown", True) for item in lost)
+    share = judged_claims(studied(as_claimed_but(np.nan, "share"), BELOW))[1]
+    assert (share.judgement, BELOW in share.result) == ("holds", True)
+
+
+@pytest.mark.parametrize(("kind", "worst", "unknown", "does"), [(BELOW, 3.0, 0, True), (UNKNOWN, 1.0, 1, False)])
+def test_the_worst_edge_of_a_design(kind: str, worst: float, unknown: int, does: bool) -> None:
     below = worked.ThesisCase({}, 2.0, np.nan, BELOW)
-    design = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.ThesisCase({}, 2.0, 3.0)), 0.5)
-    assert (design.worst, design.does) == (3.0, True)
-    lost = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.ThesisCase({}, 2.0, np.nan, UNKNOWN)), 0.5)
-    assert (lost.worst, lost.unknown) == (1.0, 1)
-    assert not lost.does
-    share = judged_claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]
-    assert share.judgement == "holds"
-    assert BELOW in share.result
+    other = worked.ThesisCase({}, 2.0, 3.0) if does else worked.ThesisCase({}, 2.0, np.nan, kind)
+    design = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, other), 0.5)
+    assert (design.worst, design.unknown, design.does) == (worst, unknown, does)
 
 
 @pytest.mark.parametrize(("static", "low", "high"), [(2.0, 1.0, 1.0), (1.0, 0.85, np.inf), (20.0, 0.0, 2.0)])
@@ -534,22 +519,19 @@ def test_an_interrupted_guideline_answers_from_fewer_samples(monkeypatch: pytest
     assert ("Interrupted" in " ".join(sentences(answer))) is answer.interrupted
 
 
-@pytest.mark.parametrize("samples", ["0", "-3", "63", "100000"])
-def test_wrong_number_of_samples(samples: str, monkeypatch: Any, capsys: Any, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "argv", ["friso", "guideline", "--samples", samples, "--out", str(tmp_path / "none")])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert left.value.code == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("friso: --samples\n")
-    assert {samples, "64", "65536"} <= {*err.split()}
+@pytest.mark.parametrize("samples", ["0", "63", "100000"])
+def test_wrong_number_of_samples(samples: str, tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, "guideline", "--samples", samples, "--out", "none")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("friso: --samples\n")
+    assert rows_of(done.stderr)
+    assert {samples, "64", "65536"} <= {*done.stderr.split()}
     assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.parametrize("parts", [0, 1])
 def test_an_interrupted_guideline_says_what_is_kept_and_leaves_nothing_else(
-    parts: int, monkeypatch: Any, capsys: Any, tmp_path: Path
+    parts: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     out = tmp_path / "new" / "out"
 
@@ -560,22 +542,19 @@ def test_an_interrupted_guideline_says_what_is_kept_and_leaves_nothing_else(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("friso_thesis.studies.guideline.compute.guideline", interrupted)
-    monkeypatch.setattr(sys, "argv", ["friso", "guideline", "--samples", "64", "--out", str(out)])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert left.value.code == 130
-    assert ("1 part of the sweeps is kept" in capsys.readouterr().err) == bool(parts)
+    done = friso_inside(tmp_path, "guideline", "--samples", "64", "--out", out)
+    assert done.returncode == 130
+    assert ("1 part of the sweeps is kept" in done.stderr) == bool(parts)
     assert len([*tmp_path.rglob("*.npz")]) == parts
     assert (tmp_path / "new").exists() == bool(parts)
 
 
-def test_parasitic_modes_in_words(snapshots: Snapshots) -> None:
+def test_parasitic_modes_in_words() -> None:
     modes = [
         ParasiticLimits(100.0, 0.01, (0.1, 69.2), None),
         ParasiticLimits(300.0, 0.01, (0.1, 69.9), (3.82, 14.2)),
         ParasiticLimits(100.0, 0.001, None, None),
     ]
-    texts = parasitic_sentences(modes)
     facts = (
         ("0.1 Hz", "69.2 to 69.9 Hz", "1.45 to 4.29"),
         ("locked", "0.001"),
@@ -583,5 +562,5 @@ def test_parasitic_modes_in_words(snapshots: Snapshots) -> None:
         ("free", "0.001"),
         ("1.45 to 21.1",),
     )
+    texts = parasitic_sentences(modes)
     assert [fact for row, text in zip(facts, texts, strict=True) for fact in row if fact not in text] == []
-    snapshots.check("guideline", "parasitic modes", "\n".join(texts))
