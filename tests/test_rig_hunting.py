@@ -14,7 +14,6 @@ from friso.progress import silent
 from friso.questions.rig.words import rig_document, rig_figures, sentences
 from friso.studies.rig.experiments import hunting
 from friso.studies.rig.moves_on_rails import (
-    RailRuns,
     distance,
     move,
     numbers_of,
@@ -55,25 +54,19 @@ def test_a_cycle_of_known_shape() -> None:
 
 
 def test_swings_that_die_out_count_but_do_not_last() -> None:
+    """Runs that failed neither hunt nor settle."""
     time = np.arange(0, 20, 1e-3)
-    dying = np.where(time < 16.5, 5e-4 * np.sin(2 * np.pi * time), 0.0)
-    runs = rail_runs(recorded(dying))
+    runs = rail_runs(recorded(np.where(time < 16.5, 5e-4 * np.sin(2 * np.pi * time), 0.0)))
     assert runs.peaks[0] == 7  # maxima at 10.25, 11.25, ..., 16.25 s
     assert not runs.swings[0]
-
-
-def test_runs_that_failed_neither_hunt_nor_settle() -> None:
-    time = np.arange(0, 20, 1e-3)
     cycle = 5e-4 * np.sin(2 * np.pi * time)
     runs = rail_runs(recorded(cycle, np.where(time < 15, cycle, np.nan), np.zeros_like(time)))
     assert runs.failed.tolist() == [False, True, False]
     assert np.isnan(runs.swing[1])
     share = runs.share()
     assert share.probability == 0.5
-    assert (
-        share.high
-        > replace(runs, **{item.name: getattr(runs, item.name)[[0, 2]] for item in fields(runs)}).share().probability
-    )
+    sound = replace(runs, **{item.name: getattr(runs, item.name)[[0, 2]] for item in fields(runs)})
+    assert share.high > sound.share().probability
 
 
 def test_turning_points_of_a_flat_top() -> None:
@@ -82,38 +75,24 @@ def test_turning_points_of_a_flat_top() -> None:
 
 
 def test_the_move_is_the_thesis_s() -> None:
-    """Sec. 4.3.2: 100 mm at 100 m/s^2."""
+    """Sec. 4.3.2: 100 mm at 100 m/s^2. A larger stage moves farther, and one without a joint is refused."""
     task = move(RIG)
     assert distance(RIG) == pytest.approx(0.1)
     assert task.pieces[0] == pytest.approx([0, 0, 0, 100])
     assert task.pieces[-1] == pytest.approx([2 * np.sqrt(0.1 / 100), 0.1, 0, 0])
     assert task.duration == 20.0
-
-
-def test_a_larger_stage_moves_farther() -> None:
     assert distance(RIG.replace({"motion.acceleration_time": "0.1 s"})) == pytest.approx(1.0)
-
-
-def test_what_has_no_joint_or_goes_nowhere() -> None:
-    bare = RIG.replace({"joint": None, "parasitic": None})
     with refused("joint"):
-        hunting.run_experiment(bare, 1, silent)
+        hunting.run_experiment(RIG.replace({"joint": None, "parasitic": None}), 1, silent)
 
 
-@pytest.fixture(scope="module")
-def moved() -> RailRuns:
-    """The rig with its joint locked at 8 and 14.3 Hz, on eight rails: shape (2, 8)."""
-    locked, seeds = with_joint(RIG, locked=True), rails(RIG)[:8]
-    changes = on_rails(RIG, {"controller.crossover": np.array([8.0, 14.3])}, seeds)
-    return run_moves(locked, move(RIG), numbers_of(1, 2, 8), changes).shaped(2, 8)
-
-
-def test_hunting_ends_at_more_crossover(moved: RailRuns) -> None:
-    """Fig. 25: it hunts at 8 Hz, here on some rails, and no more at 14.3 Hz."""
+def test_hunting_ends_at_more_crossover() -> None:
+    """Fig. 25: it hunts at 8 Hz, here on some of eight rails, and no more at 14.3 Hz."""
+    changes = on_rails(RIG, {"controller.crossover": np.array([8.0, 14.3])}, rails(RIG)[:8])
+    moved = run_moves(with_joint(RIG, locked=True), move(RIG), numbers_of(1, 2, 8), changes).shaped(2, 8)
     assert 2 <= (moved.peaks[0] > 0).sum() < 8
     assert not moved.peaks[1].any()
-    lives = moved.swings[0]
-    assert moved.swing[0, lives] == pytest.approx(1e-3, rel=0.5)
+    assert moved.swing[0, moved.swings[0]] == pytest.approx(1e-3, rel=0.5)
 
 
 def test_hunting_can_be_started() -> None:

@@ -55,4 +55,4 @@ def test_a_loop_that_swings_between_its_limits_is_told(built: Stage) -> None:
     """Logs that end at once show no passes: their page is written all the same."""
     outcome = constant_speed.run_experiment(built.replace({"controller.crossover": "500 Hz"}), 1, silent)
     assert all(log.failure for log in outcome.logs)
-    wording(" ".join(sentences(outcome)))
+    assert "5 of 5 logs stopped early" in " ".join(sentences(outcome))
