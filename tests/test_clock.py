@@ -89,6 +89,13 @@ def noise(seeds: Any, ticks: Any) -> np.ndarray:
     return in_all(deviate, rows)[2].reshape(seeds.shape)
 
 
+def sampled(shape: Kernel, results: Results, name: str) -> np.ndarray:
+    """The samples of a held number or of a state of a run."""
+    if name in shape.held:
+        return results.samples[0, :, len(shape.full_state) + shape.held.index(name)]
+    return results.samples[0, :, shape.full_state.index(name)]
+
+
 def mixed(z: int) -> int:
     """SplitMix64 in Python's whole numbers."""
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
@@ -202,23 +209,17 @@ def test_drive_is_that_of_plain_python(delay: float, ramp: str) -> None:
     shape, results = run(keys(stage, delay, **digital), tables=tables)
     assert results.statuses[0] == Status.DONE
     states, commands = Twin(stage, delay).run(tables, 400)
-    simulated = results.samples[0, :400, [shape.full_state.index(n) for n in ("position", "velocity", "motor_force")]].T
     assert np.abs(commands).max() == LIMIT  # the limit is met, and left again
     assert np.mean(np.abs(commands) == LIMIT) < 0.4
-    assert results.samples[0, :400, len(shape.full_state) + shape.held.index("commanded")] == pytest.approx(
-        commands[:400], abs=1e-6
-    )
-    assert simulated == pytest.approx(states, abs=1e-7, rel=1e-7)
+    assert sampled(shape, results, "commanded")[:400] == pytest.approx(commands[:400], abs=1e-6)
+    for column, name in enumerate(("position", "velocity", "motor_force")):
+        assert sampled(shape, results, name)[:400] == pytest.approx(states[:, column], abs=1e-7, rel=1e-7)
 
 
 def test_delays_act_in_turn() -> None:
     """Every whole sample of delay lets the first force come a sample later; the first sample asks for none."""
-    first = []
-    for delay in DELAYS:
-        shape, results = run(keys(axis(), delay))
-        moving = np.abs(results.samples[0, :, shape.full_state.index("motor_force")]) > 1e-9
-        first.append(int(np.argmax(moving)))
-    assert first == [2 + int(delay) for delay in DELAYS]
+    forces = [sampled(*run(keys(axis(), delay)), "motor_force") for delay in DELAYS]
+    assert [int(np.argmax(np.abs(force) > 1e-9)) for force in forces] == [2 + int(delay) for delay in DELAYS]
 
 
 def test_the_continuous_loop_is_approached_in_the_first_order() -> None:
@@ -228,8 +229,7 @@ def test_the_continuous_loop_is_approached_in_the_first_order() -> None:
     times, errors = TIME / 2.0 ** np.arange(5), []
     for time in times:
         flat = keys(stage, sample_time=time, current_bandwidth=0.5 / time)
-        shape, results = run(flat, every=round(0.01 / TIME), rtol=1e-9)
-        positions = results.samples[0, :40, shape.full_state.index("position")]
+        positions = sampled(*run(flat, every=round(0.01 / TIME), rtol=1e-9), "position")[:40]
         errors.append(float(np.abs(positions - exact.position.values[:40]).max()))
     slope = np.polyfit(np.log(times[1:]), np.log(errors[1:]), 1)[0]
     assert slope == pytest.approx(1, abs=0.1)
@@ -247,17 +247,13 @@ def test_samples_are_noted_at_their_instants(every: int, delay: float) -> None:
 
 def test_tables_between_their_points() -> None:
     """A table that is a straight line is one, whether its points are far apart or closer than samples."""
-    shape, commanded = None, []
+    still = {"controller.kp": 1e-9, "controller.ki": 1e-9, "controller.kd": 1e-9}
     for count in (2, 5, 401, 3001):
         line = np.zeros((1, 2, count))
         line[0, 0] = np.linspace(-4.0, 6.0, count)
         tables = FLAT_TABLES._replace(times=line, per_second=np.array([(count - 1) / 0.4]))
-        still = {"controller.kp": 1e-9, "controller.ki": 1e-9, "controller.kd": 1e-9}
-        shape, results = run(keys(axis()) | still, tables=tables)
-        commanded.append(results.samples[0, :400, len(shape.full_state) + shape.held.index("commanded")])
-    expected = -4.0 + 10.0 * np.arange(400) * TIME / 0.4
-    for force in commanded:
-        assert force == pytest.approx(expected, abs=1e-9)
+        force = sampled(*run(keys(axis()) | still, tables=tables), "commanded")[:400]
+        assert force == pytest.approx(-4.0 + 10.0 * np.arange(400) * TIME / 0.4, abs=1e-9)
 
 
 def test_any_lane_and_any_number_of_threads() -> None:
@@ -304,8 +300,7 @@ def test_what_is_not_watched_is_not_a_number() -> None:
     statistics = results.statistics[0]
     assert np.isnan(statistics[1:5]).all()
     assert statistics[7] == pytest.approx(0.4)
-    force = np.abs(results.samples[0, :, shape.full_state.index("motor_force")])
-    assert statistics[0] == pytest.approx(np.nanmax(force), rel=1e-3)
+    assert statistics[0] == pytest.approx(np.nanmax(np.abs(sampled(shape, results, "motor_force"))), rel=1e-3)
 
 
 # --- the controller's expressions, beside plain Python and SciPy ------------------------------------------------------
@@ -450,18 +445,19 @@ FEATURES: Mapping[str, Flat] = {
     "deadband": {"integrator_deadband": 7e-4},
     "reset": {"integrator_reset": 1.0},
 }
-DRIVES = {
-    "plain": {},
-    **FEATURES,
-    "all": {name: value for feature in FEATURES.values() for name, value in feature.items()},
-}
+DRIVES = {**FEATURES, "all": {name: value for feature in FEATURES.values() for name, value in feature.items()}}
+WINDUP = {"controller.anti_windup_time": 5 * TIME}
+LIMITED = {how: {**WINDUP, "controller.anti_windup": how} for how in ("none", "back_calculation")}
 
 
 @pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
-@pytest.mark.parametrize("feature", DRIVES)
+@pytest.mark.parametrize("feature", ["plain", *DRIVES, *LIMITED])
 def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:
-    """Features are tested one by one and together; each makes a difference, and the limit is reached."""
-    flat, inputs = keys(axis(), **DRIVES[feature]) | tuned, motions()
+    """Features are tested one by one and together; each makes a difference, and the limit is reached.
+
+    At the limit of the force the integrator winds up, or unwinds in proportion to the excess, or rests.
+    """
+    flat, inputs = keys(axis(), **DRIVES.get(feature, {})) | tuned | LIMITED.get(feature, {}), motions()
     result = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
     commands, integrals = plain_drive(flat, inputs)
     assert result["commanded"] == pytest.approx(commands, abs=1e-9)
@@ -469,20 +465,6 @@ def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:
     assert 0.02 < np.mean(np.abs(commands) == LIMIT) < 0.7
     without = plain_drive(keys(axis()) | tuned, inputs)[0]
     assert (np.abs(commands - without).max() > 0.01) == (feature != "plain")
-
-
-@pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
-@pytest.mark.parametrize("anti_windup", ["none", "back_calculation"])
-def test_the_integrator_at_the_limit_of_the_force(anti_windup: str, tuned: Flat) -> None:
-    """The integrator winds up, or unwinds in proportion to the excess; both differ from one that rests."""
-    how = {"controller.anti_windup": anti_windup, "controller.anti_windup_time": 5 * TIME}
-    flat, inputs = keys(axis()) | tuned | how, motions()
-    held = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
-    commands, integrals = plain_drive(flat, inputs)
-    assert held["commanded"] == pytest.approx(commands, abs=1e-9)
-    assert held["integral"] == pytest.approx(integrals, abs=1e-12)
-    clamped = plain_drive(keys(axis()) | tuned, inputs)[0]
-    assert np.abs(commands - clamped).max() > 0.01
 
 
 def settled(error: list[float], **drive: float) -> np.ndarray:

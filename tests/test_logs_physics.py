@@ -36,9 +36,9 @@ def steps() -> dict[str, np.ndarray]:
     rng = np.random.default_rng(1)
     force = np.repeat(LEVELS, 600).astype(float)
     position, velocity = pushed(force)
+    noise = [rng.normal(0, 0.02, len(force)), rng.normal(0, 4e-3, len(force))]
     time = STEP * np.arange(len(force))
-    force = force + rng.normal(0, 0.02, len(force))
-    return {"time": time, "force": force, "position": position, "velocity": velocity + rng.normal(0, 4e-3, len(force))}
+    return {"time": time, "force": force + noise[0], "position": position, "velocity": velocity + noise[1]}
 
 
 def servo(sign: float = 1.0) -> dict[str, np.ndarray]:
@@ -70,25 +70,28 @@ def options(path: Path) -> tuple[str, ...]:
     return caught.value.options
 
 
+def written(folder: Path, names: list[str], *columns: np.ndarray) -> Path:
+    return log_files.write_text(folder / f"{len([*folder.iterdir()])}.csv", names, columns)
+
+
 def test_force_and_velocity_without_a_unit(tmp_path: Path) -> None:
     """The one of two columns that is the derivative of nothing is no position; the copied line reads the log."""
     log = steps()
-    path = log_files.write_text(tmp_path / "a.csv", ["t", "u", "v"], [log["time"], log["force"], log["velocity"]])
-    offered = options(path)
-    assert {*offered} == {"--map velocity=v", "--map force=u", "--unit t=s", "--unit v=m/s", "--unit u=N"}
+    path = written(tmp_path, ["t", "u", "v"], log["time"], log["force"], log["velocity"])
+    assert {*options(path)} == {"--map velocity=v", "--map force=u", "--unit t=s", "--unit v=m/s", "--unit u=N"}
     said = from_options(["velocity=v", "force=u"], ["t=s", "v=m/s", "u=N"])
     (file,) = read_all([path], said, tmp_path)
     assert file.kind == "moves"
-    assert isinstance(file.source.signals, dict)  # pyright: ignore[reportAttributeAccessIssue]
     assert np.ptp(file.source["position"] - log["position"]) < 0.01  # pyright: ignore[reportIndexIssue]
+    against = written(tmp_path, ["t", "u", "v"], log["time"], -log["force"], log["velocity"])
+    assert '--scale force="-1 N/N"' in options(against)
 
 
 def test_a_ramp_of_whole_numbers_counts(tmp_path: Path) -> None:
     log = steps()
     count = np.arange(len(log["time"]))
-    path = log_files.write_text(tmp_path / "a.csv", ["n", "y", "u"], [count, 1e3 * log["velocity"], log["force"]])
-    offered = options(path)
-    assert {"--map velocity=y", "--map force=u", "--unit y=mm/s", '--dt "NUMBER ms"'} <= {*offered}
+    path = written(tmp_path, ["n", "y", "u"], count, 1e3 * log["velocity"], log["force"])
+    assert {"--map velocity=y", "--map force=u", "--unit y=mm/s", '--dt "NUMBER ms"'} <= {*options(path)}
     with pytest.raises(OpenQuestions, match='"n" counts samples'):
         read_all([path], Mapping(), tmp_path)
 
@@ -109,47 +112,37 @@ def test_no_role_follows_from_the_place_of_a_column(order: tuple[int, ...], tmp_
 def test_rpm_and_amperes(tmp_path: Path) -> None:
     """A reference speed is not taken for a position, and all open questions are asked at once."""
     log = steps()
-    wanted = np.repeat(np.array(LEVELS) / 25, 600) * 600
-    columns = [log["time"], wanted, 300 * log["velocity"], log["force"] / 35]
-    path = log_files.write_text(tmp_path / "a.csv", ["time", "rpm_ref", "rpm", "current"], columns)
-    offered = options(path)
-    assert {*offered} == {"--unit time=s", "--axis rotary", "--unit rpm=rpm", "--unit current=A"}
+    wanted, rpm = np.repeat(np.array(LEVELS) / 25, 600) * 600, 300 * log["velocity"]
+    path = written(tmp_path, ["time", "rpm_ref", "rpm", "current"], log["time"], wanted, rpm, log["force"] / 35)
+    assert {*options(path)} == {"--unit time=s", "--axis rotary", "--unit rpm=rpm", "--unit current=A"}
     (file,) = read_all([path], from_options([], ["time=s", "rpm=rpm", "current=A"], axis="rotary"), tmp_path)
-    assert file.source["velocity"].max() == pytest.approx(np.pi / 30 * columns[2].max())  # pyright: ignore
+    assert file.source["velocity"].max() == pytest.approx(np.pi / 30 * rpm.max())  # pyright: ignore
 
 
 def test_a_position_comes_before_its_own_derivative(tmp_path: Path) -> None:
     """The velocity explains the force better, but the position holds the micrometres in which bristles bend."""
     log = servo()
     velocity = np.gradient(log["position"], log["time"])
-    columns = [log["time"], log["position"], velocity, log["force"]]
-    path = log_files.write_text(tmp_path / "a.csv", ["t", "x", "v", "u"], columns)
+    path = written(tmp_path, ["t", "x", "v", "u"], log["time"], log["position"], velocity, log["force"])
     assert {"--map position=x", "--map force=u"} <= {*options(path)}
-
-
-def test_a_force_against_its_motion_is_offered_with_a_negative_scale(tmp_path: Path) -> None:
-    log = steps()
-    path = log_files.write_text(tmp_path / "a.csv", ["t", "u", "v"], [log["time"], -log["force"], log["velocity"]])
-    assert '--scale force="-1 N/N"' in options(path)
 
 
 def test_names_of_torques_tell_a_rotary_axis_where_the_motion_has_no_unit(tmp_path: Path) -> None:
     log = steps()
     columns = [log["time"], log["velocity"], log["force"]]
-    path = log_files.write_text(tmp_path / "a.csv", ["time", "speed", "torque"], columns)
-    assert {*options(path)} == {"--unit time=s", "--axis rotary", "--unit speed=rad/s", '--unit torque="N*m"'}
-    path = log_files.write_text(tmp_path / "b.csv", ["time", "speed [mm/s]", "torque"], columns)
-    assert "--axis rotary" not in options(path)
+    offered = options(written(tmp_path, ["time", "speed", "torque"], *columns))
+    assert {*offered} == {"--unit time=s", "--axis rotary", "--unit speed=rad/s", '--unit torque="N*m"'}
+    assert "--axis rotary" not in options(written(tmp_path, ["time", "speed [mm/s]", "torque"], *columns))
 
 
 def test_logs_with_the_same_channels_are_asked_once(tmp_path: Path) -> None:
     """A log that hardly moves would have the force for the position: most decide."""
-    log = steps()
-    hardly = [log["time"], log["force"], np.random.default_rng(1).normal(0, 1e-3, len(log["time"]))]
-    paths = [log_files.write_text(tmp_path / "a.csv", ["t", "u", "v"], hardly)]
-    for name in ("b", "c"):
-        columns = [log["time"], log["force"], log["velocity"]]
-        paths.append(log_files.write_text(tmp_path / f"{name}.csv", ["t", "u", "v"], columns))
+    log, names = steps(), ["t", "u", "v"]
+    still = np.random.default_rng(1).normal(0, 1e-3, len(log["time"]))
+    paths = [
+        written(tmp_path, names, log["time"], log["force"], moving)
+        for moving in (still, log["velocity"], log["velocity"])
+    ]
     with pytest.raises(OpenQuestions) as caught:
         read_usable(paths, Mapping(), tmp_path)
     assert {*caught.value.options} == {"--map velocity=v", "--map force=u", "--unit t=s", "--unit v=m/s", "--unit u=N"}
@@ -158,26 +151,22 @@ def test_logs_with_the_same_channels_are_asked_once(tmp_path: Path) -> None:
 
 def test_a_kept_role_that_is_wrong_is_mentioned(tmp_path: Path) -> None:
     log = steps()
-    path = log_files.write_text(
-        tmp_path / "a.csv", ["time [s]", "force [N]", "velocity [m/s]"], [log["time"], log["force"], log["velocity"]]
-    )
+    columns = [log["time"], log["force"], log["velocity"]]
+    path = written(tmp_path, ["time [s]", "force [N]", "velocity [m/s]"], *columns)
     for channel in ("force", "elsewhere"):
-        path.with_name("a.csv.friso.toml").write_text(f'[roles]\nposition = "{channel}"\n', "utf-8")
-        with pytest.raises(LogError, match=f"as kept in a.csv.friso.toml: position is {channel}"):
+        path.with_name("0.csv.friso.toml").write_text(f'[roles]\nposition = "{channel}"\n', "utf-8")
+        with pytest.raises(LogError, match=f"as kept in 0.csv.friso.toml: position is {channel}"):
             read_all([path], Mapping(), tmp_path)
 
 
-def test_a_command_that_switches_is_not_clipped() -> None:
+def test_a_command_that_switches_is_not_clipped_and_in_round_numbers_not_coarse() -> None:
+    """A dozen levels, all multiples of 0.1 N, each held for half a second."""
     switched = np.repeat([0.0, 9.0, 0.0, 9.0], 500)
     assert clipped_share(switched) == 0
     assert digit_of(switched) == 0
     wave = 9 * np.sin(np.linspace(0, 20, 2000))
     assert clipped_share(np.clip(wave, -6, 6)) > 0.3
     assert digit_of(np.round(wave)) == pytest.approx(1.0)
-
-
-def test_forces_commanded_in_round_numbers_are_no_coarse_digits() -> None:
-    """A dozen levels, all multiples of 0.1 N, each held for half a second."""
     levels = np.array([1.2, -0.7, 2.0, 0.3, -1.9, 1.1, -0.4, 0.8, -1.5, 1.7, 0.5, -1.1])
     assert digit_of(np.repeat(levels, 500)) == 0
     slow = np.round(2 * np.sin(np.linspace(0, 6, 6000)), 1)
@@ -190,31 +179,23 @@ def test_two_readings_are_asked(tmp_path: Path) -> None:
     """Two forces that explain the motion about as well: neither is offered, and both are named."""
     log = servo()
     twice = log["force"] * 2 + np.random.default_rng(3).normal(0, 0.1, len(log["force"]))
-    columns = [log["time"], log["position"], log["force"], twice + 7 * np.sign(np.gradient(log["position"]))]
-    path = log_files.write_text(tmp_path / "a.csv", ["time [s]", "pos [m]", "a", "b"], columns)
+    other = twice + 7 * np.sign(np.gradient(log["position"]))
+    path = written(tmp_path, ["time [s]", "pos [m]", "a", "b"], log["time"], log["position"], log["force"], other)
     with pytest.raises(GapsError) as caught:
         read_all([path], Mapping(), tmp_path)
     assert not any("--map force" in option for option in caught.value.options)
     assert "--map force=b or --map force=a" in str(caught.value)
-
-
-def test_one_channel_has_one_role(tmp_path: Path) -> None:
-    log = servo()
-    path = log_files.write_text(
-        tmp_path / "a.csv", ["time [s]", "x [m]", "F [N]"], [*[*log.values()][::2], log["force"]]
-    )
+    path = written(tmp_path, ["time [s]", "x [m]", "F [N]"], log["time"], log["position"], log["force"])
     with pytest.raises(LogError, match="for two roles"):
         read_all([path], from_options(["position=x", "velocity=x"]), tmp_path)
 
 
 def test_a_bad_stamp_costs_its_file_alone(tmp_path: Path) -> None:
-    log = servo()
-    paths = []
+    log, paths = servo(), []
     for number in range(3):
         time = STEP * np.arange(5000)
         time[2500] = 1.0 if number == 1 else time[2500]
-        columns = [time, log["position"], log["force"]]
-        paths.append(log_files.write_text(tmp_path / f"{number}.csv", ["time [s]", "pos [m]", "force [N]"], columns))
+        paths.append(written(tmp_path, ["time [s]", "pos [m]", "force [N]"], time, log["position"], log["force"]))
     files, wrong = read_usable(paths, Mapping(), tmp_path)
     assert [file.path for file in files] == [paths[0], paths[2]]
     assert [error.origin for error in wrong] == [str(paths[1])]
@@ -223,10 +204,8 @@ def test_a_bad_stamp_costs_its_file_alone(tmp_path: Path) -> None:
 
 
 def test_what_was_kept_and_is_said_otherwise_is_told(tmp_path: Path) -> None:
-    log = servo()
-    names = ["time [s]", "a [m]", "b [m]", "force [N]"]
-    path = log_files.write_text(tmp_path / "a.csv", names, [*log.values()])
-    (tmp_path / "a.csv.friso.toml").write_text('[roles]\nposition = "a"\n')
+    path = written(tmp_path, ["time [s]", "a [m]", "b [m]", "force [N]"], *servo().values())
+    (tmp_path / "0.csv.friso.toml").write_text('[roles]\nposition = "a"\n')
     (file,) = read_all([path], from_options(["position=b", "reference=a"]), tmp_path)
     assert "in place of position is a, as kept" in file.reused
     (file,) = read_all([path], from_options(["reference=a", "position=b"]), tmp_path)
