@@ -33,9 +33,9 @@ from friso.axis import ROTARY, speaking_of
 from friso.quantities import percent
 from friso.questions.check.figures import check_figures
 from friso.shown import pages
-from friso.shown.drawing import images, matplotlib_renderer, plotly_maps, plotly_renderer
+from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import KEPT_PER_BUCKET, MOST_BUCKETS, drawable, thin
-from friso.shown.drawing.figure import Axis, Category, Figure, Map, Panel, Series
+from friso.shown.drawing.figure import Axis, Figure, Map, Panel, Series
 from friso.shown.drawing.palette import GREY
 from friso.shown.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
 
@@ -146,15 +146,6 @@ def test_a_spike_of_one_sample_survives_where_it_is(place, height, sign):
     x, kept = thin(np.arange(200_000.0), y)
     assert len(kept) <= (KEPT_PER_BUCKET + 1) * MOST_BUCKETS
     assert kept[x == place] == pytest.approx(sign * height)
-
-
-def test_every_stretch_keeps_its_own_extremes():
-    y = np.random.default_rng(1).normal(size=100_000)
-    x, kept = thin(np.arange(100_000.0), y, 100)
-    for start in range(0, 100_000, 1000):
-        inside = (x >= start) & (x < start + 1000)
-        assert kept[inside].min() == y[start : start + 1000].min()
-        assert kept[inside].max() == y[start : start + 1000].max()
 
 
 def test_a_loop_that_rests_keeps_its_shape():
@@ -274,23 +265,6 @@ def test_files_are_the_same_bytes_in_every_process(request, tmp_path, monkeypatc
     assert done.stdout.split() == digests()
 
 
-def test_a_figure_file_opens_as_an_image(tmp_path):
-    import matplotlib.image
-
-    images.save(small_figure(), tmp_path / "small.PNG")
-    assert matplotlib.image.imread(io.BytesIO((tmp_path / "small.PNG").read_bytes()), format="png").ndim == 3
-
-
-def test_a_page_shows_the_drawing_of_the_file():
-    """Cut off below the heading, which its window alone tells."""
-    window = re.compile(rb'height="([^"]*)pt" viewBox="0 (\S+) 648 (\S+)"')
-    shown, filed = (matplotlib_renderer.image(small_figure(), "svg", headed) for headed in (False, True))
-    assert window.sub(b"", shown) == window.sub(b"", filed)
-    (height, top, seen), (whole, above, _) = (tuple(map(float, window.search(svg).groups())) for svg in (shown, filed))
-    assert (top, above) == (pytest.approx(72 * matplotlib_renderer.HEADER_HEIGHT), 0)
-    assert height == seen == pytest.approx(whole - top)
-
-
 def test_a_page_carries_what_plotly_draws_in_four_bytes_a_number():
     """The first bytes of all numbers of an array stand first, as `page.js` reads them."""
     figure = small_figure()
@@ -361,19 +335,6 @@ def places(path: str) -> np.ndarray:
     return np.array(ends)
 
 
-def with_lines(*labels: str, title: str = "", x: Axis | None = None) -> Panel:
-    """Return a panel with a line for each of these labels."""
-    lines = tuple(Series(np.arange(1.0, 3.0), np.arange(2.0), label, GREY) for label in labels)
-    return Panel(title, x or Axis("x", ""), Axis("y", ""), lines)
-
-
-def layouts(*panels: Panel, columns: int = 1, note: str = "") -> tuple[dict, dict]:
-    """Return the layout of a figure on a narrow page and on a wide one."""
-    figure = Figure("f", "", "", panels, columns=columns, note=note)
-    narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
-    return narrow, wide
-
-
 @pytest.mark.parametrize(
     ("limits", "readable"),
     [
@@ -384,63 +345,8 @@ def layouts(*panels: Panel, columns: int = 1, note: str = "") -> tuple[dict, dic
     ],
 )
 def test_a_log_axis_of_less_than_two_decades_has_whole_numbers(limits, readable):
-    panel = with_lines("", x=Axis("Factor", "", limits, True))
+    line = Series(np.arange(1.0, 3.0), np.zeros(2), "", GREY)
+    panel = Panel("", Axis("Factor", "", limits, True), Axis("y", ""), (line,))
     axis = plotly_renderer.render(Figure("f", "", "", (panel,))).layout.xaxis
     assert {*readable} <= {*axis.ticktext}
     assert len(axis.ticktext) == len(axis.tickvals)
-
-
-def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
-    """The higher what stands above the axes, the higher the figure; no line is wider than the axes."""
-    labels = [f"a line with a long name, {k}" for k in range(4)]
-    panel = with_lines(*labels, title="A title that is too long for the width of a telephone")
-    narrow, wide = layouts(panel, panel, columns=2, note="a long note, " * 8)
-    (note,) = (text["text"].split("<br>") for text in narrow["annotations"])
-    assert all(len(narrow[name]["title"]["text"].split("<br>")) > 1 for name in ("legend", "legend2"))
-    assert max(map(len, note)) < plotly_renderer.NARROW_PAGE_WIDTH / 6
-    assert narrow["height"] > wide["height"]
-    axes = 2 * (plotly_renderer.PLOT_HEIGHT + plotly_renderer.FOOTER_HEIGHT)
-    assert narrow["height"] - axes >= 8 * plotly_maps.KEY_ROW
-
-
-def test_a_title_stands_upon_the_legend_or_upon_the_axes() -> None:
-    """However many rows the legend takes: on a wide page they are fewer."""
-    (_, with_legend), (_, alone) = (layouts(with_lines(*labels, title="A title")) for labels in ("ab", "a"))
-    assert (with_legend["legend"]["title"]["text"], with_legend["annotations"]) == ("<b>A title</b>", [])
-    assert [text["text"] for text in alone["annotations"]] == ["<b>A title</b>"]
-    assert "legend" not in alone
-
-
-@pytest.mark.parametrize(("columns", "lines", "orientation"), [(1, 6, "h"), (2, 2, "h"), (2, 6, "v")])
-def test_legends_beside_each_other_stay_above_their_axes(columns: int, lines: int, orientation: str) -> None:
-    """Plotly breaks the rows of a legend at the width of the figure: two that are wider than their axes overlap."""
-    panel = with_lines(*(f"tuned to {k} Hz" for k in range(lines)), title="model")
-    _, layout = layouts(*(panel,) * columns, columns=columns)
-    assert [layout[f"legend{name}"]["orientation"] for name in ("", "2")[:columns]] == [orientation] * columns
-
-
-def test_the_note_of_a_map_stands_below_all_rows_of_its_key() -> None:
-    """On a narrow page four entries take two rows; without title and key, no space is kept above."""
-    categories = tuple(Category(f"a category {k}", GREY) for k in range(4))
-    codes = np.array([np.arange(4.0)] * 2)
-    field = Map(np.arange(4.0), np.arange(2.0), codes * np.nan, "", "", categories=categories, codes=codes)
-    panel = Panel("", Axis("x", ""), Axis("y", ""), maps=(field,))
-    narrow, wide = layouts(panel, note="a note")
-    rows = [-layout["annotations"][0]["yshift"] // plotly_maps.KEY_ROW for layout in (wide, narrow)]
-    assert rows == [1, 2]
-    assert narrow["height"] - wide["height"] == plotly_maps.KEY_ROW
-    _, titled = layouts(replace(panel, title="A title"), note="a note")
-    assert titled["height"] - wide["height"] == plotly_renderer.TITLE_HEIGHT
-
-
-def test_maps_stand_below_each_other_on_a_narrow_page() -> None:
-    """The places of their colour bars belong to the traces, not to the layout."""
-    field = Map(np.arange(3.0), np.arange(2.0), np.arange(6.0).reshape(2, 3), "peaks", "")
-    panels = tuple(Panel(name, Axis("x", ""), Axis(name, ""), maps=(field,)) for name in "AB")
-    second = replace(panels[1], maps=(replace(field, z=2 * field.z),))
-    (packed,) = packed_values(plotly_renderer.fragment(Figure("f", "", "", (panels[0], second), columns=2)))
-    bars = [bar for bar in packed["bars"] if bar]
-    domains = [packed["narrow"][axis]["domain"] for axis in ("yaxis", "yaxis2")]
-    assert [low < bar["y"] < high for bar, (low, high) in zip(bars, domains, strict=True)] == [True, True]
-    assert packed["narrow"]["xaxis"]["domain"] == packed["narrow"]["xaxis2"]["domain"]
-    assert packed["layout"]["xaxis"]["domain"] != packed["layout"]["xaxis2"]["domain"]
