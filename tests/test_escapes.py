@@ -44,13 +44,22 @@ def test_no_text_steers(text: str) -> None:
     assert table_cell(text)[:1] not in ("=", "+", "-", "@", "\t", "\uff1d")
 
 
-def test_the_text_of_an_error_steers_nothing() -> None:
+def test_the_text_of_an_error_or_of_a_log_record_steers_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    """A folder whose name is no text reached a record raw, and a collector could not encode it."""
     assert not steers(str(friso.InputError(HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, ((HOSTILE, HOSTILE),))))
+    logging.getLogger("friso").warning("%s and %s", "\x1b[2J", "o\udcff")
+    assert caplog.messages == ["\\x1b[2J and o\\udcff"]
 
 
-@pytest.mark.parametrize("text", ["Ångström µm²", "שלום", "ruler −5 °C", "a\tb\nc", "日本"])
-def test_a_harmless_text_stays(text: str) -> None:
-    assert escaped(text) == text
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        *((text, text) for text in ("Ångström µm²", "שלום", "ruler −5 °C", "a\tb\nc", "日本")),
+        ("\x1b[2J\u202ex", r"\x1b[2J\u202ex"),
+    ],
+)
+def test_a_harmless_text_stays_and_what_is_written_out_can_be_read(text: str, shown: str) -> None:
+    assert escaped(text) == shown
 
 
 @pytest.mark.parametrize(
@@ -70,10 +79,6 @@ def test_a_character_that_an_encoding_lacks_is_spelled(encoding: str, shown: str
 @given(st.text(st.characters(exclude_categories=())))
 def test_every_character_can_be_spelled(text: str) -> None:
     assert spelled(text, "ascii").isascii()
-
-
-def test_what_is_written_out_can_be_read() -> None:
-    assert escaped("\x1b[2J\u202ex") == r"\x1b[2J\u202ex"
 
 
 def hostile_stage(folder: Path) -> Path:
@@ -169,9 +174,3 @@ def test_friso_draws_on_the_terminal_itself() -> None:
     assert "Axis:x:pos" in screen.getvalue()
     assert out.isatty()
     assert sys.stdout is not out
-
-
-def test_whoever_collects_log_records_gets_safe_texts(caplog: pytest.LogCaptureFixture) -> None:
-    """A folder whose name is no text reached a record raw, and a collector could not encode it."""
-    logging.getLogger("friso").warning("%s and %s", "\x1b[2J", "o\udcff")
-    assert caplog.messages == ["\\x1b[2J and o\\udcff"]

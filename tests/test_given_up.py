@@ -68,7 +68,8 @@ def beyond(size: float) -> Any:
 
 
 def test_kicks_whose_runs_were_given_up_make_no_window() -> None:
-    """Between 10 and 20 mm no run is completed: there is no edge of hunting."""
+    """Between 10 and 20 mm no run is completed: there is no edge of hunting. Nor do kicks after which swings are far
+    larger than what attracts, which may grow or die out, but takes long without anti-windup."""
     whole = displaced(beyond(2e-3), beyond(0))
     assert whole.unknown == 0
     gap = displaced(beyond(2e-3), lambda kicks: (kicks < 0.01) | (kicks > 0.02))
@@ -76,16 +77,9 @@ def test_kicks_whose_runs_were_given_up_make_no_window() -> None:
     assert gap.windows == whole.windows
     assert len(whole.windows) == 1
     assert 2e-3 < whole.windows[0][0] < 1.01 * 2e-3
-
-
-def test_kicks_after_which_swings_are_far_larger_than_what_attracts_make_no_window() -> None:
-    """Such large swings may grow or die out, which takes long without anti-windup."""
-    kick = displaced(beyond(2e-3), beyond(0), swing=0.5)
-    assert kick.unknown > 0
-    assert kick.searched[1] == kick.windows[-1][1] < 8e-3
-
-
-def test_kicks_of_which_none_is_completed_are_unknown() -> None:
+    large = displaced(beyond(2e-3), beyond(0), swing=0.5)
+    assert large.unknown > 0
+    assert large.searched[1] == large.windows[-1][1] < 8e-3
     nothing = displaced(beyond(2e-3), beyond(1))
     assert (nothing.windows, nothing.unknown) == ((), BasinSettings().kick_count)
     assert nothing.searched == pytest.approx((1e-3 / 30, 0.3))
@@ -144,24 +138,21 @@ def judged(
         ({"swing": 1e-5, "settling": 0.5}, SWINGS_ON),
         ({"other": (True, True)}, BY_CHANCE),
         ({"other": (False, False)}, UNCHECKED),
+        ({"ends": True, "swing": 1e-3, "complete": False}, ""),
+        ({"ends": True, "swing": 1e-2}, RUNS_AWAY),
     ],
 )
 def test_a_motion_that_may_end_in_another_swing_does_not_surely_settle(run: dict[str, Any], doubt: str) -> None:
+    """What ends in the hunting that was found hunts, whatever else there is."""
     judgement = judged(**run)
-    assert judgement.verdict == "bistable"
+    assert judgement.verdict == ("hunts" if "ends" in run else "bistable")
     assert judgement.hunting.certain == (not doubt)
     assert judgement.hunting.reason == doubt
 
 
 def test_a_longer_run_that_is_not_completed_gives_no_verdict() -> None:
     assert judged(completed=False).verdict == "failed"
-
-
-def test_what_ends_in_the_hunting_that_was_found_hunts_whatever_else_there_is() -> None:
-    judgement = judged(ends=True, swing=1e-3, complete=False)
-    assert (judgement.verdict, judgement.hunting.certain) == ("hunts", True)
-    judgement = judged(ends=True, swing=1e-2)
-    assert (judgement.verdict, judgement.hunting.certain, judgement.hunting.reason) == ("hunts", False, RUNS_AWAY)
+    assert all(MORE_WORK in reason for reason in (GIVEN_UP, UNFOLLOWED))  # sentences name the commands by these words
 
 
 @pytest.mark.parametrize(
@@ -232,8 +223,3 @@ def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, wo
     assert (judgement.settled_after, judgement.followed) == (None, None)
     assert (judgement.hunting.certain, judgement.hunting.reason) == (False, UNFOLLOWED)
     assert spent.used < 1e6
-
-
-def test_reasons_of_lacking_work_are_told_by_the_words_that_lead_to_other_commands() -> None:
-    """A check names the commands without a limit of work where a sentence has these words."""
-    assert all(MORE_WORK in reason for reason in (GIVEN_UP, UNFOLLOWED))
