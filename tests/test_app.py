@@ -624,20 +624,34 @@ def test_the_loops_of_the_limit_cases_come_before_those_of_the_family(served: Se
     assert (last["names"], last["sentences"]) == (family["names"], [])
 
 
+AXES = {"x": "masses.stage=0.8 kg..1.2 kg", "y": "friction.static=6 N..12 N"}
+EDGE = Series(np.array([0.9, 1.1]), np.array([7.0, 9.0]), "flip of the hunting cycle", "#222222")
+
+
+def edge_panel(**more: Any) -> Panel:
+    return Panel("", Axis("Stage mass", "kg"), Axis("Static friction", "N"), (EDGE,), **more)
+
+
 def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Last, over the same keys, with its sentence; `friso.boundary` itself takes too long here."""
+    """Last, over the same keys, with its sentence; `friso.boundary` itself takes too long here.
+
+    A stage that cannot hunt has none: `friso.boundary` refuses it, in words that stand below the map.
+    """
+    part = served.ask("map", STICK_SLIP, **AXES, edge=True)[-1]
+    assert part["kind"] == "answer"
+    assert part["figures"]
+    assert "cannot hunt" in part["sentences"][-1]
+    assert "log" not in part["command"] + part["python"]
     asked = []
-    curve = Series(np.array([0.9, 1.1]), np.array([7.0, 9.0]), "flip of the hunting cycle", "#222222")
-    panel = Panel("", Axis("Stage mass", "kg"), Axis("Static friction", "N"), (curve,))
 
     class Edge:
-        figures = staticmethod(lambda: [Figure("boundary", "Edge of hunting", "", (panel,))])
+        figures = staticmethod(lambda: [Figure("boundary", "Edge of hunting", "", (edge_panel(),))])
         sentences = staticmethod(lambda: ["Hunting ends there."])
 
     monkeypatch.setattr(friso, "boundary", lambda stage, **options: asked.append(options) or Edge())
-    axes = {"x": "masses.stage=0.8 kg..1.2 kg", "y": "friction.static=6 N..12 N", "log": True}
+    axes = {**AXES, "log": True}
     answers = [part for part in served.ask("map", STICK_SLIP, **axes, edge=True) if "figures" in part]
-    drawn = [[trace.get("name") for trace in part["figures"][0]["data"]].count(curve.label) for part in answers]
+    drawn = [[trace.get("name") for trace in part["figures"][0]["data"]].count(EDGE.label) for part in answers]
     assert drawn[:-1] == [0, 0, 0]
     assert drawn[-1] > 0
     assert [options | {"progress": None} for options in asked] == [axes | {"progress": None}]
@@ -647,19 +661,9 @@ def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: py
     assert layout["xaxis"]["type"] == layout["yaxis"]["type"] == "log"
 
 
-def test_a_map_stays_where_there_is_no_edge(served: Served) -> None:
-    """A stage that cannot hunt: `friso.boundary` refuses it, in words that stand below the map."""
-    axes = {"x": "masses.stage=0.8 kg..1.2 kg", "y": "friction.static=6 N..12 N"}
-    part = served.ask("map", STICK_SLIP, **axes, edge=True)[-1]
-    assert part["kind"] == "answer"
-    assert part["figures"]
-    assert "cannot hunt" in part["sentences"][-1]
-    assert "log" not in part["command"] + part["python"]
-
-
 def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     """Last, for it takes as long again; `friso.boundary` itself takes too long here, and a coarse map is there before,
-    unless the edge is kept."""
+    unless the edge is kept, and stays where there is none."""
     asked = []
 
     class Edge:
@@ -669,12 +673,13 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
         def __init__(self, stage: friso.Stage) -> None:
             asked.append(self)
             logging.getLogger("friso").warning("static friction of %g N", stage.flat()["friction.static"])
-            curve = Series(np.array([0.9, 1.1]), np.full(2, stage.flat()["friction.static"]), "flip", "#222222")
-            cloud = Cloud(np.ones(1), np.ones(1), np.ones(1), "", "")
-            self.panel = Panel("", Axis("Stage mass", "kg"), Axis("Static friction", "N"), (curve,), clouds=(cloud,))
+            self.panel = edge_panel(clouds=(Cloud(np.ones(1), np.ones(1), np.ones(1), "", ""),))
 
         def figures(self) -> list[Figure]:
             return [Figure("boundary", "Edge of hunting", "", (self.panel,))]
+
+    def refused(stage: friso.Stage, **_: Any) -> None:
+        raise InputError("controller", "no integral action", "a stage that can hunt")
 
     monkeypatch.setattr(friso, "boundary", lambda stage, **_: Edge(stage))
     axes = {"x": "friction.coulomb=1 N..2 N", "y": "friction.static=6 N..12 N"}
@@ -683,18 +688,12 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
         drawn = [part["figures"][0] for part in parts if "figures" in part]
         assert [figure["name"] for figure in drawn] == pictures
         first, last = (figure["data"] for figure in drawn[-2:])
-        assert {trace.get("name") for trace in last} >= {"flip", "pinned", "this machine"}
+        assert {trace.get("name") for trace in last} >= {EDGE.label, "pinned", "this machine"}
         assert parts[-1]["notes"] == ["static friction of 9 N"]
         assert len(last) > len(first)
     assert len(asked) == 2  # both are kept
-
-
-def test_where_there_is_no_edge_the_coarse_map_stays(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(stage: friso.Stage, **_: Any) -> None:
-        raise InputError("controller", "no integral action", "a stage that can hunt")
-
     monkeypatch.setattr(friso, "boundary", refused)
-    axes = {"x": "friction.coulomb=1 N..2 N", "y": "friction.static=6 N..13 N"}
+    axes["y"] = "friction.static=6 N..13 N"
     first, last = (part for part in served.ask("boundary", STICK_SLIP, **axes) if "figures" in part)
     assert (first["kind"], last["kind"]) == ("partly", "answer")
     assert "no integral action" in last["sentences"][0]

@@ -24,7 +24,6 @@ from friso.studies.store import Store
 from friso.studies.study import Request
 from friso.studies.sweep import run_in_memory, run_in_store, sweep
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 
 pytestmark = [

@@ -13,7 +13,6 @@ from pages import Page
 
 from friso.interface.drafts import DRAFTS
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
 PRELOAD = Path(__file__).parent / "foreign_host"
 
 AXIS = """# an axis of 20 µm/s and more

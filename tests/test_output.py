@@ -38,7 +38,6 @@ from friso.stage import load
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, DRIVE, LEAVES = (EXAMPLES / f"thesis_{name}.toml" for name in ("rig", "drive", "leaves"))
-STICK_SLIP = EXAMPLES / "lugre_stick_slip.toml"
 
 NEEDS: dict[str, tuple[object, ...]] = {
     "check": (RIG,),
