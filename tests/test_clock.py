@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from compiled import in_all
 from plain_axis import DRAG, KI, KP, MASS, TIME, plain_axis
-from scipy import signal, stats
+from scipy import signal
 from scipy.linalg import expm
 
 from friso.engine import simd_math
@@ -112,35 +112,6 @@ def test_noise_is_that_of_plain_python() -> None:
         first, second = ((bits >> 24) + 0.5) / 2**40, ((bits % 2**24) * 2**16 + 0.5) / 2**40
         expected = np.sqrt(-2 * np.log(first)) * np.sin(2 * np.pi * (abs(second - 0.5) - 0.25))
         assert noise(seed, tick) == pytest.approx(expected, abs=1e-10)
-
-
-@pytest.mark.thorough
-def test_noise_is_normal() -> None:
-    """Moments, distribution and tails of 4 million deviates, each within five of its standard errors."""
-    z = noise(np.arange(40)[:, None], np.arange(100_000)).ravel()
-    n = z.size
-    for power, expected, variance in ((1, 0, 1), (2, 1, 2), (3, 0, 15), (4, 3, 96)):
-        assert np.mean(z**power) == pytest.approx(expected, abs=5 * np.sqrt(variance / n))
-    assert stats.kstest(z[::7], "norm").pvalue > 1e-6
-    for size in (2.0, 3.0, 4.0, 4.75):
-        beyond = n * stats.norm.sf(size)
-        for side in (z, -z):
-            assert np.count_nonzero(side > size) == pytest.approx(beyond, abs=5 * np.sqrt(beyond))
-
-
-@cache
-def field() -> np.ndarray:
-    """Deviates of neighbouring seeds, along axis 0, at neighbouring ticks."""
-    return noise(np.arange(1000)[:, None], np.arange(1000))
-
-
-@pytest.mark.parametrize("lag", [1, 2, 3, 64])
-@pytest.mark.parametrize("along", [0, 1], ids=["seeds", "ticks"])
-def test_neighbours_are_independent(lag: int, along: int) -> None:
-    """For neighbouring seeds, and neighbouring ticks, deviates and their squares are uncorrelated."""
-    z = np.moveaxis(field(), along, 0)
-    for values in (z, (z**2 - 1) / np.sqrt(2)):
-        assert np.mean(values[lag:] * values[:-lag]) == pytest.approx(0, abs=5 / float(np.sqrt(values[lag:].size)))
 
 
 @dataclass

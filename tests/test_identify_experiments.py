@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from emps import emps_log
-from machines import break_aways, creeping, drawn
+from machines import break_aways, creeping, drawn, moved
 from numba import njit
 from refusals import refused
 from scipy.signal import lfilter
@@ -89,13 +89,6 @@ FLAT = (np.array([-1e3, 1e3]), np.ones(2))
 def measured(values: np.ndarray, noise: float, rng: np.random.Generator) -> np.ndarray:
     """Return values with noise, rounded to steps of the noise's size."""
     return np.round((values + noise * rng.standard_normal(len(values))) / noise) * noise
-
-
-def moved(stage: friso.Stage, **motion: str) -> friso.Stage:
-    """The stage with another kind of motion."""
-    text = stage.to_toml()
-    rows = "\n".join(f'{key} = "{value}"' for key, value in motion.items())
-    return friso.loads(f"{text[: text.index('[motion]')]}[motion]\n{rows}\n")
 
 
 @pytest.fixture(scope="module")

@@ -298,6 +298,8 @@ def test_a_value_has_the_digits_of_its_interval(estimate: Estimate, said: str) -
     [
         (20.0, 79.0, "N", "20 to 79 N"),
         (20.0, np.inf, "N", "at least 20.00 N"),
+        (0.9e-25, np.inf, "N/m", "at least 9.000e-17 nN/m"),
+        (0.9e25, np.inf, "N/m", "at least 9.000e+15 GN/m"),
         (-np.inf, 3e-3, "m", "at most 3.000 mm"),
         (-np.inf, np.inf, "N", "–"),
         (4.26e-5, 0.128, "m/s", "42.6 µm/s to 128 mm/s"),
