@@ -33,28 +33,20 @@ TURNING = Mapping(axis="rotary")
 def break_away(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ramps of a torque, the same numbers as of a linear axis whose static friction is known."""
     log, folder = ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3)), tmp_path_factory.mktemp("turning")
-    step = log.sample_time
+    step, place, force = log.sample_time, log["position"], log["force"]
     time = np.concatenate([np.arange(part.stop - part.start) * step + 100 * i for i, part in enumerate(log.segments)])
-    csv(folder / "linear.csv", "time [s],position [m],force [N]", time, log["position"], log["force"])
-    csv(
-        folder / "turned.csv",
-        "time [s],angle [deg],torque [mN*m]",
-        time,
-        np.rad2deg(log["position"]),
-        1e3 * log["force"],
-    )
+    csv(folder / "linear.csv", "time [s],position [m],force [N]", time, place, force)
+    csv(folder / "turned.csv", "time [s],angle [deg],torque [mN*m]", time, np.rad2deg(place), 1e3 * force)
     return folder
 
 
 def test_angles_and_torques_are_in_si_under_the_units_of_a_linear_axis(break_away: Path) -> None:
+    """A log of angles asks for the kind of axis alone."""
     linear, turned = read_log(break_away / "linear.csv"), read_log(break_away / "turned.csv", TURNING)
     assert (linear.axis, turned.axis) == (LINEAR, ROTARY)
     for role in ("position", "force"):
         assert turned[role] == pytest.approx(linear[role], rel=1e-7, abs=1e-15)
         assert turned.unit(role) == linear.unit(role)
-
-
-def test_a_log_of_angles_asks_for_the_kind_of_axis_alone(break_away: Path) -> None:
     with pytest.raises(GapsError) as open_questions:
         read_log(break_away / "turned.csv", needed=("position", "force"))
     assert open_questions.value.options == ("--axis rotary",)
@@ -124,24 +116,16 @@ def test_a_stage_around_a_rotary_log_is_one_of_a_rotary_axis() -> None:
     assert bends(turned.axis_kind)[1] > settings.longest_bristle_bend
 
 
-def test_logs_and_stage_are_of_one_kind_of_axis() -> None:
-    log = axis()
-    assert axis_of_all([replace(log, axis=ROTARY)], None) == ROTARY
+def test_logs_and_stage_are_of_one_kind_of_axis_and_unit_of_force(tmp_path: Path) -> None:
+    log, turned = axis(), replace(axis(), axis=ROTARY)
+    assert axis_of_all([turned], None) == ROTARY
+    for logs, stage, key in (
+        ([log, replace(turned, name="other")], None, "--axis"),
+        ([turned], friso.load("examples/emps_axis.toml"), "--axis"),
+        ([log, replace(log, name="other", axis=LINEAR.per("A"))], None, "force"),
+    ):
+        with refused(key):
+            axis_of_all(logs, stage)
+    sidecar(tmp_path / "log.csv").write_text(mapping_text(Mapping(axis="round")))
     with refused("--axis"):
-        axis_of_all([log, replace(log, name="other", axis=ROTARY)], None)
-    with refused("--axis"):
-        axis_of_all([replace(log, axis=ROTARY)], friso.load("examples/emps_axis.toml"))
-
-
-def test_forces_of_all_logs_are_in_one_unit() -> None:
-    log = axis()
-    with refused("force"):
-        axis_of_all([log, replace(log, name="other", axis=LINEAR.per("A"))], None)
-
-
-def test_a_kind_of_axis_that_is_none_is_refused(tmp_path: Path) -> None:
-    log = tmp_path / "log.csv"
-    sidecar(log).write_text(mapping_text(Mapping(axis="round")))
-    with refused("--axis"), pytest.MonkeyPatch.context() as patch:
-        patch.chdir(tmp_path)
-        load_mapping(Path("log.csv"))
+        load_mapping(tmp_path / "log.csv")
