@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import redirect_stdout
 from dataclasses import replace
 from io import StringIO
-from itertools import chain
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -48,7 +47,7 @@ from friso.questions.design.steps import (
 from friso.questions.design.window import lower, stiffest, upper
 from friso.questions.design.words import brings, edge, headline, hertz, refusal, settling
 from friso.shown import files
-from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 
@@ -370,18 +369,6 @@ def test_the_page_stands_alone_and_shows_all(designed: Design, folder: Path) -> 
         assert words in page.text
     named = [name for step in steps(designed) for name in step.figures]
     assert sorted(named) == sorted(FIGURES)
-
-
-@pytest.mark.parametrize("name", [name for name in FIGURES if name not in ("design_map", "design_modes")])
-def test_both_renderers_draw_the_same_arrays(designed: Design, name: str) -> None:
-    figure = _figures(designed)[name]
-    (axes,) = matplotlib_renderer.render(figure).axes
-    paper = [part for patch in axes.patches for part in np.asarray(patch.get_xy()).T]  # type: ignore[attr-defined]
-    paper += [np.asarray(part, float) for line in axes.lines for part in line.get_data()]
-    traces = plotly_renderer.render(figure).data
-    page = chain.from_iterable((np.asarray(trace.x, float), np.asarray(trace.y, float)) for trace in traces)
-    for one, other in zip(paper, page, strict=True):
-        assert np.array_equal(one, other, equal_nan=True)
 
 
 def test_front_with_chosen_and_failed_points(designed: Design) -> None:

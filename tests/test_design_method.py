@@ -22,7 +22,6 @@ from friso.design_method.spec import Spec, load_spec
 from friso.design_method.verification import MachineOutcomes, move_machines, verification
 from friso.equations.breakaway import least_breakaway
 from friso.frequency.crossover import limits, settled_margin
-from friso.frequency.margins import Tuning
 from friso.hunting import find_margin
 from friso.hunting.measures import measured_run
 from friso.leaf_springs import beams as beams_module
@@ -56,13 +55,17 @@ def candidates(task: LeafTask) -> list[Candidate]:
 
 def loaded(**force: str) -> Spec:
     """The example with another load."""
-    return Spec(
-        **{**SPEC.as_written(), "load": force, **tables("machine", "friction", "masses", "moves", "position", "leaves")}
-    )
+    kept = ("machine", "friction", "masses", "moves", "position", "leaves")
+    return Spec(**{**SPEC.as_written(), "load": force, **{name: getattr(SPEC, name) for name in kept}})
 
 
-def tables(*names: str) -> dict[str, object]:
-    return {name: getattr(SPEC, name) for name in names}
+LEAVES = Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
+
+
+@pytest.fixture(scope="module")
+def guided(base: Stage) -> Stage:
+    """The stage on leaf springs."""
+    return with_leaves(base, LEAVES, 1e-3)
 
 
 # --- leaf springs -----------------------------------------------------------------------------------------------------
@@ -76,9 +79,8 @@ def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> No
     assert np.all(np.diff(stiffness) >= 0)
     assert np.all(np.diff(frequency) >= -1e-9 * frequency[:-1])
     wanted = [requirement for requirement in requirements(task) if requirement.name != PARASITIC]
-    result = evaluate_geometries(
-        task, wanted, sizes_of([candidate.geometry for candidate in candidates]), [e.geometry.sheet for e in candidates]
-    )
+    geometries = [candidate.geometry for candidate in candidates]
+    result = evaluate_geometries(task, wanted, sizes_of(geometries), [item.sheet for item in geometries])
     assert np.all(result.excess <= 1 + 1e-9)
     low, high = box(SPEC)
     rng, bought = np.random.default_rng(0), sheets(SPEC)
@@ -120,7 +122,7 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     assert excess["safety.parasitic"] == pytest.approx(480 / result.interfering.frequency, rel=1e-6)
     # a force across the leaf ends turns the stage about z: each leaf is a cantilever (by the stiffness of the stage)
     moved = np.linalg.solve(closed_forms.stage_stiffness(item), [0, 1, 0, 0, 0, 0])
-    root = -(closed_forms.stage_stiffness(replace_leaves(item)) @ moved)[5] + 60e-3 * 0.5
+    root = -(closed_forms.stage_stiffness(replace(item, leaves=1.0)) @ moved)[5] + 60e-3 * 0.5
     assert root == pytest.approx(0.5 * 60e-3, rel=1e-6)
     stress = 1.5 * (root * 10e-3 / (0.3e-3 * 20e-3**3 / 12) + (5 + weight) / 2 / (20e-3 * 0.3e-3))
     assert excess["safety.fatigue"] == pytest.approx(
@@ -129,11 +131,6 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     assert excess["safety.strength"] == pytest.approx(
         DesignSettings.current().model_reserve * 1.5 * (result.clamp_stress + stress) / 1.3e9
     )
-
-
-def replace_leaves(mechanism: Mechanism) -> Mechanism:
-    """Return a mechanism with one leaf in the middle instead of two, for the moment at its root."""
-    return replace(mechanism, leaves=1.0)
 
 
 def test_a_geometry_at_which_beams_fail_is_marked(
@@ -256,13 +253,12 @@ def test_a_stage_that_never_hunts_has_no_edge(base: Stage) -> None:
     assert edges.highest == 4.0
 
 
-def test_modes_count_in_the_margin(base: Stage, task: LeafTask) -> None:
+def test_modes_count_in_the_margin(guided: Stage) -> None:
     """With the single mode of the equations, the margin equals theirs.
 
     If actuator and sensor move against each other, the loop is unstable, as the poles of the state space show.
     """
-    leaves_ = Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
-    stage = with_leaves(base, leaves_, 1e-3).replace({"controller.crossover": "40 Hz"})
+    stage = guided.replace({"controller.crossover": "40 Hz"})
     result = beams_module.beams(Mechanism.of(stage.flat()), 1e-3)
     assert Modal.of(stage.flat(), result).margin(np.array([40.0]))[0] == pytest.approx(
         settled_margin(stage.flat()), rel=0.01
@@ -278,8 +274,11 @@ def test_modes_count_in_the_margin(base: Stage, task: LeafTask) -> None:
 
 def rightmost(stage: Stage, leaves_: Evaluation) -> float:
     """Real part [1/s] of the rightmost closed-loop pole with all modes, over the stuck and the sliding cart."""
-    rigid_joint = {key: float(stage.flat()[key]) for key in ("joint.stiffness",)}
-    bare = stage.replace({"flexure": None, **{key: f"{value!r} N/m" for key, value in rigid_joint.items()}})
+    flat = stage.flat()
+    bare = stage.replace({"flexure": None, "joint.stiffness": f"{float(flat['joint.stiffness'])!r} N/m"})
+    tuned = friso.tuning(*(flat[f"controller.{name}"] for name in ("crossover", "alpha", "beta", "tuned_mass")))
+    zeros = np.array([tuned.tau_z, 1 + tuned.tau_z / tuned.tau_i, 1 / tuned.tau_i])
+    controller = control.tf2ss(control.tf(tuned.k_p * zeros, [tuned.tau_p, 1, 0]))
     result = []
     for state in ("stuck", "sliding"):
         plant = friso.linear(bare, state)["stage", "force"]
@@ -287,20 +286,12 @@ def rightmost(stage: Stage, leaves_: Evaluation) -> float:
             omega = 2 * np.pi * mode.frequency
             swing = [[0, 1], [-(omega**2), -2 * 0.01 * omega]]
             plant = plant + control.ss(swing, [[0], [1]], [[mode.actuator * mode.sensor, 0]], [[0]])
-        k_p, tau_z, tau_i, tau_p = (getattr(tuned_gains(stage), name) for name in ("k_p", "tau_z", "tau_i", "tau_p"))
-        loop = control.tf(k_p * np.array([tau_z, 1 + tau_z / tau_i, 1 / tau_i]), [tau_p, 1, 0])
-        result.append(control.feedback(plant * control.tf2ss(loop), 1).poles().real.max())
+        result.append(control.feedback(plant * controller, 1).poles().real.max())
     return max(result)
 
 
-def tuned_gains(stage: Stage) -> Tuning:
-    flat = stage.flat()
-    return friso.tuning(*(flat[f"controller.{name}"] for name in ("crossover", "alpha", "beta", "tuned_mass")))
-
-
-def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
-    stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
-    stage = stage.replace({"controller.crossover": "40 Hz"})
+def test_the_crossover_is_comfortable_and_damping_helps(guided: Stage) -> None:
+    stage = guided.replace({"controller.crossover": "40 Hz"})
     ranges = limits(stage.flat()).comfortable
     assert comfortable_below(ranges, 43.0) == pytest.approx(43.0)
     assert comfortable_below(ranges, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
@@ -309,17 +300,15 @@ def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
     together = modal.margin(crossovers).tolist()
     assert together == [float(modal.margin(crossover)[0]) for crossover in crossovers]
     assert min(together) < 0.5 < max(together)
-    expected = choose_controller(stage, leaves, corners(SPEC, stage.flat()))
+    least = corners(SPEC, stage.flat())
+    assert np.min(least_breakaway(least.over(stage.flat()))) == 1.0
+    expected = choose_controller(stage, leaves, least)
     assert expected.margin == pytest.approx(settled_margin(stage.flat()), rel=0.01)
     assert expected.margin >= 0.5
     worth = expected.damping.worth
     assert expected.damping.margins[worth] >= 0.95 * expected.damping.margins.max()
     assert np.all(np.diff(dampings(stage.flat())) > 0)
     assert expected.gains.k_p == pytest.approx(1.7 * (2 * np.pi * 40) ** 2 / np.sqrt(10), rel=1e-6)
-
-
-def test_the_least_friction_is_that_of_the_range(base: Stage) -> None:
-    assert np.min(least_breakaway(corners(SPEC, base.flat()).over(base.flat()))) == 1.0
 
 
 @pytest.mark.thorough
@@ -351,29 +340,26 @@ def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
     assert result.settling[0] == pytest.approx(within[0], rel=1e-4)
 
 
-def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verification_counts_and_its_worst_is_reproduced(guided: Stage) -> None:
+    reported: list[tuple[int, int]] = []
+
+    def report(done: int, total: int, label: str) -> None:
+        reported.append((done, total))
 
     with DesignSettings(verified_moves=200).in_use():
-        stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
-        reported: list[tuple[int, int]] = []
-        outcomes = verification(
-            stage.replace({"controller.crossover": "9 Hz"}),
-            SPEC,
-            0.3,
-            lambda done, total, label: reported.append((done, total)),
-        )
-        ends = [total for done, total in reported if done == total]
-        assert ends[0] == 200
-        assert outcomes.locked.missed <= ends[-1] < 200  # the long runs of those that are not at rest report, too
-        assert outcomes.free.tried == outcomes.locked.tried == 200
-        assert outcomes.free.missed == 0
-        assert outcomes.locked.missed >= outcomes.locked.swinging > 20
-        low, high = outcomes.free.interval
-        assert low == 0
-        assert high == pytest.approx(1 - 0.025 ** (1 / 200), rel=1e-6)  # Clopper and Pearson for none of 200
-        worst = outcomes.free.worst
-        again = move_machines({**outcomes.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
-        assert again.settling[0] == pytest.approx(outcomes.free.settling[worst], rel=1e-3)
+        outcomes = verification(guided.replace({"controller.crossover": "9 Hz"}), SPEC, 0.3, report)
+    ends = [total for done, total in reported if done == total]
+    assert ends[0] == 200
+    assert outcomes.locked.missed <= ends[-1] < 200  # the long runs of those that are not at rest report, too
+    assert outcomes.free.tried == outcomes.locked.tried == 200
+    assert outcomes.free.missed == 0
+    assert outcomes.locked.missed >= outcomes.locked.swinging > 20
+    low, high = outcomes.free.interval
+    assert low == 0
+    assert high == pytest.approx(1 - 0.025 ** (1 / 200), rel=1e-6)  # Clopper and Pearson for none of 200
+    worst = outcomes.free.worst
+    again = move_machines({**outcomes.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
+    assert again.settling[0] == pytest.approx(outcomes.free.settling[worst], rel=1e-3)
 
 
 def test_an_outcome_ranks_what_does_not_rest_before_slow_settling() -> None:

@@ -3,7 +3,6 @@
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,8 +30,6 @@ from friso.questions.flexure.page import flexure_files
 from friso.questions.flexure.question import EXAMPLE
 from friso.questions.flexure.table import rows
 from friso.questions.flexure.words import assumptions, findings, sentences, warnings
-from friso.shown.drawing import matplotlib_renderer, plotly_renderer
-from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 
 command = command_of("flexure")
@@ -330,13 +327,6 @@ def test_a_mode_is_seen_from_where_it_moves(models: BothModels, stage_motion: tu
     mode = Mode("some", 1.0, 0.0, 0.0, 0.0, np.array(stage_motion, float), np.zeros((2, 17, 3)))
     assert best_view(models.mechanism, mode) == view
     assert view in VIEWS
-
-
-@pytest.mark.parametrize("render", [matplotlib_renderer.render, plotly_renderer.render])
-def test_both_renderers_draw_the_figures(models: BothModels, render: Callable[[Figure], Any]) -> None:
-    for figure in flexure_figures(models):
-        drawn = render(figure)
-        assert len(getattr(drawn, "axes", figure.panels)) == len(figure.panels)
 
 
 # ---------------------------------------------------------------- the drawing

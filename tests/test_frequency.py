@@ -49,7 +49,7 @@ def resonances(poles: np.ndarray) -> np.ndarray:
 
 
 def test_the_rig_has_its_resonances(rig: Stage) -> None:
-    """Bristles and joint in a row hold a stuck cart at 11 Hz; a sliding one has an antiresonance before its resonance."""
+    """Bristles and joint in a row hold a stuck cart at 11 Hz; a sliding one swings against the mass at its joint."""
     stiff = rig.replace({"friction.bristle_stiffness": "1e9 N/m", "joint.damping": "0 N*s/m", "parasitic": None})
     assert resonances(friso.linear(stiff, "stuck").poles())[0] == pytest.approx(np.sqrt(2400 / 0.5) / HZ, rel=1e-5)
     assert resonances(friso.linear(rig, "stuck").poles())[0] == pytest.approx(11.03, rel=0.02)
