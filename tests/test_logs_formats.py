@@ -644,21 +644,25 @@ def circular_mat(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "write",
+    ("write", "words"),
     [
-        endless_mat,
-        unwritten_mat,
-        circular_mat,
-        lambda path: log_files.cells_in_cells_as_mat(path, 200_000),  # the library's reader dies by a signal
-        lambda path: log_files.write_mat73(path, {}),  # an object that only MATLAB can read
+        (endless_mat, "more than 3 s"),
+        (unwritten_mat, "760 MB of memory"),
+        (circular_mat, "nested too deeply"),
+        (lambda path: log_files.cells_in_cells_as_mat(path, 200_000), "crash"),  # the reader dies by a signal
+        (lambda path: log_files.write_mat73(path, {}), "objects: result (timeseries)"),
     ],
     ids=["endless", "unwritten", "circular", "nested", "objects"],
 )
-def test_a_small_file_that_its_library_cannot_read_is_refused(tmp_path: Path, write: Callable[[Path], object]) -> None:
+def test_a_small_file_that_its_library_cannot_read_is_refused(
+    tmp_path: Path, write: Callable[[Path], object], words: str
+) -> None:
     write(tmp_path / "a.mat")
     assert (tmp_path / "a.mat").stat().st_size < 100_000
-    with refused("log"), LogSettings(time_of_reading=3.0).in_use():
+    seconds = 3.0 if write is endless_mat else LogSettings.current().time_of_reading
+    with refused("log") as caught, LogSettings(time_of_reading=seconds).in_use():
         read_table(tmp_path / "a.mat")
+    assert words in caught.value.actual
 
 
 def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
