@@ -868,7 +868,7 @@ def test_document_and_page_have_every_claim(thorough_study: Reproduction, tmp_pa
     places = [*(f'id="claim-{name}"' for name in shown), *(f">{claim.id}<" for claim in claims())]
     places += [f'id="figure-figure-{number}"' for number in (5, 7, 8, *range(11, 30))]
     assert [place for place in (*places, "default-src 'none'") if place not in page] == []
-    assert {Path(name).suffix for name in contents} == {".html", ".json", ".pdf", ".png", ".svg"}
+    assert {Path(name).suffix for name in contents} == {".html", ".json", ".md", ".pdf", ".png", ".svg"}
     pictures = [name for name in contents if name.startswith("figures/")]
     assert len(pictures) == 2 * len(reproduction_figures(thorough_study))
     few = [name for name in contents if name not in pictures or name == "figures/figure-26.png"]  # drawing takes long
