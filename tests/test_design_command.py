@@ -273,6 +273,7 @@ def test_the_joint_is_held_below_the_static_friction(designed: Design) -> None:
     assert lacking(text, *stated) == []
     unknown = joint_step(replace(designed, edges=replace(designed.edges, unknown=2))).sentences
     assert "were stopped, which counts as hunting" in " ".join(unknown)
+    assert "were stopped" not in text
 
 
 @pytest.mark.parametrize(
@@ -294,7 +295,8 @@ def test_leaves_and_what_binds_them(designed: Design) -> None:
         assert (name in text) == spare.endswith("binds")
     assert f"{len(designed.candidates)} geometries" in text
     broken = replace(designed.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
-    assert "fail" in " ".join(leaves_step(replace(designed, confirmed=(broken, *designed.confirmed[1:]))).sentences)
+    other = " ".join(leaves_step(replace(designed, confirmed=(broken, *designed.confirmed[1:]))).sentences)
+    assert ("could not be computed" in text, "1 could not be computed" in other) == (False, True)
     assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
     assert [row[3] for row in rows] == ["98.5 %, binds", "20 %", "10 %", "60 %", "99 %, binds"]
     loose = replace(designed.fitted, choice=replace(tight, excess=excess / 2))
