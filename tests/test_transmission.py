@@ -322,7 +322,7 @@ def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) 
     result = feeding(backlash_alone)
     assert result is not None
     assert (result.friction, result.backlash.needed, result.backlash.gone) == (None, True, 0.0)
-    wording(" ".join(feeding_sentences(result)))
+    assert "backlash" in " ".join(feeding_sentences(result))
 
 
 @pytest.mark.inner
@@ -346,7 +346,7 @@ def test_what_feeds_it_is_told() -> None:
     assert "friction.viscous" not in keys
     lasting, ending = Decline(0.001, None, True), Decline(0.5, 0.3, True)
     for result in (Feeding(lasting, ending), Feeding(ending, lasting)):
-        wording(" ".join(feeding_sentences(result)))
+        assert "0.3" in " ".join(feeding_sentences(result)), feeding_sentences(result)
     assert len(feeding_sentences(Feeding(None, Decline(0.5, 0.3, False)))) == 2
 
 
