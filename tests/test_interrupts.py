@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 from filelock import FileLock
 from inside import friso_inside
+from patience import LIMIT, wait_until
 from systems import posix
 
 from friso.engine import building
@@ -371,20 +372,26 @@ def test_who_fails_leaves_what_another_waits_for(tmp_path: Path, monkeypatch: py
         with ended_by(flag):
             work.finish([shared, unwanted])
 
+    def waiting(request: Any) -> int:
+        return work._jobs[request].waiting if request in work._jobs else 0
+
     with ThreadPoolExecutor(3) as pool:
-        first = pool.submit(work.finish, [shared, failing])
-        while len(begun) < 2:
-            time.sleep(0.01)
-        second, third = pool.submit(work.finish, [shared]), pool.submit(overtaken)
-        time.sleep(0.3)  # they wait
-        flag[0] = 1
-        with pytest.raises(Overtaken):
-            third.result(10)
-        may_end[failing].set()
-        with pytest.raises(RuntimeError, match="could not be compiled"):
-            first.result(10)
-        may_end[shared].set()
-        second.result()
+        try:
+            first = pool.submit(work.finish, [shared, failing])
+            wait_until(lambda: len(begun) == 2)
+            second, third = pool.submit(work.finish, [shared]), pool.submit(overtaken)
+            wait_until(lambda: (waiting(shared), waiting(unwanted)) == (3, 1))
+            flag[0] = 1
+            with pytest.raises(Overtaken):
+                third.result(LIMIT)
+            may_end[failing].set()
+            with pytest.raises(RuntimeError, match="could not be compiled"):
+                first.result(LIMIT)
+            may_end[shared].set()
+            second.result(LIMIT)
+        finally:
+            for event in may_end.values():
+                event.set()
     assert len(begun) == 2
     assert unwanted not in begun
 
