@@ -16,6 +16,7 @@ import pytest
 from browser import BROWSER, needs_browser
 from log_files import motion, write_text
 from made_up import both_joints
+from patience import LIMIT
 from test_map_views import plain
 
 import friso
@@ -125,7 +126,7 @@ class Browsed:
     def answered(self, text: str) -> None:
         """Wait until the answer has a text."""
         self.page.wait_for_function(
-            "text => document.getElementById('answer').innerText.includes(text)", arg=text, timeout=180_000
+            "text => document.getElementById('answer').innerText.includes(text)", arg=text, timeout=1000 * LIMIT
         )
 
     def begin(self) -> None:
@@ -166,7 +167,7 @@ class Browsed:
     def says(self, text: str) -> None:
         """Wait until the picture has a text."""
         self.page.wait_for_function(
-            "text => document.getElementById('picture').innerText.includes(text)", arg=text, timeout=180_000
+            "text => document.getElementById('picture').innerText.includes(text)", arg=text, timeout=1000 * LIMIT
         )
 
 
@@ -187,7 +188,7 @@ def opened() -> Iterator[Browsed]:
             assert address is not None
             chromium = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
             page = chromium.new_context().new_page()
-            page.set_default_timeout(120_000)
+            page.set_default_timeout(1000 * LIMIT)
             opened = Browsed(page, *address.group(0, 1))
             page.goto(address[0])
             page.wait_for_selector("[data-part=controller]")

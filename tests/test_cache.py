@@ -13,8 +13,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 from filelock import FileLock
+from patience import LIMIT, wait_until
 from systems import posix
 
 from friso.engine import building, cache, prune
@@ -91,7 +93,7 @@ def start(folder: Path, name: str = "stand-in", **more: str) -> subprocess.Popen
 
 def finished(process: subprocess.Popen[str]) -> tuple[bool, str]:
     """Return whether the process built the entry (code always runs from the cache), and what it logged."""
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=LIMIT)
     assert process.returncode == 0, err
     assert out == ""
     return COMPILING in err, err
@@ -304,20 +306,17 @@ def test_a_helper_that_may_not_be_orphaned_ends_in_the_midst_of_its_work(tmp_pat
     held = FileLock(tmp_path / "held")
     environ = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *filter(None, sys.path)])}
     with subprocess.Popen([sys.executable, "-c", ASKING, held.lock_file], env=environ) as parent:
-        while not Path(held.lock_file).exists():
-            time.sleep(0.05)
-        time.sleep(0.5)
+        wait_until(Path(held.lock_file).exists)
+        time.sleep(0.5)  # it works
         parent.kill()
-    held.acquire(timeout=20)
+    held.acquire(timeout=LIMIT)
 
 
 @posix
 def test_a_helper_that_has_ended_leaves_no_zombie() -> None:
     helper = HelperProcess("friso.engine.builder", ".", paths=sys.path)
     helper.kill()
-    time.sleep(1.0)
-    with pytest.raises(ProcessLookupError):
-        os.kill(helper._process.pid, 0)
+    wait_until(lambda: not psutil.pid_exists(helper._process.pid))  # one that is a zombie exists
     helper.end()
 
 

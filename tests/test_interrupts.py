@@ -186,7 +186,7 @@ def test_a_command_that_cannot_be_interrupted_is_ended(tmp_path: Path, way: str)
     a pipe that is full.
     """
     program = [sys.executable, "-c", STUCK.replace("WAY", way)]
-    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT)
     silent = way.startswith((CLOSED, FULL))
     assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "" if silent else "friso: terminated\n")
     assert (tmp_path / "whole").exists() == (way == "write()")
@@ -205,7 +205,7 @@ def test_a_signal_that_is_ignored_is_so_where_others_wait() -> None:
 
 def test_a_command_that_answers_an_interrupt_has_the_time_for_it(tmp_path: Path) -> None:
     program = [sys.executable, "-c", STUCK.replace("WAY", "answer()")]
-    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT)
     assert (done.returncode, done.stdout, done.stderr) == (0, "the best so far\n", "")
 
 
@@ -230,7 +230,7 @@ with interrupts.raising():
 
 def test_ctrl_c_that_the_main_thread_does_not_take_waits() -> None:
     """The thread that watches for signals takes none for it."""
-    done = subprocess.run([sys.executable, "-c", WAITING], capture_output=True, text=True, timeout=50)
+    done = subprocess.run([sys.executable, "-c", WAITING], capture_output=True, text=True, timeout=LIMIT)
     assert (done.stdout, done.stderr) == ("whole\ninterrupted\n", "")
 
 
@@ -278,7 +278,7 @@ class Builder:
         self.killed = Event()
 
     def build(self, request: object) -> str:
-        self.killed.wait(10)
+        self.killed.wait(LIMIT)
         return ""
 
     def kill(self) -> None:
@@ -334,7 +334,7 @@ def test_what_is_compiled_when_its_question_is_overtaken_is_there_for_the_next(
     class Building(Builder):
         def build(self, request: object) -> str:
             begun.append(request)
-            go.wait(10)
+            go.wait(LIMIT)
             return "name"
 
     monkeypatch.setattr(building, "_taken", lambda surroundings: None)
@@ -415,13 +415,13 @@ def test_the_app_ends_in_one_line(signals: list[signal.Signals]) -> None:
         assert address is not None
         for _ in range(300):
             try:
-                urlopen(address[0], timeout=5)
+                urlopen(address[0], timeout=LIMIT)
             except HTTPError:  # it answers, though not to one without a token
                 break
             except OSError:
                 time.sleep(0.1)
         for number in signals:
             process.send_signal(number)
-        assert process.wait(30) == 128 + signals[0]
+        assert process.wait(LIMIT) == 128 + signals[0]
         assert process.stderr is not None
         assert process.stderr.read() == f"friso: {'interrupted' if signals[0] == signal.SIGINT else 'terminated'}\n"

@@ -19,6 +19,7 @@ import psutil
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from patience import LIMIT
 from refusals import refused
 from scipy.io import savemat
 from systems import posix
@@ -668,13 +669,13 @@ def test_a_small_file_that_its_library_cannot_read_is_refused(
 def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit counts processor time; a file is given up only if it takes far longer."""
     slow, program = tmp_path / "slow.py", confined.binary.__file__
-    slow.write_text(f"import runpy, time\ntime.sleep(2.5)\nrunpy.run_path({program!r}, run_name='__main__')\n")
+    slow.write_text(f"import runpy, time\ntime.sleep(4.5)\nrunpy.run_path({program!r}, run_name='__main__')\n")
     monkeypatch.setattr(confined.binary, "__file__", str(slow))
     zeros_as_mat(tmp_path / "a.mat", 1000)
-    with LogSettings(time_of_reading=2.0).in_use():
+    with LogSettings(time_of_reading=4.0).in_use():
         assert channel(read_table(tmp_path / "a.mat"), "x").values.shape == (1000,)
     zeros_as_mat(tmp_path / "b.mat", 1000)
-    impatient = LogSettings(time_of_reading=2.0, patience_with_a_busy_machine=0.5)
+    impatient = LogSettings(time_of_reading=4.0, patience_with_a_busy_machine=0.5)
     with impatient.in_use(), pytest.raises(LogError, match="the machine is busy"):
         read_table(tmp_path / "b.mat")
 
@@ -698,7 +699,7 @@ def test_the_process_that_reads_ends_with_who_started_it(tmp_path: Path) -> None
             assert parent.poll() is None
             time.sleep(0.01)
         parent.kill()
-    children[0].wait(30)
+    children[0].wait(LIMIT)
 
 
 @pytest.mark.parametrize("text", ["import os\nos.abort()\n", NEVER_ENDING], ids=["crash", "endless"])
@@ -740,34 +741,44 @@ def test_a_column_of_forty_thousand_digits_is_left_out(tmp_path: Path, column: i
 
 
 LONG = 30_000
-SECONDS = 3.0
-"""Time of the processor [s] of which reading takes a tenth here, and which a reader whose time grows with the square of
-the length exceeds several times."""
+
+
+def grows_with_the_square(read: Callable[[int], object]) -> bool:
+    """Tell whether reading takes much more than four times as long, on the processor, where a text is so."""
+
+    def seconds(length: int) -> float:
+        begin = time.process_time()
+        read(length)
+        return time.process_time() - begin
+
+    return min(seconds(4 * LONG) for _ in range(2)) > 10 * max(0.01, *(seconds(LONG) for _ in range(3)))
 
 
 @pytest.mark.parametrize("filler", [" ", "\t", '"', ",", ";", "#", "/", "[", "(", "a(", "1", "*"])
-def test_a_long_line_takes_no_time(tmp_path: Path, filler: str) -> None:
-    """Which once took a time that grew with the square of its length: the file is read or refused."""
+def test_a_long_line_is_read_or_refused_in_a_time_like_its_length(tmp_path: Path, filler: str) -> None:
     rows = "".join(f"{k / 1000},{k % 7},{k % 5}\n" for k in range(50))
     heading = "time [s],position [mm],force [N]\n"
-    long, begin = filler * LONG, time.process_time()
-    for text in (
-        f"key: v{long}x\n{heading}{rows}",
-        f"{long}\n{heading}{rows}",
-        f"{long}\n{rows.replace(',', ' ')}",
-        f"time [s],position{long}x [mm],force [N]\n{rows}",
-        f"{heading}{rows}0.2,{long},3\n",
-    ):
-        (tmp_path / "log.csv").write_text(text)
-        with suppress(LogError):
-            read_table(tmp_path / "log.csv")
-    assert time.process_time() - begin < SECONDS
+
+    def read(length: int) -> None:
+        long = filler * length
+        for text in (
+            f"key: v{long}x\n{heading}{rows}",
+            f"{long}\n{heading}{rows}",
+            f"{long}\n{rows.replace(',', ' ')}",
+            f"time [s],position{long}x [mm],force [N]\n{rows}",
+            f"{heading}{rows}0.2,{long},3\n",
+        ):
+            (tmp_path / "log.csv").write_text(text)
+            with suppress(LogError):
+                read_table(tmp_path / "log.csv")
+
+    assert not grows_with_the_square(read)
 
 
-def test_a_long_text_of_any_sign_takes_no_time() -> None:
-    """Above a table, in a heading and as a unit."""
-    for filler in (*string.punctuation, *string.whitespace, *"1aemsE"):
-        long, begin = filler * LONG, time.process_time()
+@pytest.mark.parametrize("filler", [*string.punctuation, *string.whitespace, *"1aemsE"])
+def test_a_long_text_above_a_table_in_a_heading_or_as_a_unit_takes_a_time_like_its_length(filler: str) -> None:
+    def read(length: int) -> None:
+        long = filler * length
         for above in ("dt = {} x y", "units: {}", "{} unit: mm", "position unit: {}", "dt: 1{}"):
             preamble([above.format(long)], ["time", "position", "force"], ";")
         for heading in (long, f"a{long}", f"a [{long}]", f"a_{long}", f"{long} in mm", f"{long} m/s"):
@@ -775,7 +786,8 @@ def test_a_long_text_of_any_sign_takes_no_time() -> None:
             split_line(heading, " ")
         assert not is_unit(long)
         assert spelled(f"µ{long}") == f"µ{long}"  # its parts are not looked at one by one
-        assert time.process_time() - begin < SECONDS
+
+    assert not grows_with_the_square(read)
 
 
 @pytest.mark.parametrize("text", ["time [s],position{}\n0,1\n1,2\n", "0,1\n1,2\n2,{}\n", "Name,{}\n\nName,x\n0,1\n"])

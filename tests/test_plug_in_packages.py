@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from patience import LIMIT
 
 from friso import example
 from friso.errors import InputError
@@ -62,7 +63,7 @@ def python(folder: Path, code: str, *arguments: str) -> subprocess.CompletedProc
     paths = os.pathsep.join([str(TESTS.parent), str(folder)])
     return subprocess.run(
         [sys.executable, "-c", code, *arguments],
-        cwd=folder, capture_output=True, text=True, timeout=600, env={**os.environ, "PYTHONPATH": paths},
+        cwd=folder, capture_output=True, text=True, timeout=LIMIT, env={**os.environ, "PYTHONPATH": paths},
     )  # fmt: skip
 
 
@@ -292,5 +293,5 @@ def test_a_registered_name_is_refused_in_python() -> None:
 
 def test_friso_without_packages_loads_nothing() -> None:
     code = "import friso, sys; print('importlib.metadata' in sys.modules and 'sympy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT)
     assert done.stdout.strip() == "False"

@@ -13,6 +13,7 @@ from typing import Any
 import psutil
 import pytest
 import xarray as xr
+from patience import LIMIT
 from systems import posix
 
 from friso.stage import Stage
@@ -95,7 +96,7 @@ def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.
             list(crew.compute(crew.jobs([study])))
     assert StudySettings.current().block_timeout not in waited
     for worker in workers:
-        worker.join(30)
+        worker.join(LIMIT)
         assert not worker.is_alive()
 
 
@@ -115,7 +116,7 @@ def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> 
         assert len([*tmp_path.glob("friso-kernels-*")]) == 1
         parent.send_signal(signal.SIGKILL if kill else signal.SIGINT)
     with suppress(psutil.NoSuchProcess):
-        worker.wait(30)
+        worker.wait(LIMIT)
     assert not [*tmp_path.glob("friso-kernels-*")]
 
 
@@ -131,4 +132,4 @@ def test_ctrl_c_ends_the_blocks_in_flight(rig: Stage) -> None:
         with pytest.raises(KeyboardInterrupt):
             next(jobs)
         jobs.close()
-        assert crew.executor.submit(os.getpid).result(60)
+        assert crew.executor.submit(os.getpid).result(LIMIT)

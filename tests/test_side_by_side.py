@@ -2,10 +2,11 @@
 
 from functools import partial
 from threading import Barrier, Event
-from time import monotonic, sleep
+from time import sleep
 
 import numpy as np
 import pytest
+from patience import LIMIT, wait_until
 
 from friso.engine import side_by_side as module
 from friso.engine.overtaken import Overtaken, ended_by, go_on
@@ -19,7 +20,10 @@ def test_results_come_in_the_order_of_the_tasks(cores: int, monkeypatch: pytest.
     second = Event()
     if cores == 1:
         second.set()
-    assert side_by_side([lambda: second.wait(10) and "first", lambda: second.set() or "second"]) == ["first", "second"]
+    assert side_by_side([lambda: second.wait(LIMIT) and "first", lambda: second.set() or "second"]) == [
+        "first",
+        "second",
+    ]
 
 
 def _until_ended(ended: list[bool]) -> None:
@@ -72,9 +76,9 @@ def test_tasks_within_a_task_share_its_cores(monkeypatch: pytest.MonkeyPatch) ->
     begun = Barrier(4)
 
     def inner() -> int:
-        begun.wait(10)
+        begun.wait(LIMIT)
         cores = cores_to_use()
-        begun.wait(10)
+        begun.wait(LIMIT)
         return cores
 
     assert side_by_side([lambda: side_by_side([inner, inner])] * 2) == [[2, 2], [2, 2]]
@@ -85,14 +89,12 @@ def test_a_task_takes_the_cores_of_those_that_have_ended(monkeypatch: pytest.Mon
     asked, seen = Event(), []
 
     def first() -> None:
-        asked.wait(10)
+        asked.wait(LIMIT)
 
     def second() -> None:
         seen.append(cores_to_use())
         asked.set()
-        end = monotonic() + 10
-        while cores_to_use() == 2 and monotonic() < end:
-            go_on()
+        wait_until(lambda: cores_to_use() > 2)
         seen.append(cores_to_use())
 
     side_by_side([first, second])
