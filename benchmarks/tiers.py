@@ -1,10 +1,10 @@
-"""Choose the tests that a plain `pytest` runs: `python -m benchmarks.tiers FOLDER --measure --budget 1500`.
+"""Choose the tests that a plain `pytest` runs: `python -m benchmarks.tiers FOLDER --measure`.
 
 `--measure` runs every test but the thorough ones and keeps what it needs in FOLDER: how long each test takes, in units
 of a calibrating loop, and which lines of friso it executes (by the package coverage). The choice is greedy: the next
 test is the one that executes most lines for its time, where a line counts half as much each time that a chosen test
-executes it already. What the budget [units] leaves out is written to tests/slow.txt, which marks these tests as slow.
-A test that is in no list is run, so new tests need no entry.
+executes it already. Two budgets [units] end the first tier and the one that every landing runs; tests/tiers.txt gets
+the others, with their marks `slow` and `thorough`. A test that is in no list is run, so new tests need no entry.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import pytest
 
 from benchmarks.faults import PACKAGES, ROOT
 
-SLOW = ROOT / "tests" / "slow.txt"
+TIERS = ROOT / "tests" / "tiers.txt"
 FOLDER_VARIABLE = "FRISO_TIMES_DIR"
 
 
@@ -181,7 +181,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--measure", action="store_true")
-    parser.add_argument("--budget", type=float, default=1500.0)
+    parser.add_argument("--first", type=float, default=4000.0, help="units of the first tier")
+    parser.add_argument("--landing", type=float, default=17_000.0, help="units of the tests of every landing")
     arguments = parser.parse_args()
     folder: Path = arguments.folder.absolute()
     if arguments.measure:
@@ -204,19 +205,15 @@ def main() -> None:
         subprocess.run(command, cwd=ROOT, env={**os.environ, FOLDER_VARIABLE: str(folder)}, check=True)
     tests, costs, first = measured(folder)
     number = add_lines(tests, first, folder / "coverage")
-    chosen = set(choose(tests, costs, number, arguments.budget))
-    left = sorted(set(tests) - chosen)
-    SLOW.write_text("".join(f"{tests[name].cost:.1f} {name}\n" for name in left), "utf-8")
-    covered_lines = np.zeros(number, bool)
-    for name in chosen:
-        covered_lines[tests[name].lines] = True
-    every = np.zeros(number, bool)
-    for test in tests.values():
-        every[test.lines] = True
-    whole = sum(test.cost for test in tests.values()) + sum(costs.values())
-    print(
-        f"{len(chosen)} of {len(tests)} tests, {whole:.0f} units in all; {covered_lines.sum()} of {every.sum()} lines"
-    )
+    first_tier = set(choose(tests, costs, number, arguments.first))
+    landing = first_tier | set(choose(tests, costs, number, arguments.landing))
+    marked = {name: "slow" if name in landing else "thorough" for name in sorted(set(tests) - first_tier)}
+    TIERS.write_text("".join(f"{mark} {tests[name].cost:.1f} {name}\n" for name, mark in marked.items()), "utf-8")
+    for tier, names in {"first": first_tier, "landing": landing, "all": set(tests)}.items():
+        executed = np.unique(np.concatenate([tests[name].lines for name in names]))
+        shared = {key for name in names for key in tests[name].shared}
+        units = sum(tests[name].cost for name in names) + sum(costs[key] for key in shared)
+        print(f"{tier}: {len(names)} tests, {units:.0f} units, {len(executed)} lines")
 
 
 if __name__ == "__main__":

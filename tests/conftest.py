@@ -24,8 +24,11 @@ FOLDER = "FRISO_CACHE_DIR"
 MADE = "FRISO_TEST_CACHE_DIR"
 BLAS = "OPENBLAS_NUM_THREADS"
 
-SLOW = Path(__file__).parent / "slow.txt"
-"""Tests that a plain `pytest` leaves out, with their durations in units; written by `python -m benchmarks.tiers`."""
+TIERS = Path(__file__).parent / "tiers.txt"
+"""Tests that a plain `pytest` leaves out: their mark, duration in units, and name; by `python -m benchmarks.tiers`."""
+
+MEASURED = "FRISO_TIMES_DIR"
+"""Variable that is set while tests are measured, which gives them no marks."""
 
 # The same examples for the same test, however slow the machine is: a change is refused for what it did. Others are
 # drawn by `pytest --hypothesis-profile random`.
@@ -53,13 +56,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests as thorough that a fixture named `thorough_...` computes, and as slow those listed in slow.txt."""
-    slow = {line.partition(" ")[2] for line in SLOW.read_text(encoding="utf-8").splitlines()}
+    """Give tests their marks: those of tests/tiers.txt, and thorough to what a fixture `thorough_...` computes."""
+    rows = (line.split(" ", 2) for line in TIERS.read_text(encoding="utf-8").splitlines())
+    marks = {} if MEASURED in os.environ else {name: mark for mark, _, name in rows}
     for item in items:
         if any(name.startswith("thorough_") for name in getattr(item, "fixturenames", ())):
             item.add_marker("thorough")
-        if item.nodeid in slow:
-            item.add_marker("slow")
+        if mark := marks.get(item.nodeid):
+            item.add_marker(mark)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
