@@ -154,19 +154,8 @@ def outcome(fault: Fault, copy: Path, tests: list[str], limit: float) -> tuple[s
     (copy / fault.file).write_text(fault.seeded(source), "utf-8")
     (copy / "chosen.txt").write_text("\n".join(tests), "utf-8")
     begin = time.monotonic()
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-n",
-        "0",
-        "-x",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--no-header",
-        "@chosen.txt",
-    ]
+    options = "-n 0 -x -q -p no:cacheprovider --no-header".split()
+    command = [sys.executable, "-m", "pytest", *options, "-m", "", "@chosen.txt"]
     try:
         done = subprocess.run(
             command,

@@ -189,18 +189,8 @@ def main() -> None:
         (folder / "coveragerc").write_text(f"[run]\nparallel = true\ndata_file = {folder / 'coverage'}\n", "utf-8")
         covered = [f"--cov={package}" for package in PACKAGES]
         options = ["--cov-context=test", "--cov-report=", f"--cov-config={folder / 'coveragerc'}"]
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-p",
-            "benchmarks.tiers",
-            "-m",
-            "not thorough",
-            "--max-worker-restart=0",
-            *covered,
-            *options,
-        ]
+        plugin = ["-p", "benchmarks.tiers", "-m", "not thorough", "--max-worker-restart=0"]
+        command = [sys.executable, "-m", "pytest", *plugin, *covered, *options]
         subprocess.run(command, cwd=ROOT, env={**os.environ, FOLDER_VARIABLE: str(folder)}, check=True)
     tests, costs, first = measured(folder)
     number = add_lines(tests, first, folder / "coverage")
