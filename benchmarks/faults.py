@@ -124,6 +124,8 @@ def executing(coverage: Path) -> dict[str, dict[int, set[str]]]:
     data.read()
     result: dict[str, dict[int, set[str]]] = {}
     for file in data.measured_files():
+        if Path(file).suffix != ".py":  # a template
+            continue
         parts = Path(file).parts
         package = next(k for k, part in enumerate(parts) if part in PACKAGES)
         result["/".join(parts[package:])] = {
@@ -154,7 +156,7 @@ def outcome(fault: Fault, copy: Path, tests: list[str], limit: float) -> tuple[s
     (copy / fault.file).write_text(fault.seeded(source), "utf-8")
     (copy / "chosen.txt").write_text("\n".join(tests), "utf-8")
     begin = time.monotonic()
-    options = "-n 0 -x -q -p no:cacheprovider --no-header".split()
+    options = ["-n", "0", "-x", "-q", "-p", "no:cacheprovider", "--no-header"]
     command = [sys.executable, "-m", "pytest", *options, "-m", "", "@chosen.txt"]
     try:
         done = subprocess.run(
