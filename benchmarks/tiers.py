@@ -3,8 +3,10 @@
 `--measure` runs every test but the thorough ones and keeps what it needs in FOLDER: how long each test takes, in units
 of a calibrating loop, and which lines of friso it executes (by the package coverage). The choice is greedy: the next
 test is the one that executes most lines for its time, where a line counts half as much each time that a chosen test
-executes it already. Two budgets [units] end the first tier and the one that every landing runs; tests/tiers.txt gets
-the others, with their marks `slow` and `thorough`. A test that is in no list is run, so new tests need no entry.
+executes it already. A test function counts as some lines of its own, and each of its cases as one, as they assert
+something that no line shows. Two
+budgets [units] end the first tier and the one that every landing runs; tests/tiers.txt gets the others, with their
+marks `slow` and `thorough`. A test that is in no list is run, so new tests need no entry.
 """
 
 from __future__ import annotations
@@ -30,6 +32,8 @@ from benchmarks.faults import PACKAGES, ROOT
 
 TIERS = ROOT / "tests" / "tiers.txt"
 FOLDER_VARIABLE = "FRISO_TIMES_DIR"
+FUNCTION_LINES = 20.0
+"""Lines that a test function counts as."""
 
 
 def unit() -> float:
@@ -145,17 +149,23 @@ def add_lines(tests: dict[str, Candidate], first: dict[tuple[str, str], str], co
     return number
 
 
+def _function(name: str) -> str:
+    """Return the name of a test without its parameters."""
+    return name.partition("[")[0]
+
+
 def choose(
     tests: dict[str, Candidate], costs: dict[tuple[str, str], float], lines: int, budget: float
 ) -> Iterator[str]:
     """Yield the tests to run, by what they add for their cost, within the budget [units]."""
     weight, paid, chosen, spent = np.ones(lines), set[tuple[str, str]](), set[str](), 0.0
+    function_weight = dict.fromkeys((_function(name) for name in tests), FUNCTION_LINES)
 
     def cost(test: Candidate) -> float:
         return test.cost + sum(costs[key] for key in test.shared if key not in paid)
 
     def value(name: str) -> float:
-        return (0.1 + weight[tests[name].lines].sum()) / cost(tests[name])
+        return float(1 + function_weight[_function(name)] + weight[tests[name].lines].sum()) / cost(tests[name])
 
     waiting = [(-np.inf, name) for name in tests]
     while waiting:
@@ -167,6 +177,7 @@ def choose(
             continue
         spent += cost(tests[name])
         weight[tests[name].lines] *= 0.5
+        function_weight[_function(name)] *= 0.5
         chosen.add(name)
         yield name
         if new := {key for key in tests[name].shared if key not in paid}:
@@ -180,8 +191,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--measure", action="store_true")
-    parser.add_argument("--first", type=float, default=4000.0, help="units of the first tier")
-    parser.add_argument("--landing", type=float, default=17_000.0, help="units of the tests of every landing")
+    parser.add_argument("--first", type=float, default=2400.0, help="units of the first tier")
+    parser.add_argument("--landing", type=float, default=9000.0, help="units of the tests of every landing")
     arguments = parser.parse_args()
     folder: Path = arguments.folder.absolute()
     if arguments.measure:

@@ -62,7 +62,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if any(name.startswith("thorough_") for name in getattr(item, "fixturenames", ())):
             item.add_marker("thorough")
-        if mark := marks.get(item.nodeid):
+        if (mark := marks.get(item.nodeid)) and not item.get_closest_marker("first"):
             item.add_marker(mark)
 
 

@@ -205,6 +205,7 @@ def browsed(opened: Browsed) -> Browsed:
     return opened
 
 
+@pytest.mark.first
 def test_the_verdict_of_the_locked_rig_changes_at_its_edge(browsed: Browsed) -> None:
     """9.75 Hz, where the cycle stops attracting; undo takes it back."""
     page = browsed.page
@@ -1065,6 +1066,7 @@ def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
         assert violations(browsed.page) == []
 
 
+@pytest.mark.first
 def test_nothing_went_wrong_and_nothing_left_this_machine(opened: Browsed) -> None:
     """Check the errors and requests of the whole file; this test runs last."""
     assert (opened.wrong, opened.outside) == ([], [])

@@ -42,6 +42,7 @@ def special(diagram: Diagram, symmetric: bool) -> dict[str, list[tuple[float, Lo
     return points
 
 
+@pytest.mark.first
 def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Diagram) -> None:
     """references.md: it stops attracting near 9.77 Hz; the issue: the unstable cycle lives on to a fold at 16.2 Hz."""
     points = special(over_crossover, symmetric=True)

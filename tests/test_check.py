@@ -26,6 +26,7 @@ def checked(rig: Stage) -> CheckAnswer:
     return friso.check(rig)
 
 
+@pytest.mark.first
 @pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer, rig: Stage, rtol: float) -> None:
@@ -42,6 +43,7 @@ def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer, rig:
     assert cases["given"].solver == free.solver
 
 
+@pytest.mark.first
 def test_the_readme_shows_what_its_first_line_prints(rig: Stage, checked: CheckAnswer) -> None:
     """What a stage file notes is repeated."""
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
@@ -137,6 +139,7 @@ def test_a_run_too_short_for_the_peak_count_hunts_all_the_same(rig: Stage) -> No
     assert (case.verdict, case.peaks) == ("hunts", 0)
 
 
+@pytest.mark.first
 def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
     """references.md, section 2: the locked rig's multiplier passes -1 near 9.7 Hz."""
     locked, free = checked["locked"].judgement, checked["free"].judgement

@@ -98,6 +98,7 @@ def test_a_store_takes_nothing_that_makes_another_study(mapped: tuple[Path, dict
     assert rows_of(done.stderr)
 
 
+@pytest.mark.first
 @posix
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     """Interrupted on a terminal in the middle of its bar; resumed by the store alone."""

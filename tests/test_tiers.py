@@ -36,14 +36,14 @@ def test_the_first_tier_executes_most_for_its_time() -> None:
     """New lines count more than lines that other tests execute, and shared fixtures are paid once."""
     shared = ("test_a.py", "runs")
     tests = {
-        "cheap": Candidate(1.0, [], np.arange(10)),
-        "copy": Candidate(1.0, [], np.arange(5)),
-        "shared": Candidate(1.0, [shared], np.arange(20, 100)),
-        "again": Candidate(1.0, [shared], np.arange(20, 60)),
-        "dear": Candidate(50.0, [], np.arange(100, 120)),
+        "cheap": Candidate(1.0, [], np.arange(1000)),
+        "copy": Candidate(1.0, [], np.arange(500)),
+        "shared": Candidate(1.0, [shared], np.arange(2000, 10_000)),
+        "again": Candidate(1.0, [shared], np.arange(2000, 6000)),
+        "dear": Candidate(50.0, [], np.arange(10_000, 12_000)),
     }
-    assert list(choose(tests, {shared: 5.0}, 120, 9.0)) == ["shared", "again", "cheap", "copy"]
-    assert list(choose(tests, {shared: 5.0}, 120, 8.0)) == ["shared", "again", "cheap"]
+    assert list(choose(tests, {shared: 5.0}, 12_000, 9.0)) == ["shared", "again", "cheap", "copy"]
+    assert list(choose(tests, {shared: 5.0}, 12_000, 8.0)) == ["shared", "again", "cheap"]
 
 
 def test_tests_with_marks_exist() -> None:
