@@ -150,7 +150,8 @@ def drawn(tests: dict[str, dict[int, set[str]]], count: int, seed: int, root: Pa
 def outcome(fault: Fault, copy: Path, tests: list[str], limit: float) -> tuple[str, float]:
     """Return the first test that fails with a fault, and the seconds until then.
 
-    The test is empty if none of them fails, "timeout" if they do not end within the limit [s].
+    The test is empty if none of them fails, "timeout" if they do not end within the limit [s]. Raises RuntimeError if a
+    test is not there any more.
     """
     source = (copy / fault.file).read_text("utf-8")
     (copy / fault.file).write_text(fault.seeded(source), "utf-8")
@@ -167,6 +168,8 @@ def outcome(fault: Fault, copy: Path, tests: list[str], limit: float) -> tuple[s
             text=True,
             timeout=limit,
         )
+        if "not found:" in done.stdout + done.stderr:
+            raise RuntimeError(f"tests have changed since they were measured: {done.stdout}")
         failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
         caught = failed[0].split()[1] if failed else "" if done.returncode in (0, 5) else f"exit {done.returncode}"
     except subprocess.TimeoutExpired:
@@ -177,7 +180,7 @@ def outcome(fault: Fault, copy: Path, tests: list[str], limit: float) -> tuple[s
 
 def chosen(fault: Fault, tests: dict[str, dict[int, set[str]]], cost: dict[str, float], budget: float) -> list[str]:
     """Return the tests that execute the line of a fault, the quick ones first, for so many seconds in sum."""
-    some = tests.get(fault.file, {}).get(fault.line, set())
+    some = tests.get(fault.file, {}).get(fault.line, set()) & set(cost)
     if len(some) < FEW:
         files = {test.partition("::")[0] for test in some}
         some = {test for test in cost if test.partition("::")[0] in files} | some
@@ -193,7 +196,7 @@ def chosen(fault: Fault, tests: dict[str, dict[int, set[str]]], cost: dict[str, 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("coverage", type=Path)
-    parser.add_argument("--times", type=Path, help="tests with their seconds, as JSON")
+    parser.add_argument("--times", type=Path, required=True, help="tests with their seconds, as JSON")
     parser.add_argument("--checkout", type=Path, default=ROOT)
     parser.add_argument("--faults", type=Path, help="file with the faults; made if there is none")
     parser.add_argument("--only", type=Path, help="file with the names of tests, such as those of the first tier")
@@ -202,7 +205,7 @@ def main() -> None:
     parser.add_argument("--budget", type=float, default=240.0, help="seconds of tests a fault, by their times")
     arguments = parser.parse_args()
     tests = executing(arguments.coverage)
-    cost = json.loads(arguments.times.read_text()) if arguments.times else {}
+    cost = json.loads(arguments.times.read_text())
     if arguments.faults and arguments.faults.exists():
         seeded = [Fault(**fault) for fault in json.loads(arguments.faults.read_text())]
     else:
