@@ -17,6 +17,7 @@ from patched import patched
 from refusals import rows_of
 from snapshots import Snapshots
 
+from friso.engine.arrays import Status
 from friso.equations.motion import Stand
 from friso.equations.settings import SETTINGS, settings_named
 from friso.equations.structure import structure
@@ -39,7 +40,7 @@ from friso.stage.correlations import Correlations
 from friso.stage.lists import element_keys
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
-from friso.studies.compare.measures import difference, linear_loops, median, quantile_interval
+from friso.studies.compare.measures import difference, linear_loops, median, quantile_interval, staying_in_position
 from friso.studies.compare.options import (
     DEADBAND_SHARE,
     MODEL_ERROR,
@@ -50,6 +51,7 @@ from friso.studies.compare.options import (
     options,
 )
 from friso.studies.compare.study import Comparison, NeededBandwidth, OptionResult, compare
+from friso.virtual_rig.run import RecordedRuns
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
@@ -645,3 +647,17 @@ def test_ctrl_c_keeps_the_options_that_were_run(built: Stage, monkeypatch: pytes
     ran, most = [], 1
     with pytest.raises(KeyboardInterrupt):
         compare(built, COUNT, 1)
+
+
+def test_a_machine_stays_in_position_about_its_reference() -> None:
+    """Runs at their reference, beside it, and about zero, where the reference is not."""
+    reference = np.full((3, 2000), 1e-3)
+    position = np.array([1e-3 + 1e-7 * np.sin(np.arange(2000) / 50), np.full(2000, 1.1e-3), np.full(2000, -1e-3)])
+    recorded = RecordedRuns(
+        np.arange(3),
+        1e-3,
+        {"reference": reference, "position": position},
+        {"position": position},
+        np.full(3, Status.DONE),
+    )
+    assert staying_in_position(recorded, 1e-5).stays.tolist() == [True, False, False]

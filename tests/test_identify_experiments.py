@@ -14,6 +14,7 @@ from emps import emps_log
 from machines import break_aways, creeping, drawn, moved
 from numba import njit
 from refusals import refused
+from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 import friso
@@ -495,6 +496,17 @@ def test_the_bound_on_the_rate_effect_holds() -> None:
         assert level > 1.5 * (1 - share_below(force_rate))
     small = np.array([share_below(r) for r in (1e-2, 1e-1)])
     assert small[1] / small[0] == pytest.approx(10 ** (2 / 3), rel=0.1)
+
+
+def test_the_least_break_away_is_the_highest_point_of_creeping_bristles() -> None:
+    """At a speed v bristles give way to a force rate r by r / sigma: what is left is F(v) (1 - r / (sigma v))."""
+    static, coulomb, bristles, stribeck, rate = 3.0, 1.2, 2e5, 4e-3, 5.0
+
+    def left(speed: float) -> float:
+        return (coulomb + (static - coulomb) * np.exp(-((speed / stribeck) ** 2))) * (1 - rate / (bristles * speed))
+
+    best = minimize_scalar(lambda log: -left(np.exp(log)), bounds=(np.log(1e-5), np.log(1e-2)), method="bounded")
+    assert break_away(rate, static, coulomb, bristles, stribeck) == pytest.approx(-best.fun, rel=1e-5)
 
 
 def test_a_step_of_the_force_behind_a_slow_rise_is_no_ramp() -> None:

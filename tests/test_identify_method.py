@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
 import friso
 from friso.errors import InputError
@@ -22,6 +23,7 @@ from friso.identification.readings.course import external
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
 from friso.identification.sources import recognised
+from friso.identification.spread import correlation_length
 from friso.identification.stage_file import identified_stage
 from friso.identification.stage_keys import fitting
 from friso.stage import Stage
@@ -280,3 +282,11 @@ def test_the_injected_force_makes_the_estimate_indirect() -> None:
         if log is labels:
             assert not any("give the" in text for text in bench.warnings)
     assert off["told"] < 0.5 * off["held"]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.9])
+def test_residuals_are_correlated_over_the_length_of_their_model(share: float) -> None:
+    """For a first-order autoregression the autocorrelation sums to (1 + share) / (1 - share)."""
+    noise = np.random.default_rng(5).standard_normal(60_000)
+    rows = lfilter([1.0], [1.0, -share], noise)
+    assert correlation_length(rows) == pytest.approx((1 + share) / (1 - share), rel=0.2, abs=0.5)
