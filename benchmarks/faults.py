@@ -110,8 +110,12 @@ def _changes(tree: ast.Module) -> Iterator[tuple[ast.expr, ast.expr]]:
                 yield node, operand
             case ast.IfExp(test=test, body=body, orelse=other):
                 yield node, ast.IfExp(test, other, body)
-            case ast.Constant(value=value) if type(value) in (int, float):
-                yield node, ast.Constant(value + 1 if type(value) is int else 1.5 * value or 1.0)
+            case ast.Constant(value=bool()):
+                continue
+            case ast.Constant(value=int(value)):
+                yield node, ast.Constant(value + 1)
+            case ast.Constant(value=float(value)):
+                yield node, ast.Constant(1.5 * value or 1.0)
 
 
 def _swapped(operator: Any) -> Any:
