@@ -223,7 +223,9 @@ def test_the_document_has_the_agreed_keys(
     moves = document["verification"]
     assert (moves["moves"], moves["not_at_rest"], moves["settling_time_met"]) == (64, 0, True)
     assert moves["locked"]["moves"] == 64
-    assert moves["settling_median_s"] <= moves["settling_95_s"]
+    settling = np.sort(designed.verification.free.settling)
+    assert moves["settling_median_s"] == pytest.approx(np.median(settling), rel=0.05)
+    assert moves["settling_median_s"] <= np.median(settling) * 1.05 < moves["settling_95_s"] <= settling[-1]
 
 
 def test_what_is_not_finite_is_null(designed: Design) -> None:

@@ -1,5 +1,6 @@
 """Sweeps: axes and links read, cells against runs alone, structures mixed in one sweep, cells no stage may have."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -187,8 +188,14 @@ def test_a_dataset_holds_its_study(rig: Stage) -> None:
     axes = {"controller.crossover": "4 Hz..8 Hz:2", "joint.locked": [True, False]}
     runs = sweep(rig, axes, samples=Samples({"joint.stroke": "0.1 mm..1 mm"}, 2), metrics=["peaks"])
     study = study_of(runs)
-    made = Request(rig, axes, Samples({"joint.stroke": "0.1 mm..1 mm"}, 2)).study(metrics=["peaks"])
+    made_of = Samples({"joint.stroke": "0.1 mm..1 mm"}, 2)
+    made = Request(rig, axes, made_of).study(metrics=["peaks"])
     assert not made.differences(study, runs.attrs["equations"])
+    others = {"controller.crossover": "4 Hz..9 Hz:2", "joint.locked": [False]}
+    more = Request(rig, others, made_of).study(metrics=["peaks", "multiplier"])
+    said = " ".join(replace(more, refined=True).differences(study, "0"))
+    for words in ("0 there", "4..8 Hz", "4..9 Hz", "True..False", "refined here, not there", "none of multiplier"):
+        assert words in said
     assert runs.attrs["stage"] == rig.to_toml()
 
 
