@@ -1,9 +1,8 @@
-"""Seed faults into friso, and tell which of them the tests catch: `python -m benchmarks.faults COVERAGE`.
+"""Seed faults into friso, and tell which of them the tests catch: `python -m benchmarks.faults FOLDER`.
 
-COVERAGE is a file of `pytest --cov=friso --cov=friso_thesis --cov-context=test`, which needs the package pytest-cov. It
-says which tests execute a line; only these are run, the quick ones first, until one fails. A fault is one changed
-operator, comparison, condition or number in a line that some test executes, drawn with a seed. Tests run in a copy of
-this checkout, in one process.
+FOLDER is one of `python -m benchmarks.tiers FOLDER --measure`: it says which tests execute a line, and how long each
+takes; only these are run, the quick ones first, until one fails. A fault is one changed operator, comparison, condition
+or number in a line that some test executes, drawn with a seed. Tests run in a copy of this checkout, in one process.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -139,6 +139,26 @@ def executing(coverage: Path) -> dict[str, dict[int, set[str]]]:
     return result
 
 
+def seconds_of_tests(folder: Path) -> dict[str, float]:
+    """Return how long the tests of a measuring run took that still exist [s]."""
+    lines = (line for path in folder.glob("*.jsonl") for line in path.read_text("utf-8").splitlines())
+    rows = [row for row in map(json.loads, lines) if "test" in row]
+    return {row["test"]: row["cpu"] for row in rows if f"def {_function(row['test'])}(" in _source(row["test"])}
+
+
+def _function(test: str) -> str:
+    return test.partition("[")[0].rpartition("::")[2]
+
+
+@cache
+def _source_of_file(file: str) -> str:
+    return (ROOT / file).read_text("utf-8") if (ROOT / file).exists() else ""
+
+
+def _source(test: str) -> str:
+    return _source_of_file(test.partition("::")[0])
+
+
 def drawn(tests: dict[str, dict[int, set[str]]], count: int, seed: int, root: Path) -> list[Fault]:
     """Return some faults: of a random line of the code, one of its possible ones."""
     by_line: dict[tuple[str, int], list[Fault]] = defaultdict(list)
@@ -198,9 +218,9 @@ def chosen(fault: Fault, tests: dict[str, dict[int, set[str]]], cost: dict[str, 
 
 
 def main() -> None:
+    """Seed the faults one by one, and print which test catches each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("coverage", type=Path)
-    parser.add_argument("--times", type=Path, required=True, help="tests with their seconds, as JSON")
+    parser.add_argument("folder", type=Path)
     parser.add_argument("--checkout", type=Path, default=ROOT)
     parser.add_argument("--faults", type=Path, help="file with the faults; made if there is none")
     parser.add_argument("--only", type=Path, help="file with the names of tests, such as those of the first tier")
@@ -208,8 +228,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--budget", type=float, default=240.0, help="seconds of tests a fault, by their times")
     arguments = parser.parse_args()
-    tests = executing(arguments.coverage)
-    cost = json.loads(arguments.times.read_text())
+    tests = executing(arguments.folder / "coverage")
+    cost = seconds_of_tests(arguments.folder)
     if arguments.faults and arguments.faults.exists():
         seeded = [Fault(**fault) for fault in json.loads(arguments.faults.read_text())]
     else:

@@ -4,9 +4,8 @@
 of a calibrating loop, and which lines of friso it executes (by the package coverage). The choice is greedy: the next
 test is the one that executes most lines for its time, where a line counts half as much each time that a chosen test
 executes it already. A test function counts as some lines of its own, and each of its cases as one, as they assert
-something that no line shows. Two
-budgets [units] end the first tier and the one that every landing runs; tests/tiers.txt gets the others, with their
-marks `slow` and `thorough`. A test that is in no list is run, so new tests need no entry.
+something that no line shows. Two budgets [units] end the first tier and the one that every landing runs. The others
+get their marks, `slow` and `thorough`, by tests/tiers.txt. A test that is in no list is run, so new ones need none.
 """
 
 from __future__ import annotations
@@ -102,7 +101,7 @@ class Candidate:
 def measured(folder: Path) -> tuple[dict[str, Candidate], dict[tuple[str, str], float], dict[tuple[str, str], str]]:
     """Return the tests of a measuring run, the costs of shared fixtures [units], and the tests that set them up.
 
-    A test that waits for another process costs half of the time for which it occupies a worker. A fixture is named by
+    A test costs its CPU time, but at least half of the time for which it occupies a worker. A fixture is named by
     its file and name; one of the whole session costs nothing, as some test needs it anyway.
     """
     tests: dict[str, dict[str, Any]] = {}
@@ -188,6 +187,7 @@ def choose(
 
 
 def main() -> None:
+    """Measure the tests if asked to, choose the tiers, and write the marks of the others."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--measure", action="store_true")

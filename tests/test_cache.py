@@ -289,7 +289,7 @@ def test_where_the_disk_is_full_kernels_are_compiled_and_not_kept(caplog: pytest
 ASKING = """
 import sys
 from friso.platform.helper_process import HelperProcess
-HelperProcess("sleeping", sys.argv[1], paths=sys.path).ask(60.0)
+HelperProcess("sleeping", sys.argv[1], paths=sys.path).ask(1e6)
 """
 SLEEPING = """
 import sys, time

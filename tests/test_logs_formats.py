@@ -685,9 +685,10 @@ READING = """
 import sys
 from pathlib import Path
 from friso.identification.logs import confined
+from friso.identification.logs.settings import LogSettings
 
-confined.SECONDS = 300.0
-confined.content("MAT", Path(sys.argv[1]))
+with LogSettings(time_of_reading=1e5).in_use():
+    confined.content("MAT", Path(sys.argv[1]))
 """
 
 

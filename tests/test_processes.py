@@ -74,7 +74,7 @@ from friso.studies.execute import processes
 with processes(1) as crew:
     crew.executor.submit(time.sleep, 0).result()
     print(*crew.executor._processes, flush=True)
-    time.sleep(60)
+    time.sleep(1e6)
 """
 
 

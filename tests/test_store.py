@@ -306,7 +306,7 @@ from friso.studies.store import Store
 
 with Store.opened(Path(sys.argv[2]), Request(friso.load(sys.argv[1]), {AXES!r}).study()):
     print("open", flush=True)
-    time.sleep(60)
+    time.sleep(1e6)
 """
 
 

@@ -1300,7 +1300,8 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     assert (tried.settles, none.settles) == (True, False)
     assert flat["joint.stiffness"] * flat["joint.stroke"] < flat["friction.static"]
     assert with_unit(flat["joint.stiffness"], "N/m") in isolator_sentence(tried)
-    assert isolator_sentence(tried) != isolator_sentence(none)
+    assert "it would not hunt" in isolator_sentence(tried)
+    assert "would not surely stop hunting" in isolator_sentence(none)
     assert suggestion(load(EXAMPLES / "thesis_rig.toml")) is None
 
 

@@ -334,6 +334,12 @@ FAILS: Mapping[str, Case] = {
 }
 
 
+def test_every_judge_of_maps_is_tried_both_ways() -> None:
+    """Judges of other evidence have tests of their own."""
+    assert HOLDS.keys() == FAILS.keys()
+    assert HOLDS.keys() <= registered().keys()
+
+
 @pytest.mark.parametrize("claim", HOLDS)
 def test_judges_recognise_what_holds(claim: str) -> None:
     finding = registered()[claim].judge(Evidence(*HOLDS[claim]))
