@@ -191,7 +191,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--measure", action="store_true")
-    parser.add_argument("--first", type=float, default=2400.0, help="units of the first tier")
+    parser.add_argument("--first", type=float, default=1500.0, help="units of the first tier")
     parser.add_argument("--landing", type=float, default=9000.0, help="units of the tests of every landing")
     arguments = parser.parse_args()
     folder: Path = arguments.folder.absolute()
