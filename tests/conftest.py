@@ -24,12 +24,6 @@ FOLDER = "FRISO_CACHE_DIR"
 MADE = "FRISO_TEST_CACHE_DIR"
 BLAS = "OPENBLAS_NUM_THREADS"
 
-TIERS = Path(__file__).parent / "tiers.txt"
-"""Tests that a plain `pytest` leaves out: their mark, duration in units, and name; by `python -m benchmarks.tiers`."""
-
-MEASURED = "FRISO_TIMES_DIR"
-"""Variable that is set while tests are measured, which gives them no marks."""
-
 # The same examples for the same test, however slow the machine is: a change is refused for what it did. Others are
 # drawn by `pytest --hypothesis-profile random`.
 settings.register_profile("random", deadline=None)
@@ -57,8 +51,10 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Give tests their marks: those of tests/tiers.txt, and thorough to what a fixture `thorough_...` computes."""
+    from benchmarks.tiers import FOLDER_VARIABLE, TIERS  # behind the path of this checkout
+
     rows = (line.split(" ", 2) for line in TIERS.read_text(encoding="utf-8").splitlines())
-    marks = {} if MEASURED in os.environ else {name: mark for mark, _, name in rows}
+    marks = {} if FOLDER_VARIABLE in os.environ else {name: mark for mark, _, name in rows}
     for item in items:
         if any(name.startswith("thorough_") for name in getattr(item, "fixturenames", ())):
             item.add_marker("thorough")
