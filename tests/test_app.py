@@ -30,9 +30,10 @@ from urllib.parse import quote
 
 import log_files
 import numpy as np
+import psutil
 import pytest
 import uvicorn
-from patience import LIMIT
+from patience import LIMIT, wait_until
 
 import friso
 from friso.app import connections, gate, uploads
@@ -63,6 +64,11 @@ from friso.studies.sweep import run_in_memory
 
 RIG = Path(friso.example("thesis_rig"))
 STICK_SLIP = Path(friso.example("lugre_stick_slip"))
+
+
+def served_clients() -> set[tuple[str, int]]:
+    """Return the addresses of all who are connected to this process."""
+    return {tuple(connection.raddr) for connection in psutil.Process().net_connections("tcp4")}
 
 
 @dataclass
@@ -200,7 +206,8 @@ def test_whoever_has_no_key_and_reads_slowly_is_cut_off_and_a_question_is_not(
         slow = opened.enter_context(socket.create_connection(("127.0.0.1", served.port), timeout=LIMIT))
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
         slow.sendall(f"GET /plotly.js HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n\r\n".encode())
-        time.sleep(4.0)
+        wait_until(lambda: slow.getsockname() in served_clients())
+        wait_until(lambda: slow.getsockname() not in served_clients())
         assert len(served.request("GET", "/plotly.js")[2]) > 1_000_000
         size = 0
         with contextlib.suppress(ConnectionResetError):

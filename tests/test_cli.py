@@ -4,7 +4,6 @@ import copy
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import pytest
 import xarray as xr
 from inside import friso_inside
+from patience import wait_until
 from refusals import rows_of
 
 import friso
@@ -111,12 +111,12 @@ def test_a_wait_is_told_where_no_terminal_shows_it(
 
 def _until_told(capsys: pytest.CaptureFixture[str], line: str) -> None:
     printed: list[str] = []
-    for _ in range(1000):
-        printed += capsys.readouterr().err.splitlines()
-        if line in printed:
-            return
-        time.sleep(0.01)
-    raise AssertionError(printed)
+
+    def told_so() -> bool:
+        printed.extend(capsys.readouterr().err.splitlines())
+        return line in printed
+
+    wait_until(told_so)
 
 
 def test_check_json(checked: dict[str, Any]) -> None:

@@ -462,10 +462,10 @@ def test_files_of_no_design_are_not_overwritten(finished: list[str], folder: Pat
     """Nor is the stage that is read, and a folder may be no file."""
     taken = tmp_path / name if name != "." else tmp_path / "taken"
     taken.write_text("mine")
-    with refused():
+    with refused("--out"):
         command(RIG, SPEC, out=tmp_path if name != "." else taken)
     assert taken.read_text() == "mine"
-    with refused():
+    with refused("--out"):
         command(folder / "design.toml", SPEC, out=folder)
 
 
@@ -473,7 +473,7 @@ def test_overrides_are_of_the_stage(finished: list[str], folder: Path, quick: No
     command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
     assert "[drive]" in caplog.text
-    with refused():
+    with refused("controller.crosover"):
         command(RIG, spec, set=['controller.crosover="8 Hz"'], out=folder)
 
 

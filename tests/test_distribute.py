@@ -78,7 +78,7 @@ def test_a_scheduler_with_tls_is_reached_by_dask_s_configuration_alone(
     ) as cluster:
         address = cluster.scheduler_address
         assert address.startswith("tls://")
-        with StudySettings(scheduler_timeout=2.0).in_use(), refused(), connected(address):
+        with StudySettings(scheduler_timeout=2.0).in_use(), refused("--scheduler"), connected(address):
             pass
         settings = {"ca-file": names["tls_ca_file"], "client.cert": names["tls_client_cert"]}
         settings["client.key"] = names["tls_client_key"]
@@ -153,10 +153,10 @@ def test_a_worker_with_another_friso_is_refused(
     other = "9.9.9 (0123456789ab)"
     with connected(cluster.scheduler_address) as crew:
         crew.arguments["expected"] = other
-        with refused():
+        with refused("--scheduler"):
             run_in_memory([Request(rig, AXES).study()], crew)
     monkeypatch.setattr(execute, "equations_version", lambda: other)
-    with refused() as error, connected(cluster.scheduler_address):
+    with refused("--scheduler") as error, connected(cluster.scheduler_address):
         pass
     assert other in str(error.value)
 
@@ -164,9 +164,13 @@ def test_a_worker_with_another_friso_is_refused(
 def test_a_scheduler_that_does_not_answer_or_has_no_workers() -> None:
     with StudySettings(scheduler_timeout=0.3).in_use():
         for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
-            with refused(), connected(address):
+            with refused("--scheduler"), connected(address):
                 pass
-    with LocalCluster(n_workers=0, dashboard_address=":0") as empty, refused(), connected(empty.scheduler_address):
+    with (
+        LocalCluster(n_workers=0, dashboard_address=":0") as empty,
+        refused("--scheduler"),
+        connected(empty.scheduler_address),
+    ):
         pass
 
 

@@ -9,7 +9,7 @@ from inside import friso_inside
 from refusals import refused
 
 import friso
-from friso.errors import InputError
+from friso.errors import InputError, StageError
 from friso.identification.logs import mapping
 from friso.identification.logs.read import read_frequency_response
 from friso.stage import Stage, loads, numeric_keys, parse_set
@@ -85,7 +85,7 @@ def test_a_unit_in_other_capitals_is_recognised(unit: str, meant: str) -> None:
     ],
 )
 def test_the_line_is_shown_with_a_caret(old: str, new: str, below: str) -> None:
-    with refused() as error:
+    with refused(kind=StageError) as error:
         loads(RIG.replace(old, new))
     lines = str(error.value).splitlines()
     (caret,) = (k for k, line in enumerate(lines) if line.strip() == "^")

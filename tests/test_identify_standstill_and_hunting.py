@@ -52,7 +52,7 @@ def test_a_log_of_standstill_with_its_force_is_told_how_to_go_on(tmp_path: Path)
 
 
 def test_a_log_without_cycles_is_refused() -> None:
-    with refused():
+    with refused("rests, position"):
         swings_of(made("rests", np.linspace(1e-4, 0.0, 5000)))
 
 

@@ -211,7 +211,7 @@ def test_a_file_that_friso_has_not_written_stays(tmp_path: Path, caplog: pytest.
     """A file of the user stays even in a folder that friso made, unless `overwrite` is set."""
     place(tmp_path / "out").write({"page.html": ""})
     (tmp_path / "out" / "figure.png").write_text("mine")
-    with refused():
+    with refused("--out"):
         place(tmp_path / "out").write({"page.html": "", "figure.png": ""})
     assert (tmp_path / "out" / "figure.png").read_text() == "mine"
     place(tmp_path / "out", overwrite=True).write({"figure.png": "friso's"})
@@ -262,7 +262,7 @@ def test_overwriting_does_not_make_the_folder_friso_s(tmp_path: Path) -> None:
 def test_what_is_read_is_never_replaced(tmp_path: Path, overwrite: bool) -> None:
     place(tmp_path / "out").write({"stage.toml": "read"})
     stage = tmp_path / "out" / "stage.toml"
-    with refused():
+    with refused("--out"):
         place(tmp_path / "out", overwrite, (stage,))
     (tmp_path / "other.toml").write_text("read too")
     other = OutputFolder("check", tmp_path, True, (tmp_path / "other.toml",))

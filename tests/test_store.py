@@ -24,6 +24,7 @@ import pytest
 import xarray as xr
 import zarr
 from filelock import FileLock
+from patience import wait_until
 from refusals import refused
 from systems import posix
 
@@ -85,18 +86,23 @@ sweep(friso.load(sys.argv[1]), {AXES!r}, store=sys.argv[2], refine=len(sys.argv)
 
 
 def killed_and_resumed(folder: Path, *options: str) -> tuple[xr.Dataset, int]:
-    """The study run in processes that are killed at random moments until one is let finish; how many were killed."""
+    """The study run in processes that are killed once they have written some files; how many were killed."""
     script = folder / "run.py"
     script.write_text(RUN.replace("{AXES!r}", repr(AXES)))
     path = folder / "killed.zarr"
     command = [sys.executable, str(script), str(EXAMPLES / "thesis_rig.toml"), str(path), *options]
     random.seed(3)
     kills = 0
+
+    def written() -> int:
+        return len([*path.rglob("*")])
+
     for _ in range(6):
         with subprocess.Popen(command) as process:
-            while not path.exists() and process.poll() is None:
-                time.sleep(0.01)
-            time.sleep(random.uniform(0.0, 0.6))
+            enough = len([*path.rglob("*")]) + random.randint(1, 12)
+            wait_until(
+                lambda process=process, enough=enough: process.poll() is not None or len([*path.rglob("*")]) >= enough
+            )
             kills += process.poll() is None
             process.kill()
     subprocess.run(command, check=True)
@@ -190,7 +196,7 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, first: 
         pass
     before = sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
     stage = rig.replace(second.get("stage", {}))
-    with refused():
+    with refused(kind=StoreError):
         sweep(**{"axes": axes, **second, "stage": stage, "store": path})
     assert before == sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
 
@@ -271,7 +277,7 @@ def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monke
     with Store.opened(tmp_path / "a.zarr", study_on(rig)):
         pass
     monkeypatch.undo()
-    with refused():
+    with refused(kind=StoreError):
         sweep(rig, AXES, store=tmp_path / "a.zarr")
 
 
@@ -285,12 +291,12 @@ def test_anything_else_is_refused(rig: Stage, tmp_path: Path) -> None:
     foreign.to_zarr(tmp_path / "foreign.zarr", zarr_format=2)
     foreign.assign_attrs(equations="0.1.0").to_zarr(tmp_path / "old.zarr", zarr_format=2)
     for path in (folder, file, tmp_path / "foreign.zarr"):
-        with refused():
+        with refused(kind=StoreError):
             sweep(rig, AXES, store=path)
     assert (folder / "thesis.txt").read_text() == file.read_text() == "precious"
     with refused("--out"):
         sweep(rig, AXES, store=file / "below.zarr")
-    with refused():
+    with refused(kind=StoreError):
         read_store(tmp_path / "absent.zarr")
     with pytest.raises(StoreError, match=r"earlier friso[\s\S]*under a new name"):
         read_store(tmp_path / "old.zarr")
@@ -316,7 +322,7 @@ def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path) -> N
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        with refused():
+        with refused(kind=StoreError):
             sweep(rig, AXES, store=path)
         process.kill()
     with Store.opened(path, study_on(rig)):  # the lock went with its process

@@ -328,9 +328,9 @@ def test_there_is_no_map_of_verdicts_and_no_boundary_where_the_reference_keeps_m
             friso.sweep(stage, axes, metric=metric)
         assert "ramp" in caught.value.actual
         assert "outcome" in caught.value.example
-        with refused():  # it stands in the file, and moves on the axis
+        with refused("metric"):  # it stands in the file, and moves on the axis
             friso.sweep(standing, axes, metric=metric)
-        with refused():  # or by a link
+        with refused("metric"):  # or by a link
             friso.sweep(standing, friction, link={"motion.velocity": "friction.static / 30"}, metric=metric)
     assert (friso.sweep(stage, axes, metric="outcome").outcome == "swings").any()
     with refused("motion") as caught:
@@ -344,5 +344,5 @@ def test_a_stage_that_cannot_hunt_has_a_verdict_whatever_its_reference_does() ->
     assert verdict in ("transient", "settles")
     cells = friso.sweep(stage, {"motion.velocity": ["0.05 m/s", "0.1 m/s"]}, metric="verdict").data["verdict"]
     assert cells.values[1] == verdict
-    with refused():
+    with refused("metric"):
         friso.sweep(stage, {"controller.ki": ["0 N/(m*s)", "0.8 N/(m*s)"]}, metric="verdict")

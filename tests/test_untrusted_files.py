@@ -219,12 +219,12 @@ def test_a_whole_number_of_another_type_is_refused(elements: object) -> None:
 def test_changes_of_another_type_are_refused() -> None:
     array, stage = np.array([1.0, 2.0]), friso.load(RIG)
     for changes in (3.0, True, [float("nan")], [b"x"], array, {3: 4}, "masses.cart=1 kg"):
-        with refused():
+        with refused("set"):
             friso.export("gains", RIG, set=changes)  # type: ignore[arg-type]
     for changes in ({"joint": {1: 2}}, {3: 4}, ["masses.stage"], array, "masses.stage"):
         with pytest.raises(InputError):
             stage.replace(changes)  # type: ignore[arg-type]
-    with refused():
+    with refused("stage"):
         friso.export("gains", {3: 4})  # type: ignore[dict-item]
     with pytest.raises(InputError, match="set="):
         friso.check(RIG, {"masses.cart": "1 kg"})  # type: ignore[arg-type]
