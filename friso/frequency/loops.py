@@ -303,12 +303,14 @@ class Poles:
     def distance(self, omega: np.ndarray) -> np.ndarray:
         """Return abs(1 + L) of the loop L at angular frequencies [rad/s], shape (members, k).
 
-        It is the product of the distances to all closed-loop poles, over that to all poles of the cut loop.
+        It is the product of the distances to all closed-loop poles, over that to all poles of the cut loop, and may be
+        infinite far beyond all poles that are not cut.
         """
         at = self._at(omega)
         squared = np.ones(omega.shape)
-        for closed, cut in zip(self.closed.T[..., None], self.cut.T[..., None], strict=True):
-            squared *= _squared(at, closed) / _squared(at, cut)
+        with np.errstate(over="ignore"):
+            for closed, cut in zip(self.closed.T[..., None], self.cut.T[..., None], strict=True):
+                squared *= _squared(at, closed) / _squared(at, cut)
         return np.sqrt(squared)
 
     def loop(self, omega: np.ndarray) -> Complex:
