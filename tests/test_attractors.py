@@ -44,10 +44,11 @@ from friso.hunting.attractors.survey import Survey, _slope
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW
 from friso.hunting.cycle.rest import bent, spread_over
+from friso.hunting.edge_search import Beyond, EdgeSearch
 from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import run_motions
-from friso.hunting.outward import Beyond, EdgeSearch
+from friso.hunting.path import bandwidth_path
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import CheckSettings, EdgeSettings
 from friso.hunting.verdict import STILL_SWINGS, own_motion
@@ -193,10 +194,12 @@ def test_an_orbit_that_attracts_to_the_end_of_the_range_has_no_end_in_it() -> No
     flat = VARIANTS["rigid"].replace({"controller.crossover": "6 Hz"}).flat()
     motions = attractors(Ensemble.held(flat, 1)).motions
     with pytest.raises(Beyond):
-        EdgeSearch(flat, 1.2).end(1.0, motions, 1.06)
-    end = EdgeSearch(flat, 10.0).end(1.0, motions, 1.06)  # something attracts at 1.06, other than is said
+        EdgeSearch(bandwidth_path(flat, True), 1.2).end(1.0, motions, 1.06)
+    end = EdgeSearch(bandwidth_path(flat, True), 10.0).end(
+        1.0, motions, 1.06
+    )  # something attracts at 1.06, other than is said
     assert end.inside == pytest.approx(9.77 / 6, rel=1e-3)
-    assert end.outside == pytest.approx(EdgeSettings().beyond_edge_factor * end.inside)
+    assert end.outside == pytest.approx(EdgeSettings().beyond_bandwidths[0] * end.inside)
     assert end.certain
 
 
@@ -318,8 +321,8 @@ LOSING = Stage(
 
 
 def test_an_orbit_that_is_lost_while_it_attracts_well_ends_about_there() -> None:
-    outward = EdgeSearch(LOSING.flat(), 10.0)
-    motions = what_attracts(outward._stages(np.array([1.3]))).motions
+    outward = EdgeSearch(bandwidth_path(LOSING.flat(), True), 10.0)
+    motions = what_attracts(outward.path.stages(np.array([1.3]))).motions
     end = outward.end(1.3, motions, 2.0)
     assert end.inside <= 1.8997 * 1.002
     assert end.outside >= 1.8997 * 0.998
@@ -335,12 +338,12 @@ def test_an_end_that_no_orbit_can_be_followed_to_is_certain_between_two_bandwidt
     No start of `benchmarks.truth --seed 2901` refutes it.
     """
     flat = draw(2901, number, series).flat()
-    outward = EdgeSearch(flat, 10.0)
-    end = outward.end(at, what_attracts(outward._stages(np.array([at]))).motions, 1.12 * at)
+    outward = EdgeSearch(bandwidth_path(flat, True), 10.0)
+    end = outward.end(at, what_attracts(outward.path.stages(np.array([at]))).motions, 1.12 * at)
     assert end.certain
     assert end.reserve <= EdgeSettings().edge_bracket_share
     inside, outside = (
-        attractors(outward._stages(np.array([factor])), thorough=True)
+        attractors(outward.path.stages(np.array([factor])), thorough=True)
         for factor in (0.995 * end.inside, 1.002 * end.outside)
     )
     assert inside.attracts[0]
@@ -383,7 +386,7 @@ brute force at 1e-9 (`benchmarks.laws --law rolling --seed 27`, number 91)."""
 
 def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -> None:
     """The edge lies beyond it."""
-    outward = EdgeSearch(WINDOWED.flat(), 10.0)
+    outward = EdgeSearch(bandwidth_path(WINDOWED.flat(), True), 10.0)
     end = outward.end(1.0, what_attracts(held(WINDOWED)).motions, 1.05)
     assert 3 * end.inside > 3.1
     assert 3 * end.outside > 3.35
@@ -391,7 +394,9 @@ def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -
 
 def test_no_window_is_looked_for_beyond_the_range_or_a_stage_that_settles() -> None:
     """A stage in the gap below the window was said to be contradicted by an orbit that is followed to it."""
-    end = EdgeSearch(WINDOWED.flat(), 10.0, 3.06 / 3).end(1.0, what_attracts(held(WINDOWED)).motions, 1.05)
+    end = EdgeSearch(bandwidth_path(WINDOWED.flat(), True), 10.0, 3.06 / 3).end(
+        1.0, what_attracts(held(WINDOWED)).motions, 1.05
+    )
     assert pytest.approx(3 * end.inside, rel=2e-3) == 3.016
 
 
@@ -402,9 +407,11 @@ def test_a_window_that_is_neither_proved_nor_refuted_leaves_an_edge_uncertain(
     """If simulations beyond an end could not decide, and nothing else attracts there, it stays undecided."""
     nothing = attractors(held(VARIANTS["rigid"].replace({"controller.crossover": "12 Hz"})))
     seen = replace(nothing, decided=np.array([decided]))
-    monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
+    monkeypatch.setattr("friso.hunting.edge_search.attractors", lambda *_, **__: seen)
     monkeypatch.setattr(EdgeSearch, "_told", lambda *_, **__: nothing)
-    _, survey = EdgeSearch(WINDOWED.flat(), 10.0)._proved(1.01, np.array([1.03]), np.array([1e-3]))
+    _, survey = EdgeSearch(bandwidth_path(WINDOWED.flat(), True), 10.0)._proved(
+        1.01, np.array([1.03]), np.array([1e-3])
+    )
     assert survey.decided.tolist() == [decided]
 
 

@@ -33,7 +33,7 @@ from friso.hunting import (
 from friso.hunting.basin import ends_in, evenly
 from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.rest import pushed
-from friso.hunting.outward import EdgeSearch
+from friso.hunting.edge_search import EdgeSearch
 from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import BY_CHANCE, own_motion
 from friso.stage import Stage

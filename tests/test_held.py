@@ -7,7 +7,8 @@ from beyond_flip import STEEP
 from friso.equations.bandwidth import faster
 from friso.hunting import Ensemble, KeyRange, Space, diagram, find_cycles, stuck
 from friso.hunting.attractors.survey import of_cycles
-from friso.hunting.outward import EdgeSearch
+from friso.hunting.edge_search import EdgeSearch
+from friso.hunting.path import bandwidth_path
 from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
 
@@ -19,8 +20,8 @@ FLIP = 0.135006
 
 def test_an_edge_moves_on_to_what_attracts_beyond_a_flip() -> None:
     """Irregular swings beside the cycle, and others, attract to more than 1 % beyond its end."""
-    outward = EdgeSearch(STEEP.flat(), 1.0)
-    below = what_attracts(outward._stages(np.array([0.13])))
+    outward = EdgeSearch(bandwidth_path(STEEP.flat(), True), 1.0)
+    below = what_attracts(outward.path.stages(np.array([0.13])))
     end = outward.end(0.13, below.motions, 0.14)
     assert 1.0125 * FLIP < end.inside < end.outside < 1.03 * FLIP
 
@@ -41,7 +42,7 @@ def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_
         at = crossover / flat["controller.crossover"]
         stages = Ensemble.held(faster(flat, np.array([at])), 1)
         (orbit,) = of_cycles(np.arange(1), find_cycles(stages), stages.sticking)
-        factor, _ = EdgeSearch(flat, 10.0).followed(at, orbit)
+        factor, *_ = EdgeSearch(bandwidth_path(flat, True), 10.0).followed(at, orbit)
         assert factor * flat["controller.crossover"] == pytest.approx(5.607, rel=0.01)
     key = KeyRange("controller.crossover", 5.4, 5.8)
     traced = diagram(Space.of(rig.replace({"joint.locked": False}), [key]), seeds=2)
@@ -60,5 +61,5 @@ def test_a_fold_with_a_limiter_that_chatters_is_where_its_branch_turns_back(rig:
     flat = leaning.flat()
     stages = Ensemble.held(flat, 1)
     (orbit,) = of_cycles(np.arange(1), find_cycles(stages), stages.sticking)
-    factor, _ = EdgeSearch(flat, 10.0).followed(1.0, orbit)
+    factor, *_ = EdgeSearch(bandwidth_path(flat, True), 10.0).followed(1.0, orbit)
     assert 3.63 * factor == pytest.approx(3.6468, rel=0.01)

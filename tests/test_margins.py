@@ -22,14 +22,18 @@ from friso.equations.scaled_friction import (
 from friso.hunting import (
     AttractionEnd,
     BandwidthWindow,
-    MarginEnd,
     ParameterMargin,
     check,
+    edge_search,
     find_attractors,
     joint_margins,
+    path_search,
 )
-from friso.hunting import parameter_margin as module
-from friso.hunting.parameter_margin import parameter_margin
+from friso.hunting.attractors import Attractors
+from friso.hunting.attractors.survey import Swinging
+from friso.hunting.path import Path, key_path
+from friso.hunting.stage_margins import _margin
+from friso.hunting.what_attracts import Sketch
 from friso.questions.check.document import joint_margins_document
 from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
 from friso.questions.check.question import CheckAnswer
@@ -47,21 +51,20 @@ def attracts(stage: Stage, factor: float) -> bool:
     return bool(find_attractors(with_static_friction(stage.flat(), factor), 1).attracts[0])
 
 
-@pytest.mark.inner
 def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) -> None:
     """The locked rig hunts; with half its static friction it does not, nor with half as much again."""
-    flat = locked.flat()
-    with np.errstate(all="ignore"):
-        margin = parameter_margin(lambda k: with_static_friction(flat, k), True, least_static_factor(flat), 3.0)
+    margin = check(locked)["locked"].static_friction
+    assert margin is not None
     assert margin.certain
     for end in (margin.below, margin.above):
         assert end is not None
-        assert attracts(locked, end.same)
-        assert not attracts(locked, end.other)
-        assert abs(np.log(end.other / end.same)) < 0.15
+        assert attracts(locked, end.inside)
+        assert not attracts(locked, end.outside)
+        assert abs(np.log(end.outside / end.inside)) < 0.05
     assert margin.below is not None
     assert margin.above is not None
-    assert margin.below.same < 1 < margin.above.same
+    assert (margin.below.kind, margin.above.kind) == ("fold", "flip")
+    assert margin.below.inside < 1 < margin.above.inside
 
 
 def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
@@ -72,8 +75,8 @@ def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> Non
     assert not margin.attracts
     assert margin.above is not None
     assert margin.range == pytest.approx((1 / 1.4, 3.0))
-    assert not attracts(case.stage, margin.above.same)
-    assert attracts(case.stage, margin.above.other)
+    assert not attracts(case.stage, margin.above.outside)
+    assert attracts(case.stage, margin.above.inside)
     (sentence,) = friction_sentences(case)
     assert "Coulomb friction, which is held at 1.00 N" in sentence
 
@@ -100,13 +103,13 @@ def test_the_joint_has_margins_where_it_is_free(rig: Stage) -> None:
 
 def test_the_document_holds_the_margins_of_the_joint_where_details_are_wanted(rig: Stage) -> None:
     """Margins are given as multiples of the stage file's keys and as values in the units of its axis."""
-    begins = ParameterMargin(False, MarginEnd(0.8, 0.75, True), None, (1 / 3, 3.0), (1,))
+    begins = ParameterMargin(False, AttractionEnd(0.75, 0.8, True), None, (1 / 3, 3.0), (1,))
     margins = {"joint.stroke": begins, "joint.stiffness": replace(begins, below=None)}
     document = joint_margins_document(rig, margins)["joint_margins"]
     stroke, stiffness = rig.flat()["joint.stroke"], rig.flat()["joint.stiffness"]
     below = document["stroke"].pop("below")
     assert below == {
-        **{"same_at_factor": 0.8, "other_at_factor": 0.75, "certain": True},
+        **{"same_at_factor": 0.8, "other_at_factor": 0.75, "certain": True, "kind": "seen"},
         **{"same_m": pytest.approx(0.8 * stroke), "other_m": pytest.approx(0.75 * stroke)},
     }
     rest = {"hunts": False, "above": None, "searched": [1 / 3, 3.0], "not_determined": ["above"]}
@@ -127,15 +130,15 @@ def made_up_case(margin: ParameterMargin, judgement: Any) -> Any:
 
 def test_a_margin_is_told_with_both_of_its_ends() -> None:
     """Hunting begins or ends within the stated range; stating one end alone was wrong by up to a tenth."""
-    begins = ParameterMargin(False, None, MarginEnd(1.3149, 1.4, True), (1 / 3, 3.0))
+    begins = ParameterMargin(False, None, AttractionEnd(1.4, 1.3149, True), (1 / 3, 3.0))
     assert "between 1.31 and 1.4 times" in margin_sentence("static friction", begins)
-    ends = ParameterMargin(True, MarginEnd(0.5, 0.4449, True), MarginEnd(1.3, 1.4411, True), (1 / 3, 3.0))
+    ends = ParameterMargin(True, AttractionEnd(0.5, 0.4449, True), AttractionEnd(1.3, 1.4411, True), (1 / 3, 3.0))
     assert "between 0.444 and 0.5 times" in margin_sentence("static friction", ends)
     assert "between 1.3 and 1.45 times" in margin_sentence("static friction", ends)
     (sentence,) = friction_sentences(made_up_case(begins, settles()))
     assert "3.93 to 4.20 N" in sentence  # 3 N times the factors that are told
     assert "2.93 to 3.20 N" in sentence  # less 1 N
-    already = ParameterMargin(False, None, MarginEnd(1.0, 1.08, True), (1 / 3, 3.0))
+    already = ParameterMargin(False, None, AttractionEnd(1.08, 1.0, True), (1 / 3, 3.0))
     assert "between 1 and 1.08 times" in margin_sentence("static friction", already)
 
 
@@ -148,8 +151,8 @@ def test_the_lower_bandwidth_advised_keeps_a_factor_from_hunting() -> None:
 
 
 def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:
-    near = ParameterMargin(False, None, MarginEnd(1.05, 1.1, True), (1 / 3, 3.0))
-    far = ParameterMargin(False, None, MarginEnd(1.5, 1.6, True), (1 / 3, 3.0))
+    near = ParameterMargin(False, None, AttractionEnd(1.1, 1.05, True), (1 / 3, 3.0))
+    far = ParameterMargin(False, None, AttractionEnd(1.6, 1.5, True), (1 / 3, 3.0))
     assert any("1.1 times" in text for text in thin_margins(made_up_case(near, settles())))
     assert not thin_margins(made_up_case(far, settles(margin=None)))
 
@@ -161,60 +164,55 @@ def test_a_side_that_was_given_up_is_no_margin() -> None:
     assert hunts().verdict == "hunts"
 
 
-def margin_of(
-    attracts: bool, roughly: Callable[..., Any], thoroughly: Callable[..., Any], maps: bool = True
-) -> ParameterMargin:
+def margin_of(attracts: bool, roughly: Callable[..., Any], thoroughly: Callable[..., Any]) -> ParameterMargin:
     """The margin of a made-up stage, from 1/3 to 3 times a parameter, by functions that say where it hunts."""
 
-    def answers(hunts: Callable[..., Any], factors: np.ndarray) -> Any:
-        attracting = hunts(factors)
-        motions = [SimpleNamespace(stage=int(k), cycles=1) for k in np.flatnonzero(attracting)]
-        return SimpleNamespace(attracts=attracting, decided=np.ones(len(factors), bool), motions=motions)
+    def answers(hunts: Callable[..., Any], factors: np.ndarray, **_: Any) -> Attractors:
+        nothing = np.zeros(len(factors), bool)
+        motions = [Swinging(k, 1e-3, 1.0, 1.0, 1e-4, 2) for k in np.flatnonzero(hunts(factors)).tolist()]
+        return Attractors(tuple(motions), ~nothing, np.ones(len(factors)), (), nothing, ~nothing, nothing)
 
-    changed = {
-        "surveyed_roughly": lambda stages, close: answers(roughly, stages),
+    search = {
+        "attractors": partial(answers, thoroughly),
         "what_attracts": partial(answers, thoroughly),
         "surely_surveyed": lambda stages, survey: survey.decided,
-        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
-        "map_may_decide": lambda stages: maps,
     }
-    with patched({module: changed}):
-        return parameter_margin(lambda factors: factors, attracts, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
+    sketched = {"sketched": lambda stages: Sketch(roughly(stages), np.ones(len(stages), bool))}
+    judgement = SimpleNamespace(hunting=SimpleNamespace(surveyed=answers(lambda _: np.array([attracts]), np.ones(1))))
+    made_up = {Path: {"stages": lambda path, factors: factors}, path_search: search | sketched}
+    with patched(made_up | {edge_search: search | {"has_a_map": lambda stages: True}}):
+        return _margin(key_path({"key": 1.0}, "key"), judgement)  # type: ignore[arg-type]
 
 
 @pytest.mark.inner
-@pytest.mark.parametrize("maps", [True, False])
-def test_a_window_that_was_searched_is_not_forgotten(maps: bool) -> None:
-    """A limit cycle exists only from 0.8 to 0.9 times a parameter: the nearest end below is in that window.
-
-    A rough survey that is wrong next to the stage's own value only moves the end farther away.
-    """
+def test_where_hunting_begins_is_found_between_the_factors_tried_first() -> None:
+    """A swing lasts only from 0.8 to 0.9 times a parameter: the nearest end below is that of this window."""
 
     def hunts(factors: np.ndarray) -> np.ndarray:
         return (factors > 0.8) & (factors < 0.9)
 
-    margin = margin_of(False, hunts, hunts, maps)
+    margin = margin_of(False, hunts, hunts)
     assert margin.below is not None
-    assert 0.8 < margin.below.other < 0.9 < margin.below.same
+    assert 0.8 < margin.below.inside < 0.9 <= margin.below.outside < 0.92
     assert margin.below.certain
     assert margin.above is None
     assert not margin.open_sides
 
 
 @pytest.mark.inner
-@pytest.mark.parametrize("maps", [True, False])
-def test_without_a_map_scarce_work_leaves_one_side_open(maps: bool) -> None:
-    """Runs from many starts fill the registers, so that both sides together take twice as long as one."""
-    work = 3 * 8
+def test_scarce_work_leaves_a_side_open() -> None:
+    left = 40
 
     def hunts(factors: np.ndarray) -> np.ndarray:
-        nonlocal work
-        work -= len(factors)
-        if work < 0:
+        nonlocal left
+        left -= len(factors)
+        if left < 0:
             raise Exhausted
-        return (factors < 0.8) | (factors > 1.25)
+        return (factors < 0.5) | (factors > 2.0)
 
-    assert margin_of(False, hunts, hunts, maps).open_sides == ((-1, 1) if maps else (1,))
+    margin = margin_of(False, hunts, hunts)
+    assert margin.below is not None
+    assert margin.open_sides == (1,) or (margin.above and not margin.above.certain)
 
 
 @pytest.mark.inner
@@ -222,12 +220,19 @@ def test_a_rough_survey_alone_does_not_tell_that_hunting_has_no_end() -> None:
     """On a drawn axis with a leaking integral rough surveys saw hunting up to 3 times the friction; it ends at 2.2."""
     margin = margin_of(True, lambda factors: factors > 0, lambda factors: factors < 2.2)
     assert margin.below is None
-    end = margin.above
-    assert end.same <= 2.2 <= end.other if end else margin.open_sides == (1,)
+    assert margin.above is not None
+    assert margin.above.inside <= 2.2 <= margin.above.outside < 2.3
+
+
+@pytest.mark.inner
+def test_hunting_that_only_a_thorough_search_sees_has_its_end_found() -> None:
+    margin = margin_of(False, lambda factors: factors > 5, lambda factors: factors > 2.2)
+    assert margin.above is not None
+    assert margin.above.outside <= 2.2 <= margin.above.inside
 
 
 def test_a_doubt_of_an_end_is_told_beside_a_side_that_is_open() -> None:
-    margin = ParameterMargin(False, MarginEnd(0.8, 0.7, False), None, (1 / 3, 3.0), open_sides=(1,))
+    margin = ParameterMargin(False, AttractionEnd(0.7, 0.8, False), None, (1 / 3, 3.0), open_sides=(1,))
     sentence = margin_sentence("static friction", margin)
     assert "not certain" in sentence
     assert "not determined" in sentence
@@ -237,7 +242,7 @@ def test_static_friction_is_never_told_below_coulomb_friction() -> None:
     """Its least multiple, rounded down, would be 2 mN below; the numbers that stand beside each other agree."""
     stage = VARIANTS["rigid"].replace({"friction.static": "26.3 N", "friction.coulomb": "11.31 N"})
     lowest = least_static_factor(stage.flat())
-    margin = ParameterMargin(True, MarginEnd(lowest * 1.1, lowest, False), None, (lowest, 3.0))
+    margin = ParameterMargin(True, AttractionEnd(lowest * 1.1, lowest, False), None, (lowest, 3.0))
     (says,) = friction_sentences(FakeCase(stage, None, static_friction=margin))
     assert "11.308" not in says
     assert "11.3" in says
@@ -252,7 +257,7 @@ def test_friction_beyond_the_force_limit_is_told_as_that(force_limit: str | None
     changes = {"controller.force_limit": force_limit, "controller.anti_windup": "clamp"} if force_limit else {}
     changes |= {"bias": {"stage": f"-{weight} N"}} if weight else {}
     stage = VARIANTS["rigid"].replace({"friction.static": "3 N", **changes})
-    margin = ParameterMargin(True, None, MarginEnd(2.7, 3.0, True), (1 / 3, 3.0))
+    margin = ParameterMargin(True, None, AttractionEnd(2.7, 3.0, True), (1 / 3, 3.0))
     says = friction_sentences(FakeCase(stage, None, static_friction=margin))
     assert says[0].startswith("Hunting ends")
     assert any("force limit" in text and "6.70 N" in text for text in says) == held

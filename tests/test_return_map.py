@@ -14,12 +14,15 @@ from hypothesis import strategies as st
 from benchmarks.truth.draws import draw
 from friso.engine.allowance import allowance
 from friso.equations.bandwidth import faster
-from friso.hunting import SEARCH_LIMITS, Ensemble, find_margin, outward, stuck
+from friso.hunting import SEARCH_LIMITS, Ensemble, find_margin, stuck
 from friso.hunting.attractors import attractors
 from friso.hunting.basin import displacements_that_hunt
 from friso.hunting.cycle.hunting import hunting
 from friso.hunting.cycle.rest import spread_over
-from friso.hunting.margin import NOT_SOUGHT, _Grid, search_bandwidths
+from friso.hunting.edge_search import EdgeSearch, _Place
+from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
+from friso.hunting.path import bandwidth_path
+from friso.hunting.path_search import PathSearch
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
@@ -236,7 +239,7 @@ def _everywhere(stages: Ensemble) -> Sketch:
 
 def test_what_seems_to_attract_up_to_the_top_is_proved_there(locked: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     """A sketch that says of all bandwidths that something attracts there moves no edge."""
-    monkeypatch.setattr("friso.hunting.margin.sketched", _everywhere)
+    monkeypatch.setattr("friso.hunting.path_search.sketched", _everywhere)
     sought = search_bandwidths(locked, attracting=True)
     assert not sought.to_the_top
     assert sought.margin is not None
@@ -244,7 +247,7 @@ def test_what_seems_to_attract_up_to_the_top_is_proved_there(locked: Stage, monk
 
 
 def test_a_top_that_no_work_is_left_for_is_undecided(locked: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("friso.hunting.margin.sketched", _everywhere)
+    monkeypatch.setattr("friso.hunting.path_search.sketched", _everywhere)
     survey = attractors(Ensemble.held(locked.flat(), 1), thorough=True)
     with allowance(1e5):
         sought = search_bandwidths(locked, True, survey)
@@ -284,11 +287,11 @@ def test_simulations_that_take_too_much_leave_bandwidths_open_and_no_more() -> N
 def test_a_window_that_is_followed_to_the_stage_itself_contradicts_that_nothing_attracts_it(
     locked: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def followed_home(grid: _Grid, besides: int) -> tuple[()]:
+    def followed_home(grid: PathSearch, besides: int) -> tuple[()]:
         grid.attracts[np.argmin(np.abs(grid.factors - 1))] = True
         return ()
 
-    monkeypatch.setattr(_Grid, "windows", followed_home)
+    monkeypatch.setattr(PathSearch, "windows", followed_home)
     quiet = locked.replace({"controller.crossover": "12 Hz"})
     assert search_bandwidths(quiet, attracting=False).contradicts
 
@@ -300,10 +303,10 @@ def test_what_one_survey_observed_makes_no_edge_certain_unless_a_thorough_one_do
     survey = attractors(Ensemble.held(locked.flat(), 1), thorough=True)
     observed = tuple(replace(motion, cycles=None) for motion in survey.motions)
     seen = survey if attracts else replace(survey, motions=())
-    monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
-    where = outward.EdgeSearch(locked.flat(), 10.0)
-    assert where._surely_attracts(outward._Place(1.0, observed, 1.1)) == attracts
-    assert where._surely_attracts(outward._Place(1.0, survey.motions, 1.1))
+    monkeypatch.setattr("friso.hunting.edge_search.attractors", lambda *_, **__: seen)
+    where = EdgeSearch(bandwidth_path(locked.flat(), True), 10.0)
+    assert where._surely_attracts(_Place(1.0, observed, 1.1)) == attracts
+    assert where._surely_attracts(_Place(1.0, survey.motions, 1.1))
 
 
 def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:
@@ -339,7 +342,7 @@ def test_the_page_says_what_certain_means_with_the_numbers_of_the_code() -> None
     edge, maps = EdgeSettings(), ReturnMapSettings()
     sketched = len(spread_over(*maps.sketched_starts)) + len(spread_over(maps.far_starts)[1::3])
     section = " ".join(page.split("## What *certain* means")[1].split("\n## ")[0].split())
-    beyond = ", ".join(f"{100 * (factor - 1):.3g}" for factor in (edge.beyond_edge_factor, *edge.farther_factors[:-1]))
+    *nearer, farthest = (f"{100 * (factor - 1):.3g}" for factor in edge.beyond_bandwidths)
     steps = [f"{100 * (10 ** (1 / n) - 1):.0f}" for n in (SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond)]
     tolerances = f"{LANDING_RTOL:.0e} and at {ToleranceSettings().check_rtol_factor * LANDING_RTOL:.0e}".replace(
         "e-0", "e-"
@@ -348,7 +351,7 @@ def test_the_page_says_what_certain_means_with_the_numbers_of_the_code() -> None
         f"less than {100 * maps.map_scatter_share:g} %",
         f"from {maps.near_starts[0][0]:g} to {maps.far_starts[1]:g} times",
         f"at most {100 * edge.edge_bracket_share:g} % away",
-        f"{beyond} and {100 * (edge.farther_factors[-1] - 1):.3g} % beyond",
+        f"{', '.join(nearer)} and {farthest} % beyond",
         f"land up to {maps.confirmed_landings} times where the map says, at {tolerances}",
         f"from {SEARCH_LIMITS.lowest_bandwidth:g} to {SEARCH_LIMITS.highest_bandwidth:g} times",
         f"({steps[0]} and {steps[1]} %)",

@@ -279,7 +279,7 @@ def _static_friction(claim: Claim, margin: ParameterMargin, seed: int) -> Iterat
         factor: (attracts, claim.sure and end.certain)
         for end in (margin.below, margin.above)
         if end
-        for factor, attracts in ((end.same, margin.attracts), (end.other, not margin.attracts))
+        for factor, attracts in ((end.inside, True), (end.outside, False))
     }
     ends = {margin.range[side > 0]: (margin.attracts, claim.sure) for side in (-1, 1) if margin.end(side) is None}
     quiet = {margin.range[side > 0] for side in margin.open_sides} | {1.0}

@@ -49,10 +49,9 @@ from friso.hunting.many_stages import (
 )
 from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
-from friso.hunting.outward import AttractionEnd, BandwidthWindow
-from friso.hunting.parameter_margin import MarginEnd, ParameterMargin
+from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
-from friso.hunting.stage_margins import joint_margins
+from friso.hunting.stage_margins import ParameterMargin, joint_margins
 from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement
 from friso.hunting.what_attracts import search_alone
@@ -88,7 +87,6 @@ __all__ = [
     "LoopState",
     "LowerGains",
     "Margin",
-    "MarginEnd",
     "Meeting",
     "Motions",
     "MoveShare",

@@ -27,11 +27,10 @@ from friso.hunting.many_stages import kernels_to_judge
 from friso.hunting.margin import unstable_bandwidths
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
-from friso.hunting.outward import BandwidthWindow
-from friso.hunting.parameter_margin import ParameterMargin
+from friso.hunting.path import BandwidthWindow
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import ToleranceSettings, check_settings
-from friso.hunting.stage_margins import friction_margin, keeps_friction_margin
+from friso.hunting.stage_margins import ParameterMargin, friction_margin, keeps_friction_margin
 from friso.hunting.tracking import Dwell, Tracking, dwells, tracking
 from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent

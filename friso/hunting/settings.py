@@ -126,12 +126,14 @@ class EdgeSettings(Settings):
     chattering_edge_step: float = setting(2e-3, "log of bandwidth")
     """Step in bandwidth with a chattering limiter. Shorter steps follow the roughness of multipliers."""
 
-    beyond_edge_factor: float = setting(1.0095, "")
-    """First factor beyond an edge at which no attractor may exist. It makes the edge accurate to one per cent."""
+    beyond_bandwidths: tuple[float, ...] = setting((1.0095, 1.03, 1.06), "")
+    """Factors beyond the end of an orbit in bandwidth at which other attractors are looked for. The first makes the
+    edge accurate to one per cent. Most windows to which no orbit leads lie at the others, and they are narrower than
+    the steps of a search through all bandwidths."""
 
-    farther_factors: tuple[float, ...] = setting((1.03, 1.06), "")
-    """Factors beyond the end of an orbit at which attractors are looked for again. Most windows to which no orbit leads
-    lie there, and they are narrower than the steps of a search through all bandwidths."""
+    beyond_factors: tuple[float, ...] = setting((1.03, 1.06), "")
+    """Factors beyond the end of an orbit in another parameter, which is shown with fewer digits. Nearer, motions take
+    long to decay."""
 
     followed_starts: tuple[float, ...] = setting(
         (0.92, 0.96, 0.98, 0.99, 0.995, 0.9975, 1.0, 1.0025, 1.005, 1.01, 1.02, 1.04, 1.08), "of the sticking distance"
@@ -167,22 +169,15 @@ class EdgeSettings(Settings):
     """Values tried first on either side of the stage's own. They lie closest together near it, and are as many as most
     processors run at once."""
 
-    thorough_margin_steps: tuple[int, ...] = setting((2, 4, -1), "")
+    thorough_margin_steps: tuple[int, ...] = setting((1, 3, -1), "")
     """Numbers of the values, counted outward, that are searched thoroughly if a rough survey finds no change: 9 and
     23 % off for a farthest factor of three, and the farthest, at which a rough survey once saw hunting that was not."""
 
-    proved_distances: tuple[float, float] = setting((0.02, 0.06), "log of factor")
-    """Distances from the change at which thorough searches are made, on the hunting side and on the other. Nearer,
-    motions take too long to decay."""
-
-    same_factor_log: float = setting(1e-6, "log of factor")
-    """Difference below which two factors are equal."""
-
-    widest_factor_step: float = setting(0.03, "log of factor")
-    """Widest step between factors at the end of a margin, which is shown with three digits at most."""
+    least_side_log: float = setting(0.03, "log of factor")
+    """Narrowest side of a parameter's own value that is searched: margins are shown with three digits at most."""
 
     most_proofs: int = setting(6, "")
-    """Thorough searches after which a side stays open because the rough survey was wrong."""
+    """Rounds of searches after which a side stays open because rough surveys were wrong."""
 
     joint_margin_work: float = setting(2e8, "")
     """Work for the margins of a joint, which only --details needs: a quarter of a check's time."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
@@ -9,7 +11,8 @@ from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
-from friso.hunting.parameter_margin import ParameterMargin, Scaled, parameter_margin
+from friso.hunting.path import AttractionEnd, Path, key_path, static_friction_path
+from friso.hunting.path_search import PathSearch, Undecided
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import edge_settings
 from friso.hunting.verdict import Judgement
@@ -18,6 +21,48 @@ from friso.stage import Stage
 
 JOINT_KEYS = "joint.stroke", "joint.stiffness"
 """Keys of a joint's design on which hunting depends."""
+
+
+@dataclass(frozen=True)
+class ParameterMargin:
+    """Range of a parameter over which a stage keeps hunting, or keeps not hunting.
+
+    `attracts` is true if it hunts. `below` and `above` are the nearest ends of attraction, in factors of the parameter
+    (None: there is none up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known. Nothing of it
+    is certain unless the values of the stage are `sure`.
+    """
+
+    attracts: bool
+    below: AttractionEnd | None
+    above: AttractionEnd | None
+    range: tuple[float, float]
+    open_sides: tuple[int, ...] = ()
+    sure: bool = True
+
+    @property
+    def certain(self) -> bool:
+        """Tell whether no side is open, the stage is sure, and both ends, if there are any, are certain.
+
+        Between the tried values, hunting may still begin and end unnoticed.
+        """
+        return self.sure and not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
+
+    def uncertain(self) -> ParameterMargin:
+        """Return the margin with its ends marked as not certain, of a stage that is not sure."""
+        below, above = (end and replace(end, certain=False) for end in (self.below, self.above))
+        return replace(self, below=below, above=above, sure=False)
+
+    def end(self, side: int) -> AttractionEnd | None:
+        """Return the end below (`side` -1) or above (1) the stage's own value; None without one."""
+        return self.below if side < 0 else self.above
+
+    def same(self, end: AttractionEnd) -> float:
+        """Return the factor at an end up to which the stage hunts, or does not, as at its own value."""
+        return end.inside if self.attracts else end.outside
+
+    def other(self, end: AttractionEnd) -> float:
+        """Return the factor at an end at which the stage does the opposite."""
+        return end.outside if self.attracts else end.inside
 
 
 def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | None:
@@ -30,8 +75,7 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
     flat = stage.flat()
     if not static_frictions(flat) or not _is_known(judgement):
         return None
-    lowest = max(least_static_factor(flat), 1 / SEARCH_LIMITS.most_friction)
-    return _margin(lambda factors: with_static_friction(flat, factors), judgement, lowest)
+    return _margin(static_friction_path(flat), judgement)
 
 
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
@@ -43,13 +87,8 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
         return {}
-
-    def scaled(key: str) -> Scaled:
-        return lambda factors: {**flat, key: flat[key] * factors}
-
-    keys = [key for key in JOINT_KEYS if flat.get(key)]
     with allowance(edge_settings.joint_margin_work):
-        return {key: _margin(scaled(key), judgement, 1 / SEARCH_LIMITS.most_friction) for key in keys}
+        return {key: _margin(key_path(flat, key), judgement) for key in JOINT_KEYS if flat.get(key)}
 
 
 def _is_known(judgement: Judgement) -> bool:
@@ -60,12 +99,26 @@ def _is_known(judgement: Judgement) -> bool:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMargin:
-    """Find what change of a parameter starts or ends hunting of a stage with a certain verdict.
+def _margin(path: Path, judgement: Judgement) -> ParameterMargin:
+    """Find the nearest ends of attraction on a path through a stage whose attractors are known.
 
-    `scaled` makes the stages, and `lowest` is the smallest factor of the parameter.
+    A side is open if an allowance of work is used up, or the search does not decide.
     """
-    return parameter_margin(scaled, judgement.hunting.target is not None, lowest, SEARCH_LIMITS.most_friction)
+    survey, factors = judgement.hunting.surveyed, path.factors
+    assert survey is not None
+    attracts, span = bool(survey.attracts[0]), (float(factors[0]), float(factors[-1]))
+    ends, open_sides = dict[int, AttractionEnd | None](), list[int]()
+    try:
+        search = PathSearch(path)
+    except Exhausted:
+        return ParameterMargin(attracts, None, None, span, (-1, 1))
+    search.record(survey)
+    for side in (-1, 1):
+        try:
+            ends[side] = search.nearest(side)
+        except (Exhausted, Undecided):
+            open_sides.append(side)
+    return ParameterMargin(attracts, ends.get(-1), ends.get(1), span, tuple(open_sides))
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:

@@ -37,7 +37,7 @@ from friso.hunting.loop import leaves_for_good, may_run_away
 from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
-from friso.hunting.outward import AttractionEnd, BandwidthWindow
+from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import basin_settings, check_settings
 from friso.hunting.what_attracts import resolved_map

@@ -150,26 +150,12 @@ class Tracer:
         if states is not None or near.jacobians is None:
             begin = begin * np.exp(targets[:, 1:2] - near.distance) if states is None else states
             times, places = times * np.exp(targets[:, 2] - near.time), targets[:, 0]
-        return self._closed(begin, times, places, targets, normal, near.jacobians)
-
-    def _closed(
-        self,
-        states: np.ndarray,
-        times: np.ndarray,
-        places: np.ndarray,
-        targets: np.ndarray,
-        normal: np.ndarray,
-        jacobians: np.ndarray | None = None,
-    ) -> list[Point | None]:
-        """Close a cycle on each of several parallel planes; None where none is found.
-
-        The planes pass through `targets`, (planes, 3), with the `normal`, (3,). The search starts from `states`
-        (planes, states), `times` [s] and `places`, (planes,), with `jacobians` of cycles near them if known.
-        """
-
+        reach = continuation_settings.farthest_move * float(np.abs(targets - near.vector).max())
         border = Border(np.broadcast_to(normal, targets.shape), targets @ normal)
         return self._points(
-            close_along(self._on_line, states, times, places, border, self.sign, self.rtol, self.swings, jacobians)
+            close_along(
+                self._on_line, begin, times, places, border, self.sign, self.rtol, self.swings, near.jacobians, reach
+            )
         )
 
     def _on_line(self, _: np.ndarray, places: np.ndarray) -> Ensemble:

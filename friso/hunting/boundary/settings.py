@@ -20,6 +20,9 @@ class ContinuationSettings(Settings):
     shortest_branch_step: float = setting(1e-6, "")
     """Shortest step along a branch, below which its cycle cannot be closed and the branch ends."""
 
+    farthest_move: float = setting(3.0, "steps")
+    """Distance from a cycle beyond which the search for its neighbour is given up: it leads to another branch."""
+
     most_branch_steps: int = setting(300, "")
     """Most steps along a branch, each of which is an orbit. A branch with more winds without end."""
 

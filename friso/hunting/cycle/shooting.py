@@ -145,6 +145,7 @@ def close_along(
     rtol: float,
     swings: int | None = None,
     jacobians: np.ndarray | None = None,
+    reach: float = np.inf,
 ) -> Followed:
     """Close orbits while their stages move along lines of keys, until each is on its border.
 
@@ -152,10 +153,11 @@ def close_along(
     folds, where no orbit exists at a place beyond. With `jacobians` of closed orbits at or near the start, the first
     step to the border needs no run. The Jacobians may belong to another line through the keys: further steps learn the
     derivative along this line. `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one, and `swings`
-    counts swings in that time. Runs have the relative tolerance `rtol`.
+    counts swings in that time. An orbit whose place moves farther than `reach` is given up. Runs have the relative
+    tolerance `rtol`.
     """
     following = _Following(family, states, times, sign, rtol, places)
-    following.border = border
+    following.border, following.reach = border, reach
     if jacobians is not None:
         following.begin_with(jacobians)
     orbits = _iterated(following).orbits
@@ -310,9 +312,11 @@ class _Following(_Shooting):
     """
 
     border: Border
+    reach = np.inf
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
+        self.begun = self.places.copy()
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
@@ -351,6 +355,7 @@ class _Following(_Shooting):
                 self.inverses[k] = inverse + np.outer(step - closer, row) / change
                 self.jacobians[k] = _inverse(self.inverses[k])
         step = super()._step(k, residual, sticking, scales)
+        self.active[k] &= abs(self.places[k] - self.begun[k]) <= self.reach
         self.latest[k] = step, residual
         return step
 

@@ -73,7 +73,7 @@ def likely_format(cells: Iterable[str]) -> NumberFormat:
 def number_texts(cells: Any) -> Any:
     """Return cells as texts in which signs that look alike are one; "" where there is none."""
     texts = cells.astype(str).str.strip().fillna("")
-    odd = ~texts.str.isascii() | texts.str.contains(" ", regex=False)
+    odd = ~texts.map(str.isascii).astype(bool) | texts.str.contains(" ", regex=False)
     return texts.where(~odd, texts.str.translate(_ALIKE)) if odd.any() else texts
 
 

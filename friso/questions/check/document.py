@@ -133,14 +133,14 @@ def _windows(windows: Iterable[hunting.BandwidthWindow]) -> list[dict[str, Any]]
 
 def _margin(edge: hunting.Margin) -> dict[str, Any]:
     """Return how far the bandwidth is from the edge of hunting, for the document."""
-    return {**entries(edge, "factor", "crossover_hz", "certain", "reserve"), "settles_at_factor": edge.quiet}
+    return {**entries(edge, "factor", "crossover_hz", "certain", "reserve", "kind"), "settles_at_factor": edge.quiet}
 
 
 def _end(end: hunting.AttractionEnd | None) -> dict[str, Any] | None:
     """Return one end of the bandwidths at which hunting attracts; None if there is no end."""
     if end is None:
         return None
-    return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve")}
+    return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve", "kind")}
 
 
 def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:
@@ -149,9 +149,10 @@ def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:
     Each end has the last multiple with an unchanged verdict and the next multiple with another verdict.
     """
 
-    def end(one: hunting.MarginEnd | None) -> dict[str, Any] | None:
+    def end(one: hunting.AttractionEnd | None) -> dict[str, Any] | None:
         """Return one end of a margin; None if hunting does not change on that side."""
-        return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}
+        factors = one and {"same_at_factor": margin.same(one), "other_at_factor": margin.other(one)}
+        return one and {**factors, **entries(one, "certain", "kind")}
 
     return {
         "hunts": margin.attracts,

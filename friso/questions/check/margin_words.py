@@ -8,7 +8,7 @@ from typing import Any
 from friso.equations.breakaway import breakaway
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.equations.structure import carrying_force
-from friso.hunting import SEARCH_LIMITS, Case, MarginEnd, ParameterMargin
+from friso.hunting import SEARCH_LIMITS, AttractionEnd, Case, ParameterMargin
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
     digits_that_differ,
@@ -43,7 +43,7 @@ def _too_strong(case: Case, margin: ParameterMargin) -> list[str]:
     if not (margin.attracts and end and FORCE_LIMIT in flat):
         return []
     left = flat[FORCE_LIMIT] - abs(float(carrying_force(flat)))  # of the limit, beside the constant forces
-    if breakaway(with_static_friction(flat, end.other)) <= left:
+    if breakaway(with_static_friction(flat, end.outside)) <= left:
         return []
     held = f"Static friction above {with_unit(left, 'N')} holds the stage where it sticks"
     return [f"{held}, because the force limit cannot break it away."]
@@ -105,7 +105,7 @@ def thin_margins(case: Case) -> list[str]:
         thin.append(f"a bandwidth that is lower by {percent(1 - edge.factor)}")
     for side in (-1, 1):
         end = friction.end(side) if friction and not friction.attracts else None
-        if end and max(end.same, 1 / end.same) < distance:
+        if end and max(end.outside, 1 / end.outside) < distance:
             thin.append(f"static friction {_way(end)}")
     return thin
 
@@ -115,7 +115,7 @@ def _side(side: int) -> str:
     return "below" if side < 0 else "above"
 
 
-def _way(end: MarginEnd) -> str:
+def _way(end: AttractionEnd) -> str:
     """Say between which multiples of a parameter hunting begins or ends.
 
     One of them is 1 if it is not known how little change is enough.
@@ -124,9 +124,9 @@ def _way(end: MarginEnd) -> str:
     return f"between {plain_factor(low)} and {plain_factor(high)} times yours"
 
 
-def _factors(end: MarginEnd) -> tuple[float, float]:
+def _factors(end: AttractionEnd) -> tuple[float, float]:
     """Return the multiples of a parameter between which hunting begins or ends, rounded as they are told."""
-    low, high = sorted((end.same, end.other))
+    low, high = sorted((end.inside, end.outside))
     return rounded_down(low), rounded_up(high)
 
 

@@ -1,119 +1,60 @@
-"""Find the edge of hunting in bandwidth: the factor beyond which the stage has no attractor.
+"""Find an edge of hunting along a path: the factor of a parameter beyond which the stage has no attractor.
 
-A closed orbit is followed through the bandwidth to its end: a flip, a fold, a torus, or the loss of the orbit. If
-another attractor exists just beyond, its orbit is followed in turn, until there is none. Where no orbit can be
-followed, surveys narrow down the edge between the last bandwidth with an attractor and the first one without.
+A closed orbit is followed to its end: a flip, a fold, a torus, or the loss of the orbit. If another attractor exists
+just beyond, its orbit is followed in turn, until there is none. Where no orbit can be followed, surveys narrow down the
+edge between the last factor with an attractor and the first one without.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from friso.engine.allowance import Exhausted
-from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, described, kept
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.cycle.shooting import close
+from friso.hunting.path import AttractionEnd, EndKind, Path
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
 
-@dataclass(frozen=True)
-class AttractionEnd:
-    """Where attraction ends, between two factors of the bandwidth.
-
-    The stage has an attractor at `inside` and none at `outside`. The end is `certain` under four conditions: an orbit
-    was followed to its end or its loss at `inside`, or an attractor was seen there; no attractor exists at `outside`;
-    all runs decided; and both factors are close together. `reserve` is the relative error.
-    """
-
-    inside: float
-    outside: float
-    certain: bool
-
-    @property
-    def reserve(self) -> float:
-        """Return the relative error of the end: by what fraction both factors differ."""
-        return abs(self.outside / self.inside - 1)
-
-
-@dataclass(frozen=True)
-class BandwidthWindow:
-    """A window of bandwidths in which a stage hunts, or its loop is unstable, by its ends `low` and `high`.
-
-    The ends are in factors of the stage's own bandwidth (None: the window reaches the end of the search).
-    """
-
-    low: AttractionEnd | None
-    high: AttractionEnd | None
-
-    def holds(self, factor: float) -> bool:
-        """Tell whether a factor of the stage's own bandwidth lies in this window."""
-        low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
-        return low <= factor <= high
-
-    def without(self, other: BandwidthWindow) -> tuple[BandwidthWindow, ...]:
-        """Return the parts of this window below and above another one; where both overlap, the other counts.
-
-        A part that is narrower than the error of an end is left out.
-        """
-        if (other.high and not self._reaches(other.high, -1)) or (other.low and not self._reaches(other.low, 1)):
-            return (self,)
-        parts = []
-        if other.low and self._reaches(other.low, -1):
-            parts.append(
-                BandwidthWindow(self.low, replace(other.low, inside=other.low.outside, outside=other.low.inside))
-            )
-        if other.high and self._reaches(other.high, 1):
-            parts.append(
-                BandwidthWindow(replace(other.high, inside=other.high.outside, outside=other.high.inside), self.high)
-            )
-        return tuple(parts)
-
-    def _reaches(self, place: AttractionEnd, side: int) -> bool:
-        """Tell whether part of this window surely lies above (`side` 1) or below (-1) the end of another one."""
-        end = self.high if side > 0 else self.low
-        return end is None or side * (end.inside / place.inside - 1) > end.reserve + place.reserve
-
-
 @dataclass
 class _Place:
-    """Progress of a search: the bandwidth with `motions` that it has come to, and one without.
+    """Progress of a search: the factor `at` that it has come to, with attractors `motions`, and one without.
 
-    `at` and `outside` are these bandwidths, as factors of the stage's own. At `outside` there seems to be no attractor.
+    At `outside` there seems to be no attractor. `kind` says how the orbit that was followed last has ended.
     """
 
     at: float
     motions: tuple[Swinging, ...]
     outside: float
+    kind: EndKind = "seen"
 
 
 class Beyond(Exception):
-    """An attractor was followed to the end of the range of bandwidths."""
+    """An attractor was followed to the end of the path."""
 
 
 @dataclass(frozen=True)
 class EdgeSearch:
-    """Search for an edge of hunting, towards the `farthest` factor of the bandwidth.
+    """Search for an edge of hunting along a path, towards the `farthest` factor.
 
-    `flat` has the stage's keys in SI. At the factor `settled`, if given, it does not hunt: an attractor beyond belongs
-    to another window.
+    At the factor `settled`, if given, the stage does not hunt: an attractor beyond belongs to another window.
     """
 
-    flat: Mapping[str, Any]
+    path: Path
     farthest: float
     settled: float | None = None
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
-        """Find where attraction ends between two factors of the bandwidth, `at` and `outside`.
+        """Find where attraction ends between two factors, `at` and `outside`.
 
         At the first factor the stage has the attractors `motions`. Raises Beyond if an attractor exists up to the end
         of the search. If an allowance of work is used up, the end is as close as it was by then, and not certain;
@@ -123,10 +64,10 @@ class EdgeSearch:
         try:
             return self._followed_to_the_end(place)
         except Exhausted:
-            return AttractionEnd(place.at, place.outside, False)
+            return AttractionEnd(place.at, place.outside, False, place.kind)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
-        """Follow orbits from a bandwidth to the edge of hunting, updating `place` on the way.
+        """Follow orbits to the edge of hunting, updating `place` on the way.
 
         Raises Beyond if an attractor exists up to the end of the search.
         """
@@ -134,7 +75,7 @@ class EdgeSearch:
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 return self._bracketed(place)
-            end, last = self.followed(place.at, orbit)
+            end, last, place.kind = self.followed(place.at, orbit)
             distances = _followed_from([_orbit_distance(last, orbit)])
             place.at = end
             next_to, farther = self._just_beyond(end)
@@ -144,7 +85,7 @@ class EdgeSearch:
                 if again := self._stable_again(end, next_to, last):
                     place.at, place.motions, place.outside = next_to, again, self._still_ahead(next_to, place.outside)
                     continue
-                return AttractionEnd(end, next_to, bool(survey.decided.all()))
+                return AttractionEnd(end, next_to, bool(survey.decided.all()), place.kind)
             place.at, place.motions = float(beyond[attracts[-1]]), survey.take(attracts[-1:]).motions
             place.outside = self._still_ahead(place.at, place.outside)
         return self._bracketed(place)
@@ -155,8 +96,8 @@ class EdgeSearch:
         Returns the searched factors and their attractors. Without a return map, factors farther off are searched only
         if a simulation shows an attractor. Runs start from `distances` [m], too.
         """
-        if farther.size and not has_a_map(self._stages(farther)):
-            seen = attractors(self._stages(farther), cycles=False)
+        if farther.size and not has_a_map(self.path.stages(farther)):
+            seen = attractors(self.path.stages(farther), cycles=False)
             decided, farther = bool(seen.decided[~seen.attracts].all()), farther[seen.attracts]
         else:
             decided = True
@@ -172,8 +113,8 @@ class EdgeSearch:
         """
         ahead = self._ahead(end)
         next_to, farther = (
-            end * edge_settings.beyond_edge_factor**ahead,
-            end * np.array(edge_settings.farther_factors) ** ahead,
+            end * self.path.beyond[0] ** ahead,
+            end * np.array(self.path.beyond[1:]) ** ahead,
         )
         if self.settled is not None and ahead * (self.settled - end) > 0:
             next_to = _nearer(ahead, next_to, self.settled)
@@ -190,7 +131,7 @@ class EdgeSearch:
         Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
         them until they are close together. Raises Beyond if an attractor exists up to the end of the search.
         """
-        reach, ahead = edge_settings.reach_log, self._ahead(place.at)
+        reach, ahead, place.kind = edge_settings.reach_log, self._ahead(place.at), "seen"
         place.outside = _nearer(ahead, place.outside, self.farthest)
         while True:
             factors = np.geomspace(place.at, place.outside, edge_settings.bracket_steps + 2)[1:]
@@ -215,17 +156,18 @@ class EdgeSearch:
         if any(motion.cycles is not None for motion in place.motions):
             return True
         distances = _followed_from([motion.distance for motion in place.motions])
-        survey = attractors(self._stages(np.array([place.at])), thorough=True, distances=distances[None])
+        survey = attractors(self.path.stages(np.array([place.at])), thorough=True, distances=distances[None])
         return bool(survey.attracts[0] and survey.decided[0])
 
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
-        """Find the attractors at some factors of the bandwidth.
+        """Find the attractors at some factors.
 
         Where return maps do not decide, runs also start from `distances` [m], shape (n,). At the factors numbered
         `confirm`, runs check the maps.
         """
-        begun = np.broadcast_to(distances, (len(factors), len(distances)))
-        return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
+        begun, stages = np.broadcast_to(distances, (len(factors), len(distances))), self.path.stages(factors)
+        survey = what_attracts(stages, distances=begun, confirm=confirm)
+        return replace(survey, decided=survey.decided & (survey.attracts | surely_surveyed(stages, survey)))
 
     def _stable_again(self, end: float, beyond: float, last: Point) -> tuple[Swinging, ...]:
         """Follow an orbit past its `end` to a factor `beyond`; return it as a motion if it is stable there again.
@@ -233,24 +175,20 @@ class EdgeSearch:
         `last` is the orbit at its end. After a flip an orbit may repel for a narrow range only, and then attract from a
         basin narrower than the steps of a return map.
         """
-        at, stages = last.cycle.orbits, self._stages(np.array([beyond]))
+        at, stages = last.cycle.orbits, self.path.stages(np.array([beyond]))
         if stages.chatters:
             return ()
         states, times = at.states, at.times
         for factor in np.geomspace(end, beyond, edge_settings.past_end_steps + 1)[1:]:
-            there = self._stages(np.array([factor]))
+            there = self.path.stages(np.array([factor]))
             before, at = at, close(there, states, times, at.sign, CYCLE_RTOL, at.swings)
             if not (at.closed & kept(there, at, before.states[:, stages.sticking]))[0]:
                 return ()
             states, times = 2 * at.states - before.states, 2 * at.times - before.times
         return tuple(of_cycles(np.zeros(1, np.int64), described(stages, at, CYCLE_RTOL), stages.sticking))
 
-    def _stages(self, factors: np.ndarray) -> Ensemble:
-        """Return the stage with its bandwidth multiplied by factors."""
-        return Ensemble.held(faster(self.flat, factors), len(factors))
-
     def _ahead(self, at: float) -> float:
-        """Return the direction of the search from the bandwidth factor `at`: 1 up, -1 down."""
+        """Return the direction of the search from the factor `at`: 1 up, -1 down."""
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:
@@ -259,20 +197,21 @@ class EdgeSearch:
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * edge_settings.reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-    def followed(self, at: float, orbit: Swinging) -> tuple[float, Point]:
+    def followed(self, at: float, orbit: Swinging) -> tuple[float, Point, EndKind]:
         """Follow a closed orbit from a factor to the last factor at which it is stable.
 
-        Returns this factor and the orbit there. Raises Beyond if the orbit is stable up to the end of the search.
+        Returns this factor, the orbit there, and how its stability ends. Raises Beyond if the orbit is stable up to the
+        end of the search.
         """
         ahead, cycles = self._ahead(at), orbit.cycles
         assert cycles is not None
 
         def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-            """Return the stages at places: logarithms of the bandwidth over that at the start."""
-            return self._stages(at * np.exp(ahead * places))
+            """Return the stages at places: logarithms of the factor over that at the start."""
+            return self.path.stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))
-        chatters = Ensemble.held(self.flat, 1).chatters
+        chatters = self.path.stages(np.ones(1)).chatters
         shortest, flip = (
             (edge_settings.chattering_edge_step, edge_settings.chattering_edge_step)
             if chatters
@@ -305,9 +244,10 @@ class EdgeSearch:
                 tracer, first, second, kind, max(flip, edge_settings.fold_search_step) if kind == "fold" else flip
             )
             farthest = max(farthest, last or first, key=lambda point: point.place)
-        elif tracer.reaches(points, reason):
+            return float(at * np.exp(ahead * farthest.place)), farthest, kind
+        if tracer.reaches(points, reason):
             raise Beyond
-        return float(at * np.exp(ahead * farthest.place)), farthest
+        return float(at * np.exp(ahead * farthest.place)), farthest, "lost"
 
 
 def _orbit_distance(point: Point, orbit: Swinging) -> float:

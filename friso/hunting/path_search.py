@@ -1,0 +1,282 @@
+"""Search a path for hunting: a grid of factors is surveyed, and attraction followed from there to its ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friso.engine.allowance import Exhausted, allowance
+from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.attractors.survey import Swinging
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting.edge_search import Beyond, EdgeSearch
+from friso.hunting.path import AttractionEnd, BandwidthWindow, Path
+from friso.hunting.settings import edge_settings
+from friso.hunting.what_attracts import sketched, what_attracts
+
+
+class Undecided(Exception):
+    """Error: the search could not decide whether hunting begins or ends on a side."""
+
+
+class PathSearch:
+    """Search for hunting along a path: what attracts the stage at each of its factors.
+
+    The factors numbered `lowest` and higher were searched.
+    """
+
+    def __init__(self, path: Path, first: int = 0) -> None:
+        """Survey the stage at the factors numbered `first` and higher.
+
+        Raises Exhausted if an allowance of work is used up.
+        """
+        self.path, self.factors, self.lowest = path, path.factors, first
+        factors = path.factors
+        self.attracts, self.decided, self.passed = (np.zeros(len(factors), bool) for _ in range(3))
+        self.motions: list[list[Swinging]] = [[] for _ in factors]
+        self.ends: dict[tuple[int, int], AttractionEnd] = {}
+        self.inspected: set[int] = set()
+        self.settled: float | None = None
+        self._survey(np.arange(first, len(factors)))
+
+    def search_below(self) -> None:
+        """Survey the lower factors, whose motions are slowest, until the work is used up."""
+        try:
+            self._survey(np.arange(self.lowest))
+        except Exhausted:
+            return
+        self.lowest = 0
+
+    def _survey(self, numbers: np.ndarray) -> None:
+        """Sketch the stages at factors given by number; simulate those that the sketch leaves open.
+
+        Factors nearest to 1 come first, until a fraction of the work is used up. Raises Exhausted if the allowance
+        around the whole search is used up.
+        """
+        sketch = sketched(self._stages(numbers))
+        self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
+        left = numbers[~sketch.decided]
+        left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
+        at_once, work = (
+            (edge_settings.bandwidths_at_once, edge_settings.simulated_work)
+            if sketch.decided.any()
+            else (len(left), np.inf)
+        )
+        with allowance(work) as simulated:
+            try:
+                for first in range(0, len(left), at_once):
+                    some = left[first : first + at_once]
+                    survey = attractors(self._stages(some), cycles=False)
+                    self.attracts[some], self.decided[some] = survey.attracts, survey.decided
+            except Exhausted:
+                # the allowance around this search has less left
+                if simulated.left < work - simulated.used or np.isinf(work):
+                    raise
+
+    def _stages(self, numbers: np.ndarray) -> Ensemble:
+        """Return the stages at some of the factors, by number."""
+        return self.path.stages(self.factors[numbers])
+
+    def record(self, survey: Attractors) -> None:
+        """Record a thorough survey of the stage itself."""
+        index = self.path.own
+        self.attracts[index], self.decided[index] = survey.attracts[0], survey.decided[0]
+        self.motions[index] = list(survey.motions)
+        self.inspected.add(index)
+        if self.decided[index] and not self.attracts[index]:
+            self.settled = float(self.factors[index])
+
+    def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
+        """Find the last factor at which the stage hunts while it does not at the next one.
+
+        Factors from number `index` upwards count if `above`, otherwise those below it. Returns the number, the end of
+        attraction, and whether it is certain; None if there is no such factor.
+        """
+        while True:
+            falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
+            falls = falls[falls >= index] if above else falls[falls < index]
+            if not falls.size:
+                if above and self.attracts[-1] and not self._proved_at_the_top():
+                    continue
+                return None
+            at = int(falls[-1])
+            end = self.end(at, 1)
+            if end is None:
+                continue
+            quiet = np.flatnonzero(self.factors > end.inside)
+            hunts = quiet[self.attracts[quiet]]
+            upper = quiet[quiet < hunts[0]] if hunts.size else quiet
+            return at, end, bool(end.certain and self.decided[upper].all())
+
+    def nearest(self, side: int) -> AttractionEnd | None:
+        """Find where hunting first ends, or begins, above (`side` 1) or below (-1) the stage itself.
+
+        Returns None if it does so nowhere. Raises Undecided if surveys leave that open, and Exhausted if an allowance
+        of work is used up.
+        """
+        numbers, hunts = self.path.numbers(side), self.attracts[self.path.own]
+        if not numbers.size:
+            return None
+        end = self.end(self.path.own, side) if hunts else self._beginning(numbers, side)
+        if self.attracts[self.path.own] != hunts:
+            raise Undecided
+        if end is None and self.decided[numbers].all():
+            return None
+        if end is None:
+            raise Undecided
+        before = numbers[side * np.log(self.factors[numbers] / end.outside) <= 0]
+        return replace(end, certain=end.certain and bool(self.decided[before].all()))
+
+    def _beginning(self, numbers: np.ndarray, side: int) -> AttractionEnd | None:
+        """Find where hunting begins on a side; `numbers` are those of its factors, outward.
+
+        Where a rough survey finds nothing, some factors are searched thoroughly. Raises Undecided if rough surveys are
+        wrong again and again.
+        """
+        for _ in range(edge_settings.most_proofs):
+            hunts = numbers[self.attracts[numbers]]
+            if hunts.size:
+                if end := self.end(int(hunts[0]), -side):
+                    return end
+                continue
+            left = np.setdiff1d(numbers[[*edge_settings.thorough_margin_steps]], [*self.inspected])
+            if not left.size:
+                return None
+            self._inspect(left)
+        raise Undecided
+
+    def _proved_at_the_top(self) -> bool:
+        """Tell whether the stage hunts at the highest factor.
+
+        The result is true as well if the allowance is used up before that is decided.
+        """
+        try:
+            return self.proved(len(self.factors) - 1, 1)
+        except Exhausted:
+            self.decided[-1] = False
+            return True
+
+    def end(self, at: int, ahead: int) -> AttractionEnd | None:
+        """Find where attraction ends between the factor numbered `at` and a neighbour.
+
+        The neighbour is the next factor above (`ahead` 1) or below (-1). Returns None if attraction reaches the end of
+        the search, which is then recorded for all factors up to there. Returns None as well if closer inspection shows
+        no attractor at `at`. If the allowance is used up, the end is not certain.
+        """
+        if (at, ahead) in self.ends:
+            return self.ends[at, ahead]
+        try:
+            return self._followed(at, ahead)
+        except Exhausted:
+            end = AttractionEnd(float(self.factors[at]), float(self.factors[at + ahead]), False)
+            return self.ends.setdefault((at, ahead), end)
+
+    def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
+        """Follow attraction from the factor numbered `at` to its end.
+
+        Attraction is followed up (`ahead` 1) or down (-1). Returns None if it reaches the end of the search, or if
+        closer inspection shows no attractor. Raises Exhausted if an allowance of work is used up.
+        """
+        if not self.proved(at, ahead):
+            return None
+        outward = EdgeSearch(self.path, float(self.factors[-1 if ahead > 0 else 0]), self.settled)
+        beyond = self.factors[at + ahead :: ahead] if at + ahead >= 0 else np.empty(0)
+        quiet = beyond[~self.attracts[at + ahead :: ahead]]
+        try:
+            end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float([*quiet, beyond[-1]][0]))
+        except Beyond:
+            self._pass(ahead * (np.arange(len(self.factors)) - at) > 0)
+            return None
+        beyond = ahead * np.log(self.factors / end.inside)
+        self._pass((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
+        if ahead * (end.outside - end.inside) <= 0:  # the search was given up past `outside`
+            settled = np.flatnonzero((beyond > 0) & ~self.attracts)[::ahead]
+            if not settled.size:
+                self._pass(beyond > 0)
+                self.decided[beyond > 0] = False
+                return None
+            end = AttractionEnd(end.inside, float(self.factors[settled[0]]), False)
+        attracted = np.flatnonzero((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
+        # within its error the end may lie before the first factor
+        last = int(attracted[-1 if ahead > 0 else 0]) if attracted.size else at
+        self.ends[at, ahead] = self.ends[last, ahead] = end
+        return end
+
+    def _pass(self, where: np.ndarray) -> None:
+        """Record that the stage hunts at the factors past which a stable orbit was followed.
+
+        `where`, shape (count,), is true for these factors.
+        """
+        self.passed |= where
+        self.attracts |= where
+        self.decided |= where
+        self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
+
+    def proved(self, at: int, ahead: int) -> bool:
+        """Tell whether the stage hunts at the factor numbered `at`, after closing orbits.
+
+        If it does not, neighbouring factors that seemed to have an attractor are inspected too: those below if `ahead`
+        is 1, above if it is -1.
+        """
+        if at not in self.inspected:
+            self._inspect(np.array([at]))
+            if not self.attracts[at]:
+                behind = np.arange(at - ahead, -1 if ahead > 0 else len(self.factors), -ahead)
+                end = np.flatnonzero(~self.attracts[behind])
+                some = [k for k in behind[: end[0] if end.size else None].tolist() if k not in self.inspected]
+                if some:
+                    self._inspect(np.array(some[: edge_settings.bandwidths_at_once]))
+        return bool(self.attracts[at])
+
+    def _inspect(self, numbers: np.ndarray) -> None:
+        """Close orbits at the factors with these numbers, and record what attracts the stage there."""
+        stages = self._stages(numbers)
+        survey = what_attracts(stages)
+        self.attracts[numbers] = survey.attracts | self.passed[numbers]
+        self.decided[numbers] = survey.decided & (survey.attracts | surely_surveyed(stages, survey))
+        for k, number in enumerate(numbers.tolist()):
+            self.motions[number] = list(survey.take(np.array([k])).motions)
+        self.inspected |= set(numbers.tolist())
+
+    def lower_end(self, index: int) -> AttractionEnd | None:
+        """Find the end of attraction below the factor numbered `index`.
+
+        Returns None if attraction reaches the end of the search, or if it is not certain that the stage does not hunt
+        below.
+        """
+        while self.attracts[index] and not self.attracts[self.lowest : index].all():
+            first = self.lowest + int(np.flatnonzero(~self.attracts[self.lowest : index])[-1]) + 1
+            end = self.end(first, -1)
+            if end is None:
+                continue
+            quiet = np.flatnonzero(self.factors < end.inside)[-2:]
+            return end if quiet.size and self.decided[quiet].all() and not self.attracts[quiet].any() else None
+        return None
+
+    def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
+        """Return the windows of factors with an attractor, except the one with factor `besides`.
+
+        `besides` is the number of a factor.
+        """
+        while True:
+            before = self.attracts.copy()
+            windows = tuple(self._window(a, b) for a, b in self._spans() if not a <= besides <= b)
+            if np.array_equal(before, self.attracts):
+                return windows
+
+    def _window(self, first: int, last: int) -> BandwidthWindow:
+        """Return the window from the first to the last of neighbouring factors, with its ends."""
+        return BandwidthWindow(
+            self.end(first, -1) if first > self.lowest else None,
+            self.end(last, 1) if last + 1 < len(self.factors) else None,
+        )
+
+    def _spans(self) -> list[tuple[int, int]]:
+        """Return the first and last numbers of each group of factors with an attractor.
+
+        The factors of a group are neighbours.
+        """
+        ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
+        return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]
