@@ -42,8 +42,8 @@ from friso.hunting.attractors.rounds import Ends, Pending, lengthened
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.attractors.survey import Survey, _slope
 from friso.hunting.basin import ends_in, swings_seldom
-from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW
 from friso.hunting.cycle.rest import bent, spread_over
+from friso.hunting.doubt import Doubt
 from friso.hunting.edge_search import Beyond, EdgeSearch
 from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.measures import measuring_options
@@ -51,7 +51,7 @@ from friso.hunting.motions import run_motions
 from friso.hunting.path import bandwidth_path
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import CheckSettings, EdgeSettings
-from friso.hunting.verdict import STILL_SWINGS, own_motion
+from friso.hunting.verdict import own_motion
 from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
 from friso.studies.boundary import REPELS, UNKNOWN, place_verdicts
@@ -739,7 +739,7 @@ def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sur
         case = check_given(small)
     assert case.settling_time[1e-5] is not None
     assert 1.02e-5 < case.peak_to_peak < 1.06e-5
-    assert (case.judgement.hunting.certain, case.judgement.hunting.reason) == (False, STILL_SWINGS)
+    assert (case.judgement.hunting.certain, case.judgement.hunting.reason) == (False, Doubt.MOTION)
     flat, survey = small.flat(), attractors(held(small))
     larger = tuple(replace(motion, amplitude=10 * motion.amplitude) for motion in survey.motions)
     moved = run_motions(flat, 1, measuring_options(1e-6))
@@ -822,12 +822,12 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     )
     result = hunting(stage)
     assert result.passing
-    assert (result.certain, result.reason) == (False, GROWS)
+    assert (result.certain, result.reason) == (False, Doubt.GROWTH)
     surveyed = {"attractors": lambda *_, **__: result.surveyed}
     hidden = {"at_lower_gains": lambda _: np.array(["unknown"], dtype=object)}
     with patched({friso.hunting.cycle.hunting: surveyed, friso.hunting.loop: hidden}):
         unknown = hunting(stage)
-    assert (unknown.passing, unknown.certain, unknown.reason) == (True, False, MAY_GROW)
+    assert (unknown.passing, unknown.certain, unknown.reason) == (True, False, Doubt.GROWTH)
     position = friso.simulate(stage, sample_time=0.1).position.to_numpy()
     swings = np.abs(position[:30000]).reshape(30, -1).max(axis=1)  # of 100 s each
     assert (np.diff(swings[3:]) > 0).all()
@@ -842,7 +842,7 @@ def test_many_stages_are_judged_no_more_surely_than_one() -> None:
     """At 500 kN no motion tried reaches the limit for long, but farther ones do, and may grow."""
     stage = VARIANTS["rigid"].replace({**UNWINDING, "controller.force_limit": "500 kN"})
     result = hunting(stage)
-    assert (result.certain, result.reason) == (False, FARTHER_KICKS)
+    assert (result.certain, result.reason) == (False, Doubt.BEYOND)
     assert judge_many(stage.flat(), 1, 1e-6).tolist() == ["undecided"]
     clamped = stage.replace({"controller.anti_windup": "clamp"})
     assert judge_many(clamped.flat(), 1, 1e-6).tolist() == ["settles"]

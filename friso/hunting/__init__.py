@@ -34,6 +34,7 @@ from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap
 from friso.hunting.cycle.shooting import Orbits
 from friso.hunting.derivatives import CycleDerivatives, cycle_derivatives, edge_derivatives, flow_derivatives
+from friso.hunting.doubt import Doubt
 from friso.hunting.feeding import Decline, Feeding
 from friso.hunting.loop import LoopState, LowerGains, unstable
 from friso.hunting.many_stages import (
@@ -76,6 +77,7 @@ __all__ = [
     "Cycles",
     "Decline",
     "Diagram",
+    "Doubt",
     "Dwell",
     "Ensemble",
     "Feeding",

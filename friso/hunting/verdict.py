@@ -26,13 +26,13 @@ from friso.hunting.basin import (
 from friso.hunting.criteria import Verdict, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import (
-    REACHED,
     Cycle,
     Hunting,
     Swing,
     cannot_hunt,
     hunting,
 )
+from friso.hunting.doubt import Doubt
 from friso.hunting.loop import leaves_for_good, may_run_away
 from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
@@ -45,30 +45,6 @@ from friso.stage import Stage
 
 MOVING = "the reference never stands still"
 """Reason why a stage whose reference never stands still does not hunt: it has no place to hunt about."""
-
-
-LEFT_OVER = "not every motion that kept swinging was followed to its end: this one may end in another swing"
-"""Reason given when a motion that ends in no known attractor may end in another one."""
-
-SWINGS_ON = "this motion was still swinging when it was given up, by less than half of what was found to attract"
-"""Reason given when a motion was seen to keep swinging, by less than the known attractor."""
-
-STILL_SWINGS = "this motion still swings a little at the end of the longest run, but nothing was found that attracts"
-
-UNFOLLOWED = (
-    "this motion was not followed for long enough to see it come to rest: that takes more work than a check may"
-)
-"""Reason given when no attractor was found, but the motion was not continued until it rests."""
-
-
-RUNS_AWAY = "this motion swings much farther at its end than what was found to attract, and may run away"
-"""Reason given when a motion swings much farther than the known attractor."""
-
-BY_CHANCE = "a change of its mass by a hundred-thousandth, or rounding, decides whether this motion ends in hunting"
-"""Reason given when a motion ends differently with slightly changed masses."""
-
-UNCHECKED = "runs with hardly different masses, which show whether chance decides how this motion ends, were given up"
-"""Reason given when the runs with changed masses were not completed."""
 
 
 class CheckPart(StrEnum):
@@ -234,9 +210,9 @@ def _without_a_target(
     leaves = attraction.surveyed is not None and bool(attraction.surveyed.runs_away[0])
     runs_away, doubtful = leaves and bool(rest.away[0]), attraction.possible and attraction.certain
     if doubtful and not runs_away and rest.unknown[0]:
-        attraction = replace(attraction, certain=False, reason=UNFOLLOWED)
+        attraction = replace(attraction, certain=False, reason=Doubt.WORK)
     elif doubtful and not runs_away and rest.moving[0] and rest.swing[0] > resting(stage.flat())[0]:
-        attraction = replace(attraction, certain=False, reason=STILL_SWINGS)
+        attraction = replace(attraction, certain=False, reason=Doubt.MOTION)
     observed = bool(rest.steady[0])
     word = verdicts(motions.completed, motions.completed, rest.steady, rest.steady, rest.rests)[0]
     if attraction.certain and word != "failed":
@@ -245,7 +221,7 @@ def _without_a_target(
     if attraction.possible and not observed:
         sought, given_up = _sought(stage, attraction, work - spent.used)
     if sought.contradicts:
-        attraction = replace(attraction, certain=False, reason=REACHED)
+        attraction = replace(attraction, certain=False, reason=Doubt.RUNS)
     sought = _as_sure(stage, sought, attraction)
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
     return Judgement(
@@ -284,7 +260,7 @@ def _with_a_target(
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
         doubt = own.doubt or doubt
         if own.ends and own.swing > check_settings.runaway_swing_factor * _widest(attraction):
-            doubt = RUNS_AWAY
+            doubt = Doubt.MOTION
         sure = np.ones(1, bool)
         word = verdicts(sure, sure, sure, np.array([own.ends]), ~sure)[0]
         if attraction.certain and not doubt:
@@ -331,7 +307,7 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     factors = 1 + np.array(check_settings.mass_changes)
     changed = {key: value * factors for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
     ends, completed, swing = ends_in({**flat, **changed}, len(factors), target)
-    doubt = BY_CHANCE if np.any(ends[completed] != ends[0]) else "" if completed.all() else UNCHECKED
+    doubt = Doubt.RUNS if np.any(ends[completed] != ends[0]) else "" if completed.all() else Doubt.WORK
     own = OwnMotion(ends[0], completed[0], float(swing[0]), doubt)
     if own.ends or own.doubt or not own.completed or own.swing <= resting(flat)[0]:
         return own
@@ -397,10 +373,10 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
     not within its run).
     """
     if swing > resting(stage.flat())[0]:
-        return SWINGS_ON
+        return Doubt.MOTION
     surveyed = attraction.surveyed
     every = surveyed is None or bool(surveyed.complete[0])
-    return "" if every or np.isfinite(within) else LEFT_OVER
+    return "" if every or np.isfinite(within) else Doubt.MOTION
 
 
 def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:

@@ -22,7 +22,8 @@ from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, time_consta
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import settings
-from friso.hunting.loop import LowerGains, far_beyond_a_limit, lags, surely_calm
+from friso.hunting.doubt import Doubt
+from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm
 from friso.stage import Stage
 from friso.stage.controllers import dead_band
 
@@ -30,60 +31,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-UNDECIDED = "simulations that had to decide failed, or had not settled when they were stopped"
-"""Reason given when simulations that had to decide were not completed."""
-
-GIVEN_UP = "the search for what attracts the stage would have taken more work than a check may"
-"""Reason given when the search exceeded its allowance of work."""
-
-
-FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
-"""Reason given when simulations at two tolerances contradict each other."""
-
-REACHED = "a cycle that attracts at another bandwidth could be followed to this one, but was not found here"
-"""Reason given when the search through the bandwidths contradicts the survey at the stage's own bandwidth."""
-
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
 """Reason why a stage with dither is not searched for cycles, although it may hunt."""
-
-BY_ITSELF = "its loop is unstable, or not linear even without friction"
-"""Reason given when a stage that friction cannot make hunt may still not settle."""
-
-LAGS = "its controller pushes ever harder at standstill, as an integral does, and such cycles are not searched for"
-"""Reason given when a lag that replaces the integral may make a stage hunt."""
-
-GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
-"""Reason given when a swing may grow without bound, as the loop is unstable at lower gains."""
-
-MAY_GROW = "without anti-windup it is not known whether large swings grow: a size is where a run was stopped"
-"""Reason given when stability at lower gains is unknown, so that an observed swing may grow."""
-
-MAY_DIE_OUT = "without anti-windup large swings die out the slower the larger they are: what was observed may be one"
-"""Reason given when the loop is stable at lower gains, so that a large observed swing may die out."""
-
-PASSING: Mapping[LowerGains, str] = {"stable": MAY_DIE_OUT, "unstable": GROWS, "unknown": MAY_GROW}
-
-FARTHER_KICKS = "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
-"""Reason given when something may attract a stage from farther off than the survey reaches."""
-
-MOSTLY_WITHIN = "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
-"""Reason given when most starts of a survey lie within a wide dead zone."""
-
-OUTER_INTEGRALS = (
-    "with integrals in several loops, a stage stuck with the outer one wound up otherwise may keep swinging"
-)
-"""Reason given when the survey varied only the integral of the inner loop."""
-
-SMALL_CYCLES = (
-    "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"
-)
-"""Reason given when cycles may be smaller than the survey covers, because friction hardly falls with speed."""
-
-NARROW_PLAY = "the backlash is so narrow that cycles of its size may be smaller than the search covers"
-"""Reason given when cycles within a narrow backlash may be smaller than the survey covers."""
-
-STIFF_BRISTLES = "bristles give way by so little that runs do not resolve how friction falls as they break away"
-"""Reason given when bristles bend by less than runs can resolve."""
 
 RESOLVED_BRISTLES = 10 * TIGHT_SURVEY_RTOL
 """Smallest deflection of bristles, in deflections of the loop, that runs resolve at the tightest tolerance of a survey.
@@ -230,8 +179,7 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
     if reason := cannot_hunt(stage):
         held = Ensemble.held(stage.flat(), 1)
         calm = bool(surely_calm(held)[0])
-        doubt = LAGS if lags(held)[0] else BY_ITSELF
-        return Hunting((), reason if calm or reason == DITHERS else doubt, calm, None)
+        return Hunting((), reason if calm or reason == DITHERS else Doubt.LOOP, calm, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat).standing, variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
@@ -241,7 +189,7 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
     (beyond,) = beyond_the_survey(stages, survey)
     certain = bool(survey.decided[0]) and not beyond
-    doubt = beyond or (FLIPS if survey.flips[0] else GIVEN_UP if search.exhausted else UNDECIDED)
+    doubt = beyond or (Doubt.WORK if search.exhausted and not survey.flips[0] else Doubt.RUNS)
     far = far_beyond_a_limit(stages)
     reason = survey.families[0].reasons[0] if certain else doubt
     return Hunting(
@@ -280,7 +228,7 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
         farther = (far != "stable") & ~survey.runs_away
         for motion in survey.motions:
             if motion.cycles is None:
-                why[motion.stage] = PASSING[far[motion.stage]]
+                why[motion.stage] = Doubt.GROWTH
     if (free := np.flatnonzero(~survey.attracts)).size:
         why[free] = _beyond_the_search(stages.take(free), farther[free])
     return why
@@ -293,14 +241,14 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
     were tried.
     """
     if stages.outer_integrals:
-        why = np.full(stages.count, OUTER_INTEGRALS, dtype=object)
+        why = np.full(stages.count, Doubt.BEYOND, dtype=object)
     else:
-        why = np.where(small_cycles_possible(stages), SMALL_CYCLES, "").astype(object)
-        why[(stages.backlash > 0) & (stages.backlash < settings.least_certain_swing * stages.length)] = NARROW_PLAY
+        why = np.where(small_cycles_possible(stages), Doubt.BEYOND, "").astype(object)
+        why[(stages.backlash > 0) & (stages.backlash < settings.least_certain_swing * stages.length)] = Doubt.BEYOND
     if bristles := stages.kernel.having(Role.BRISTLE):
-        why[stages.scales[:, bristles].min(axis=1) < RESOLVED_BRISTLES * stages.length] = STIFF_BRISTLES
-    why[(dead_band(stages.flat) >= settings.wide_dead_zone * stages.length) & (stages.length > 0)] = MOSTLY_WITHIN
-    why[farther] = FARTHER_KICKS
+        why[stages.scales[:, bristles].min(axis=1) < RESOLVED_BRISTLES * stages.length] = Doubt.BEYOND
+    why[(dead_band(stages.flat) >= settings.wide_dead_zone * stages.length) & (stages.length > 0)] = Doubt.BEYOND
+    why[farther] = Doubt.BEYOND
     return why
 
 

@@ -1,0 +1,16 @@
+"""Name the reasons why an answer about hunting is not certain (docs/hunting.md lists their causes)."""
+
+from enum import StrEnum
+
+from friso.hunting.search_limits import MORE_WORK
+
+
+class Doubt(StrEnum):
+    """Reason why it is not certain what attracts a stage, or how its motion ends: a code, and its sentence."""
+
+    WORK = f"deciding takes {MORE_WORK}"
+    RUNS = "simulations that had to decide were stopped, or end otherwise at another tolerance or mass"
+    MOTION = "this motion was still swinging when it was given up, otherwise than what was found to attract"
+    BEYOND = "swings smaller or larger than those searched may last"
+    GROWTH = "without anti-windup swings may grow or die out beyond the force limit: a size is where a run was stopped"
+    LOOP = "its loop is unstable, or its controller pushes ever harder at standstill as an integral does"
