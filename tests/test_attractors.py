@@ -43,7 +43,7 @@ from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.attractors.survey import Survey, _slope
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.rest import bent, spread_over
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.edge_search import Beyond, EdgeSearch
 from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.measures import measuring_options
@@ -739,7 +739,7 @@ def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sur
         case = check_given(small)
     assert case.settling_time[1e-5] is not None
     assert 1.02e-5 < case.peak_to_peak < 1.06e-5
-    assert (case.judgement.hunting.certain, case.judgement.hunting.reason) == (False, Doubt.MOTION)
+    assert (case.judgement.hunting.certain, case.judgement.hunting.reason) == (False, HuntingDoubt.MOTION)
     flat, survey = small.flat(), attractors(held(small))
     larger = tuple(replace(motion, amplitude=10 * motion.amplitude) for motion in survey.motions)
     moved = run_motions(flat, 1, measuring_options(1e-6))
@@ -822,12 +822,12 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     )
     result = hunting(stage)
     assert result.passing
-    assert (result.certain, result.reason) == (False, Doubt.GROWTH)
+    assert (result.certain, result.reason) == (False, HuntingDoubt.GROWTH)
     surveyed = {"attractors": lambda *_, **__: result.surveyed}
     hidden = {"at_lower_gains": lambda _: np.array(["unknown"], dtype=object)}
     with patched({friso.hunting.cycle.hunting: surveyed, friso.hunting.loop: hidden}):
         unknown = hunting(stage)
-    assert (unknown.passing, unknown.certain, unknown.reason) == (True, False, Doubt.GROWTH)
+    assert (unknown.passing, unknown.certain, unknown.reason) == (True, False, HuntingDoubt.GROWTH)
     position = friso.simulate(stage, sample_time=0.1).position.to_numpy()
     swings = np.abs(position[:30000]).reshape(30, -1).max(axis=1)  # of 100 s each
     assert (np.diff(swings[3:]) > 0).all()
@@ -842,7 +842,7 @@ def test_many_stages_are_judged_no_more_surely_than_one() -> None:
     """At 500 kN no motion tried reaches the limit for long, but farther ones do, and may grow."""
     stage = VARIANTS["rigid"].replace({**UNWINDING, "controller.force_limit": "500 kN"})
     result = hunting(stage)
-    assert (result.certain, result.reason) == (False, Doubt.BEYOND)
+    assert (result.certain, result.reason) == (False, HuntingDoubt.BEYOND)
     assert judge_many(stage.flat(), 1, 1e-6).tolist() == ["undecided"]
     clamped = stage.replace({"controller.anti_windup": "clamp"})
     assert judge_many(clamped.flat(), 1, 1e-6).tolist() == ["settles"]

@@ -33,7 +33,7 @@ from friso.hunting import (
 from friso.hunting.basin import ends_in, evenly
 from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.rest import pushed
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.edge_search import EdgeSearch
 from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import own_motion
@@ -96,7 +96,7 @@ def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
         first = int(np.flatnonzero(~ends)[0])
         low, high = float(kicks[first - 1]), float(kicks[first])
     turned = [own_motion(released(kick), target(), np.inf).doubt for kick in (low, 0.99 * low, 1.01 * high)]
-    assert turned == [Doubt.RUNS, "", ""]
+    assert turned == [HuntingDoubt.RUNS, "", ""]
 
 
 def released(displacement: float) -> Stage:

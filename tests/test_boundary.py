@@ -6,15 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from beyond_flip import CREEPING
 from refusals import refused
 from variants import VARIANTS
 
 import friso
 from friso.hunting import Diagram, Ensemble, KeyRange, LocatedPoint, Plane, Point, Space, diagram, plane
-from friso.hunting.boundary.branch import REACHED, Tracer, continued
-from friso.hunting.boundary.crossing import crossing, turn
+from friso.hunting.attractors import attractors
 from friso.hunting.boundary.diagram import each_once
-from friso.hunting.boundary.locate import changes, met
+from friso.hunting.continuation.branch import REACHED, Tracer, continued
+from friso.hunting.continuation.crossing import crossing, turn
+from friso.hunting.continuation.locate import changes, met
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.stage import Stage
 from friso.studies.boundary import stability_changes
@@ -419,3 +421,14 @@ def test_a_branch_goes_on_along_a_parabola(over_crossover: Diagram) -> None:
         off.append([float(np.linalg.norm(guess - ahead.vector)) for guess in guesses])
     straight, parabola = np.median(off, axis=0)
     assert parabola < straight / 3
+
+
+@pytest.mark.inner
+def test_where_hunting_ends_beyond_a_curve_it_is_searched_on() -> None:
+    """Beyond the flip that is drawn, an asymmetric cycle attracts on: a thorough search agrees on both sides."""
+    space = Space.of(CREEPING, [KeyRange("controller.crossover", 11.9, 13.5), KeyRange("friction.static", 28.6, 29.2)])
+    (end,) = plane(space, nodes=3).last_ends
+    assert end.certain
+    inside, outside = (attractors(space.stages(at[None]), thorough=True) for at in (end.inside, end.outside))
+    assert inside.attracts.all()
+    assert not outside.attracts.any()

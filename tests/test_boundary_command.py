@@ -32,6 +32,7 @@ from friso.hunting import (
     find_cycles,
     plane,
 )
+from friso.hunting.boundary.plane import LastEnd
 from friso.interface.output_folder import MARKER
 from friso.questions.boundary.document import boundary_document
 from friso.questions.boundary.figures import LOST, LOST_END, MEETING, NODES, boundary_figure
@@ -138,7 +139,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     assert document.keys() == {
-        *("conclusion", "x", "y", "curves", "ends", "meetings", "lost", "corners", "files", "plug_ins")
+        *("conclusion", "x", "y", "curves", "ends", "meetings", "lost", "beyond_curves", "corners", "files", "plug_ins")
     }
     assert [(end["curve"], end["how"]) for end in document["ends"]][:2] == [(0, "range"), (0, "range")]
     assert document["y"] == {"key": "masses.cart", "unit": "g"}
@@ -359,6 +360,7 @@ def test_the_figure_marks_where_curves_meet_and_are_lost(met: Plane) -> None:
     assert matplotlib_renderer.image(alone, "png")
 
 
+@pytest.mark.inner
 def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane) -> None:
     """Hunting ends on a curve or between two stages, along the first key or else the second.
 
@@ -382,6 +384,11 @@ def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane)
     assert "below 1.8 mm at controller.kp = 10 N/m in between" in _along_one(bulging, KEYS)
     level = bulging._replace(low=np.array([1.5, 1.50001, 1.49999]) * 1e-3)
     assert "in between" not in _along_one(level._replace(high=level.low), KEYS)
+    farther = LastEnd(np.array([0.8, 1.0]), np.array([0.9, 1.0]), True)
+    beyond = plane_edge(replace(plane, last_ends=(farther,)))
+    assert beyond is not None
+    assert beyond.low == pytest.approx([1.5e-3, 1.8e-3])
+    assert beyond.high == pytest.approx([1.5e-3, 1.9e-3])
     uncurved = plane_edge(replace(plane, curves=(), attracts=~plane.attracts))
     assert uncurved is not None
     assert (uncurved.below, uncurved.low.tolist(), uncurved.high.tolist()) == (False, [1e-3] * 2, [2e-3] * 2)

@@ -21,7 +21,7 @@ from friso.frequency.members import steady_force
 from friso.hunting import Ensemble
 from friso.hunting.attractors import Attractors
 from friso.hunting.cycle.hunting import beyond_the_survey, small_cycles_possible
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.stage.tables import FRICTION
 
 LAWS = Path(friso.__file__).parent / "equations" / "friction"
@@ -63,7 +63,7 @@ def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_
 
 
 @pytest.mark.inner
-@pytest.mark.parametrize(("play", "why"), [("200 um", ""), ("20 um", ""), ("100 nm", Doubt.BEYOND)])
+@pytest.mark.parametrize(("play", "why"), [("200 um", ""), ("20 um", ""), ("100 nm", HuntingDoubt.BEYOND)])
 def test_what_a_backlash_deflects_the_loop_by_is_no_friction_that_falls(play: str, why: str) -> None:
     """Friction falls by two thirds at speeds far above those of small swings.
 

@@ -29,7 +29,7 @@ from friso.hunting import (
     verdict,
 )
 from friso.hunting.attractors import Attractors
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.settings import BasinSettings, CheckSettings
@@ -126,14 +126,14 @@ def judged(
     ("run", "doubt"),
     [
         ({}, ""),
-        ({"complete": False}, Doubt.MOTION),
+        ({"complete": False}, HuntingDoubt.MOTION),
         ({"complete": False, "settling": 0.5}, ""),
-        ({"swing": 2e-4}, Doubt.MOTION),
-        ({"swing": 1e-5, "settling": 0.5}, Doubt.MOTION),
-        ({"other": (True, True)}, Doubt.RUNS),
-        ({"other": (False, False)}, Doubt.WORK),
+        ({"swing": 2e-4}, HuntingDoubt.MOTION),
+        ({"swing": 1e-5, "settling": 0.5}, HuntingDoubt.MOTION),
+        ({"other": (True, True)}, HuntingDoubt.RUNS),
+        ({"other": (False, False)}, HuntingDoubt.WORK),
         ({"ends": True, "swing": 1e-3, "complete": False}, ""),
-        ({"ends": True, "swing": 1e-2}, Doubt.MOTION),
+        ({"ends": True, "swing": 1e-2}, HuntingDoubt.MOTION),
     ],
 )
 def test_a_motion_that_may_end_in_another_swing_does_not_surely_settle(run: dict[str, Any], doubt: str) -> None:
@@ -146,7 +146,7 @@ def test_a_motion_that_may_end_in_another_swing_does_not_surely_settle(run: dict
 
 def test_a_longer_run_that_is_not_completed_gives_no_verdict() -> None:
     assert judged(completed=False).verdict == "failed"
-    assert MORE_WORK in Doubt.WORK  # sentences name the commands by these words
+    assert MORE_WORK in HuntingDoubt.WORK  # sentences name the commands by these words
 
 
 @pytest.mark.parametrize(
@@ -215,5 +215,5 @@ def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, wo
         judgement = judge(STAGE, run_to(np.nan, swing=1e-3), 1e-6, work=work)
     assert (judgement.verdict, judgement.observed) == ("transient", False)
     assert (judgement.settled_after, judgement.followed) == (None, None)
-    assert (judgement.hunting.certain, judgement.hunting.reason) == (False, Doubt.WORK)
+    assert (judgement.hunting.certain, judgement.hunting.reason) == (False, HuntingDoubt.WORK)
     assert spent.used < 1e6

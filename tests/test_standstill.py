@@ -21,7 +21,7 @@ from friso.errors import InputError
 from friso.frequency.parts import compensator
 from friso.hunting import DITHERS, Ensemble, stuck, wait
 from friso.hunting import hunting as hunting_of
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.stage import Stage
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import MoveTask
@@ -212,11 +212,12 @@ def test_an_integral_that_leaks_is_waited_for_until_it_changes_no_more() -> None
     assert after == pytest.approx(long_after, rel=1e-3)
 
 
+@pytest.mark.inner
 def test_nothing_is_sure_beyond_a_wide_dead_zone() -> None:
     """The break-away force deflects the loop by 1.5 mm; most starts are nearer than 3.5 mm to the reference."""
     wide = hunting_of(machine({"error_deadband": "3.5 mm"}))
     assert (wide.attracting, wide.observed, wide.certain) == ((), (), False)
-    assert wide.reason == Doubt.BEYOND
+    assert wide.reason == HuntingDoubt.BEYOND
 
 
 @pytest.mark.parametrize("name", [name for name in SETTINGS if name != "leak"])

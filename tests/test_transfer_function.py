@@ -21,7 +21,7 @@ from friso.frequency.parts import FORCE, REFERENCE, compensator
 from friso.frequency.system import DriveTiming
 from friso.hunting import cannot_hunt, hunting
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.loop import lags
 from friso.shown.motion_words import motion_sentences
 from friso.stage import Stage
@@ -203,7 +203,7 @@ def test_a_lag_that_winds_up_without_an_integral_is_not_surely_calm() -> None:
     assert friso.simulate(stage).measures.outcome[0] == "swings"
     verdict = hunting(stage)
     assert not verdict.certain
-    assert verdict.reason == Doubt.LOOP
+    assert verdict.reason == HuntingDoubt.LOOP
 
 
 @pytest.mark.inner

@@ -34,7 +34,7 @@ from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap
 from friso.hunting.cycle.shooting import Orbits
 from friso.hunting.derivatives import CycleDerivatives, cycle_derivatives, edge_derivatives, flow_derivatives
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.feeding import Decline, Feeding
 from friso.hunting.loop import LoopState, LowerGains, unstable
 from friso.hunting.many_stages import (
@@ -77,11 +77,11 @@ __all__ = [
     "Cycles",
     "Decline",
     "Diagram",
-    "Doubt",
     "Dwell",
     "Ensemble",
     "Feeding",
     "Hunting",
+    "HuntingDoubt",
     "Judgement",
     "KeyRange",
     "Kick",

@@ -5,7 +5,7 @@ from enum import StrEnum
 from friso.hunting.search_limits import MORE_WORK
 
 
-class Doubt(StrEnum):
+class HuntingDoubt(StrEnum):
     """Reason why it is not certain what attracts a stage, or how its motion ends: a code, and its sentence."""
 
     WORK = f"deciding takes {MORE_WORK}"

@@ -14,13 +14,13 @@ import numpy as np
 from friso.engine.allowance import Exhausted
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
-from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
-from friso.hunting.boundary.locate import Bifurcation, changes, last_inside
+from friso.hunting.continuation.branch import END_OF_RANGE, REACHED, Point, Tracer
+from friso.hunting.continuation.locate import Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, described, kept
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.cycle.shooting import close
-from friso.hunting.path import AttractionEnd, EndKind, Path
+from friso.hunting.path import AttractionEnd, LossKind, Path
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
@@ -35,7 +35,7 @@ class _Place:
     at: float
     motions: tuple[Swinging, ...]
     outside: float
-    kind: EndKind = "seen"
+    kind: LossKind = "seen"
 
 
 class Beyond(Exception):
@@ -197,7 +197,7 @@ class EdgeSearch:
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * edge_settings.reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-    def followed(self, at: float, orbit: Swinging) -> tuple[float, Point, EndKind]:
+    def followed(self, at: float, orbit: Swinging) -> tuple[float, Point, LossKind]:
         """Follow a closed orbit from a factor to the last factor at which it is stable.
 
         Returns this factor, the orbit there, and how its stability ends. Raises Beyond if the orbit is stable up to the

@@ -11,7 +11,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.loop import unstable_among
-from friso.hunting.path import AttractionEnd, BandwidthWindow, EndKind, Path, bandwidth_path
+from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind, Path, bandwidth_path
 from friso.hunting.path_search import PathSearch
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import check_settings
@@ -37,7 +37,7 @@ class Margin:
     crossover: float | None
     certain: bool
     quiet: float
-    kind: EndKind = "seen"
+    kind: LossKind = "seen"
 
     @property
     def end(self) -> AttractionEnd:

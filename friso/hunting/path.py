@@ -14,7 +14,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import edge_settings
 
-EndKind = Literal["flip", "fold", "torus", "lost", "seen"]
+LossKind = Literal["flip", "fold", "torus", "lost", "seen"]
 """How attraction ends: the orbit flips, folds back or becomes a torus there, was lost, or surveys enclose the end."""
 
 
@@ -31,7 +31,7 @@ class AttractionEnd:
     inside: float
     outside: float
     certain: bool
-    kind: EndKind = "seen"
+    kind: LossKind = "seen"
 
     @property
     def reserve(self) -> float:
@@ -82,12 +82,12 @@ class BandwidthWindow:
 class Path:
     """Stages along which one parameter moves.
 
-    `scaled` makes the stages, as keys in SI, with the parameter times factors (count,). `factors`, ascending, are those
-    surveyed at first; the one numbered `own` is 1, the stage itself. `beyond` are the factors past an orbit's end at
-    which other attractors are looked for.
+    `stages` makes them, with the parameter times factors (count,). `factors`, ascending, are those surveyed at first;
+    the one numbered `own` is 1, the stage itself. `beyond` are the factors past an orbit's end at which other
+    attractors are looked for.
     """
 
-    scaled: Callable[[np.ndarray], Mapping[str, Any]]
+    stages: Callable[[np.ndarray], Ensemble]
     factors: np.ndarray
     own: int
     beyond: tuple[float, ...]
@@ -100,12 +100,15 @@ class Path:
         above: np.ndarray,
         beyond: tuple[float, ...],
     ) -> Path:
-        """Make a path from ascending factors below and above 1, either of which may be empty."""
-        return cls(scaled, np.concatenate([below, [1.0], above]), len(below), beyond)
+        """Make a path from ascending factors below and above 1, either of which may be empty.
 
-    def stages(self, factors: np.ndarray) -> Ensemble:
-        """Return the stages with the parameter times factors."""
-        return Ensemble.held(self.scaled(factors), len(factors))
+        `scaled` gives the stages' keys in SI, with the parameter times factors (count,).
+        """
+
+        def stages(factors: np.ndarray) -> Ensemble:
+            return Ensemble.held(scaled(factors), len(factors))
+
+        return cls(stages, np.concatenate([below, [1.0], above]), len(below), beyond)
 
     def numbers(self, side: int) -> np.ndarray:
         """Return the numbers of the factors above (`side` 1) or below (-1) the stage's own, outward."""

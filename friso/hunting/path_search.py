@@ -127,7 +127,11 @@ class PathSearch:
         if end is None:
             raise Undecided
         before = numbers[side * np.log(self.factors[numbers] / end.outside) <= 0]
-        return replace(end, certain=end.certain and bool(self.decided[before].all()))
+        hunting_side = edge_settings.inside_end_log * np.sign(np.log(end.inside / end.outside))
+        inside = float(end.inside * np.exp(hunting_side))
+        if hunts and side * np.log(inside) < 0:
+            inside = end.inside
+        return replace(end, inside=inside, certain=end.certain and bool(self.decided[before].all()))
 
     def _beginning(self, numbers: np.ndarray, side: int) -> AttractionEnd | None:
         """Find where hunting begins on a side; `numbers` are those of its factors, outward.

@@ -173,6 +173,10 @@ class EdgeSettings(Settings):
     """Numbers of the values, counted outward, that are searched thoroughly if a rough survey finds no change: 9 and
     23 % off for a farthest factor of three, and the farthest, at which a rough survey once saw hunting that was not."""
 
+    inside_end_log: float = setting(0.02, "log of factor")
+    """Distance from an end on the hunting side at which hunting is told. Nearer, a cycle attracts from hardly anywhere,
+    and motions take too long to decay."""
+
     least_side_log: float = setting(0.03, "log of factor")
     """Narrowest side of a parameter's own value that is searched: margins are shown with three digits at most."""
 

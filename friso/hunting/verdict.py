@@ -32,7 +32,7 @@ from friso.hunting.cycle.hunting import (
     cannot_hunt,
     hunting,
 )
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.loop import leaves_for_good, may_run_away
 from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
@@ -210,9 +210,9 @@ def _without_a_target(
     leaves = attraction.surveyed is not None and bool(attraction.surveyed.runs_away[0])
     runs_away, doubtful = leaves and bool(rest.away[0]), attraction.possible and attraction.certain
     if doubtful and not runs_away and rest.unknown[0]:
-        attraction = replace(attraction, certain=False, reason=Doubt.WORK)
+        attraction = replace(attraction, certain=False, reason=HuntingDoubt.WORK)
     elif doubtful and not runs_away and rest.moving[0] and rest.swing[0] > resting(stage.flat())[0]:
-        attraction = replace(attraction, certain=False, reason=Doubt.MOTION)
+        attraction = replace(attraction, certain=False, reason=HuntingDoubt.MOTION)
     observed = bool(rest.steady[0])
     word = verdicts(motions.completed, motions.completed, rest.steady, rest.steady, rest.rests)[0]
     if attraction.certain and word != "failed":
@@ -221,7 +221,7 @@ def _without_a_target(
     if attraction.possible and not observed:
         sought, given_up = _sought(stage, attraction, work - spent.used)
     if sought.contradicts:
-        attraction = replace(attraction, certain=False, reason=Doubt.RUNS)
+        attraction = replace(attraction, certain=False, reason=HuntingDoubt.RUNS)
     sought = _as_sure(stage, sought, attraction)
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
     return Judgement(
@@ -260,7 +260,7 @@ def _with_a_target(
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
         doubt = own.doubt or doubt
         if own.ends and own.swing > check_settings.runaway_swing_factor * _widest(attraction):
-            doubt = Doubt.MOTION
+            doubt = HuntingDoubt.MOTION
         sure = np.ones(1, bool)
         word = verdicts(sure, sure, sure, np.array([own.ends]), ~sure)[0]
         if attraction.certain and not doubt:
@@ -307,7 +307,7 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     factors = 1 + np.array(check_settings.mass_changes)
     changed = {key: value * factors for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
     ends, completed, swing = ends_in({**flat, **changed}, len(factors), target)
-    doubt = Doubt.RUNS if np.any(ends[completed] != ends[0]) else "" if completed.all() else Doubt.WORK
+    doubt = HuntingDoubt.RUNS if np.any(ends[completed] != ends[0]) else "" if completed.all() else HuntingDoubt.WORK
     own = OwnMotion(ends[0], completed[0], float(swing[0]), doubt)
     if own.ends or own.doubt or not own.completed or own.swing <= resting(flat)[0]:
         return own
@@ -373,10 +373,10 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
     not within its run).
     """
     if swing > resting(stage.flat())[0]:
-        return Doubt.MOTION
+        return HuntingDoubt.MOTION
     surveyed = attraction.surveyed
     every = surveyed is None or bool(surveyed.complete[0])
-    return "" if every or np.isfinite(within) else Doubt.MOTION
+    return "" if every or np.isfinite(within) else HuntingDoubt.MOTION
 
 
 def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:

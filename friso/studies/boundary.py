@@ -390,10 +390,24 @@ def plane_edge(result: Plane) -> PlaneEdge | None:
             low, high = places[numbers, first].copy(), places[numbers, first + 1].copy()
             for row, at in enumerate(across[:, 0].tolist()):
                 crossed = [place for place in _crossings(result, along, at) if low[row] <= place <= high[row]]
-                if crossed:
+                farther = [end for end in last_ends(result) if _lies_between(end, along, low[row], high[row], at)]
+                if farther:
+                    low[row], high[row] = sorted(farther[0][:, along].tolist())
+                elif crossed:
                     low[row] = high[row] = max(crossed) if below else min(crossed)
             return PlaneEdge(along, below, across[:, 0], low, high)
     return None
+
+
+def last_ends(result: Plane) -> list[np.ndarray]:
+    """Return where hunting ends beyond the curves: both ends of each bracket in key values [SI], (2, 2)."""
+    return [_values(result.space, np.array([end.inside, end.outside])) for end in result.last_ends]
+
+
+def _lies_between(end: np.ndarray, along: int, low: float, high: float, value: float) -> bool:
+    """Tell whether a bracket, (2, 2), lies between `low` and `high` of key `along`, at a `value` of the other key."""
+    near = np.allclose(end[:, 1 - along], value, rtol=1e-9, atol=0.0)
+    return bool(near and np.all((end[:, along] >= low * (1 - 1e-9)) & (end[:, along] <= high * (1 + 1e-9))))
 
 
 def _crossings(result: Plane, along: int, value: float) -> list[float]:

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfit, polyval
 
 from friso.engine.side_by_side import side_by_side
-from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
-from friso.hunting.boundary.locate import ALONG_KEY, Bifurcation, LocatedPoint, met, met_by_secants
-from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
+from friso.hunting.continuation.branch import END_OF_RANGE, Tracer
+from friso.hunting.continuation.locate import ALONG_KEY, Bifurcation, LocatedPoint, met, met_by_secants
+from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.find import CYCLE_RTOL
 
 

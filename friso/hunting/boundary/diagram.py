@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.locate import LocatedPoint, special_points
-from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
+from friso.hunting.continuation.branch import Branch, Point, Tracer
+from friso.hunting.continuation.locate import LocatedPoint, special_points
+from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among

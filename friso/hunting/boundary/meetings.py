@@ -14,10 +14,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from friso.hunting.boundary.branch import END_OF_RANGE
 from friso.hunting.boundary.curve import CLOSED, Curve, CurveTracer, Spot, unit_vector
 from friso.hunting.boundary.settings import meeting_settings
 from friso.hunting.boundary.space import Space
+from friso.hunting.continuation.branch import END_OF_RANGE
 
 MeetingKind = Literal["cross", "together", "end"]
 """Kind of meeting of two curves: they cross, run together over a stretch, or the first one ends on the second."""

@@ -10,18 +10,21 @@ from itertools import count
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
-from friso.hunting.boundary.branch import Point, Tracer
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
-from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
-from friso.hunting.boundary.settings import continuation_settings
 from friso.hunting.boundary.space import Space
+from friso.hunting.continuation.branch import Point, Tracer
+from friso.hunting.continuation.locate import changes, located
+from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families, symmetric_cycles, whole_cycles
 from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting.edge_search import Beyond, EdgeSearch
 from friso.hunting.loop import unstable_among
+from friso.hunting.path import Path
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import attractors_beside
+from friso.hunting.what_attracts import attractors_beside, what_attracts
 from friso.progress import Progress, Tally, silent
 
 CURVES = "following the edge of hunting"
@@ -39,6 +42,7 @@ class Plane:
       that is known.
     - `unstable`: whether the loop is unstable regardless of friction.
     - `gaps`: places, shape (2,), at which a change was seen but no curve could be begun.
+    - `last_ends`: where hunting ends farther out than the curves between two nodes, by another cycle or motion.
     """
 
     space: Space
@@ -51,6 +55,20 @@ class Plane:
     unstable: np.ndarray
     gaps: tuple[np.ndarray, ...]
     meetings: tuple[Meeting, ...] = ()
+    last_ends: tuple[LastEnd, ...] = ()
+
+
+@dataclass(frozen=True)
+class LastEnd:
+    """Where hunting ends between two neighbours of the grid, beyond the curves that pass between them.
+
+    `inside` and `outside`, shape (2,), are coordinates in the box of the keys: something attracts at the first and
+    nothing at the second. The end is `certain` or not, as in `friso.hunting.path.AttractionEnd`.
+    """
+
+    inside: np.ndarray
+    outside: np.ndarray
+    certain: bool
 
 
 @dataclass(frozen=True)
@@ -111,14 +129,17 @@ def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, prog
         surveyed = attractors_beside(others, tuple(family.take(undecided) for family in sought), rtol)
         decided[undecided] = surely_surveyed(others, surveyed)
         attracts[undecided] = surveyed.attracts & decided[undecided]
-    for a, b in grid.changes(decided & attracts, decided & ~attracts):  # other attractors, too
+    ends = grid.changes(decided & attracts, decided & ~attracts)
+    for a, b in ends:  # other attractors, too
         middle = (points[a] + points[b]) / 2
         known_gap = any(np.array_equal(middle, at) for at in gaps)
         if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
             gaps.append(middle)
+    last_ends = _last_ends(space, curves, [(points[a], points[b]) for a, b in ends], rtol)
     unstable = np.any([*unstable_among(stages).values()], axis=0)
     meetings = find_meetings(space, curves, rtol)
-    return Plane(space, curves, grid.nodes, grid.allowed, hunting, attracts, decided, unstable, tuple(gaps), meetings)
+    columns = space, curves, grid.nodes, grid.allowed, hunting, attracts, decided, unstable
+    return Plane(*columns, tuple(gaps), meetings, last_ends)
 
 
 def _followed(
@@ -213,6 +234,95 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
         if np.linalg.norm(nearest - at, axis=1).min() < continuation_settings.explained_distance * mesh:
             return True
     return False
+
+
+def _last_ends(
+    space: Space, curves: Sequence[Curve], pairs: Sequence[tuple[np.ndarray, np.ndarray]], rtol: float
+) -> tuple[LastEnd, ...]:
+    """Find where hunting ends beyond the curves, on lines between neighbours of the grid.
+
+    `pairs` are the coordinates of neighbours of which something attracts the first alone. Just beyond the farthest
+    curve on each line, other attractors are looked for, on all lines at once; those found are followed to their end.
+    """
+    lines, begins = [], []
+    for start, end in pairs:
+        crossed = [share for curve in curves for share in _crossings(curve, start, end)]
+        if crossed:
+            line = _Line.between(space, start + max(crossed) * (end - start), end)
+            lines.append(line)
+            begins.append([factor for factor in edge_settings.beyond_bandwidths if factor < line.farthest])
+    owners = np.repeat(np.arange(len(lines)), [len(factors) for factors in begins])
+    if not owners.size:
+        return ()
+    factors = np.concatenate(begins)
+    places = np.array(
+        [lines[owner].at(factor) for owner, factor in zip(owners.tolist(), factors.tolist(), strict=True)]
+    )
+    survey = what_attracts(space.stages(places), rtol)
+    ends = []
+    for number, line in enumerate(lines):
+        found_at = np.flatnonzero((owners == number) & survey.attracts)
+        if found_at.size:
+            ends.append(line.end_of(float(factors[found_at[-1]]), survey.take(found_at[-1:]).motions))
+    return tuple(ends)
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A line in the box of the keys from `start` to `end`, both (2,), as a path on which factors grow from 1.
+
+    A factor of 1.01 leads as far as one key changes by 1 %, over a length of `hundredth`.
+    """
+
+    space: Space
+    start: np.ndarray
+    end: np.ndarray
+    hundredth: float
+
+    @classmethod
+    def between(cls, space: Space, start: np.ndarray, end: np.ndarray) -> _Line:
+        """Make a line from its ends."""
+        direction = (end - start) / np.linalg.norm(end - start)
+        return cls(space, start, end, space.hundredth(start, direction)(0.0))
+
+    @property
+    def farthest(self) -> float:
+        """Return the factor at the end of the line."""
+        return float(np.exp(np.log(1.01) * np.linalg.norm(self.end - self.start) / self.hundredth))
+
+    def at(self, factors: np.ndarray | float) -> np.ndarray:
+        """Return the coordinates at factors, (..., 2)."""
+        share = np.log(factors) / np.log(self.farthest)
+        return self.start + np.multiply.outer(share, self.end - self.start)
+
+    def end_of(self, factor: float, motions: tuple[Swinging, ...]) -> LastEnd:
+        """Follow `motions`, which attract at a factor, to the end of hunting on the line."""
+        farthest = self.farthest
+        path = Path(
+            lambda factors: self.space.stages(self.at(factors)),
+            np.array([1.0, farthest]),
+            0,
+            edge_settings.beyond_bandwidths,
+        )
+        try:
+            end = EdgeSearch(path, farthest).end(factor, motions, farthest)
+        except Beyond:
+            return LastEnd(self.at(factor), self.end, False)
+        return LastEnd(self.at(end.inside), self.at(min(end.outside, farthest)), end.certain)
+
+
+def _crossings(curve: Curve, start: np.ndarray, end: np.ndarray) -> list[float]:
+    """Return where a curve crosses the line between two neighbours of the grid, in shares of the line.
+
+    The curve is straight between its points. `start` and `end` are the coordinates of the neighbours in the box.
+    """
+    way = end - start
+    along, aside = (curve.points - start) @ way / (way @ way), (curve.points - start) @ (way[::-1] * [-1.0, 1.0])
+    passes = np.flatnonzero(aside[:-1] * aside[1:] <= 0)
+    with np.errstate(all="ignore"):
+        weights = np.nan_to_num(aside[passes] / (aside[passes] - aside[passes + 1]), nan=0.5)
+    shares = along[passes] + weights * (along[passes + 1] - along[passes])
+    return shares[(shares >= 0) & (shares <= 1)].tolist()
 
 
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:

@@ -22,7 +22,7 @@ from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, time_consta
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import settings
-from friso.hunting.doubt import Doubt
+from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm
 from friso.stage import Stage
 from friso.stage.controllers import dead_band
@@ -179,7 +179,7 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
     if reason := cannot_hunt(stage):
         held = Ensemble.held(stage.flat(), 1)
         calm = bool(surely_calm(held)[0])
-        return Hunting((), reason if calm or reason == DITHERS else Doubt.LOOP, calm, None)
+        return Hunting((), reason if calm or reason == DITHERS else HuntingDoubt.LOOP, calm, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat).standing, variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
@@ -189,7 +189,7 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
     (beyond,) = beyond_the_survey(stages, survey)
     certain = bool(survey.decided[0]) and not beyond
-    doubt = beyond or (Doubt.WORK if search.exhausted and not survey.flips[0] else Doubt.RUNS)
+    doubt = beyond or (HuntingDoubt.WORK if search.exhausted and not survey.flips[0] else HuntingDoubt.RUNS)
     far = far_beyond_a_limit(stages)
     reason = survey.families[0].reasons[0] if certain else doubt
     return Hunting(
@@ -228,28 +228,23 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
         farther = (far != "stable") & ~survey.runs_away
         for motion in survey.motions:
             if motion.cycles is None:
-                why[motion.stage] = Doubt.GROWTH
+                why[motion.stage] = HuntingDoubt.GROWTH
     if (free := np.flatnonzero(~survey.attracts)).size:
-        why[free] = _beyond_the_search(stages.take(free), farther[free])
+        why[free[_may_be_missed(stages.take(free)) | farther[free]]] = HuntingDoubt.BEYOND
     return why
 
 
-def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
-    """Return why stages may have an attractor that the survey missed, as texts (count,).
-
-    A text is "" without a reason. `farther`, (count,), marks stages that may keep swinging from larger distances than
-    were tried.
-    """
+def _may_be_missed(stages: Ensemble) -> np.ndarray:
+    """Return which stages may have an attractor that is too small for a survey, or lies beyond its starts, (count,)."""
     if stages.outer_integrals:
-        why = np.full(stages.count, Doubt.BEYOND, dtype=object)
+        missed = np.ones(stages.count, bool)
     else:
-        why = np.where(small_cycles_possible(stages), Doubt.BEYOND, "").astype(object)
-        why[(stages.backlash > 0) & (stages.backlash < settings.least_certain_swing * stages.length)] = Doubt.BEYOND
+        narrow = (stages.backlash > 0) & (stages.backlash < settings.least_certain_swing * stages.length)
+        missed = small_cycles_possible(stages) | narrow
     if bristles := stages.kernel.having(Role.BRISTLE):
-        why[stages.scales[:, bristles].min(axis=1) < RESOLVED_BRISTLES * stages.length] = Doubt.BEYOND
-    why[(dead_band(stages.flat) >= settings.wide_dead_zone * stages.length) & (stages.length > 0)] = Doubt.BEYOND
-    why[farther] = Doubt.BEYOND
-    return why
+        missed = missed | (stages.scales[:, bristles].min(axis=1) < RESOLVED_BRISTLES * stages.length)
+    wide = dead_band(stages.flat) >= settings.wide_dead_zone * stages.length
+    return np.asarray(missed | (wide & (stages.length > 0)))
 
 
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:

@@ -71,6 +71,10 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
         ],
         "meetings": [_meeting(meeting, keys) for meeting in boundary.curve_meetings(traced)],
         "lost": _numbers(boundary.lost_places(traced), keys),
+        "beyond_curves": [
+            dict(zip(("hunts_at", "settles_at"), _numbers(end, keys), strict=True))
+            for end in boundary.last_ends(traced)
+        ],
         "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
     }
 

@@ -36,6 +36,9 @@ LOST = "a change, no curve begun"
 LOST_END = "cycle not followed farther"
 """Label of ends of curves inside the range."""
 
+BEYOND_CURVES = "hunting ends here, by another swing"
+"""Label of places beyond a curve where the last motion that attracts ends."""
+
 MEETING = "curves meet"
 """Label of places where two curves cross, end on each other, or begin or cease to coincide."""
 
@@ -143,6 +146,7 @@ def _plane(traced: Plane) -> Figure:
         *_marks(boundary.lost_places(traced), LOST, GREY, "cross"),
         *_marks(lost_ends, LOST_END, GREY, "triangle"),
         *_marks(meetings, MEETING, GREEN, "target"),
+        *_marks([end.mean(axis=0) for end in boundary.last_ends(traced)], BEYOND_CURVES, VERMILLION, "circle"),
     )
     return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, marks, clouds=(nodes,)),), note=note)
 

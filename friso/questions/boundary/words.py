@@ -128,7 +128,8 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
         longest = sorted(range(len(curves)), key=lambda number: -len(curves[number].at))[:SHOWN_CURVES]
         more = [f"There are {len(curves) - len(longest)} more curves."] if len(curves) > len(longest) else []
         courses = [f"{_course(traced, number, keys, END_DIGITS)}." for number in longest]
-        return " ".join([_hunting_corners(traced, keys), *courses, *more, *_first_meetings(traced, keys)])
+        answer = [_hunting_corners(traced, keys), *courses, *more, *_beyond_curves(traced)]
+        return " ".join([*answer, *_first_meetings(traced, keys)])
     if traced.gaps or UNKNOWN in verdicts:
         return f"{_hunting_corners(traced, keys)} No curve could be followed."
     return f"{_hunting_corners(traced, keys)} {_no_boundary(traced.space, keys)}"
@@ -156,6 +157,13 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
     beyond = [f"{ends(k)} at {at(k)}" for k in dict.fromkeys(farther) if ends(k) not in (ends(0), ends(-1))]
     between = f", {side} {listed(beyond, 'and')} in between" if beyond else ""
     return f"{answer}{between}; {other}, none was found."
+
+
+def _beyond_curves(traced: Plane) -> list[str]:
+    """Say that hunting goes on beyond the curves, by another cycle or swing; empty if it does not."""
+    count = len(traced.last_ends)
+    places = f"{count} place{'s' if count > 1 else ''} where the grid was searched"
+    return [f"Beyond the curves another cycle or swing goes on hunting, at {places}."] if count else []
 
 
 def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:

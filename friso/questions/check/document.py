@@ -81,7 +81,7 @@ def _case(case: hunting.Case) -> dict[str, Any]:
         "cycle": _cycle(judgement.cycle) if judgement.cycle else None,
         "cycles": len(judgement.hunting.cycles),
         "reason": judgement.hunting.reason or None,
-        "doubt": reason.name.lower() if isinstance(reason := judgement.hunting.reason, hunting.Doubt) else None,
+        "doubt": reason.name.lower() if isinstance(reason := judgement.hunting.reason, hunting.HuntingDoubt) else None,
         "settled_after_s": judgement.settled_after,
         "margin": _margin(judgement.margin) if judgement.margin else None,
         "windows": _windows(judgement.windows),

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
-from friso.hunting.boundary.settings import continuation_settings
+from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, described
 from friso.hunting.cycle.shooting import Border, Condition, ConditionSearch, Family, Followed, close_along

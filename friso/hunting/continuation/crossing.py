@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from friso.hunting.boundary.settings import continuation_settings
+from friso.hunting.continuation.settings import continuation_settings
 
 
 class Crossing(NamedTuple):

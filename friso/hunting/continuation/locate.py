@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.crossing import crossing, turn
-from friso.hunting.boundary.settings import continuation_settings
+from friso.hunting.continuation.branch import Branch, Point, Tracer
+from friso.hunting.continuation.crossing import crossing, turn
+from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.multipliers import decisive_of
 from friso.hunting.cycle.shooting import Condition
 

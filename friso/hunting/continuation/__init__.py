@@ -1,0 +1,1 @@
+"""Follow limit cycles along a line of stages, and locate where they lose stability."""
