@@ -108,8 +108,8 @@ class FakeCase:
     runs_away: bool = False
     feeding: Any = None
     static_friction: Any = None
-    advice_keeps_friction: bool | None = None
-    slower_keeps_friction: bool | None = None
+    faster: Any = None
+    slower: Any = None
     dwells: tuple[Any, ...] = ()
     tracking: Any = None
 

@@ -207,7 +207,7 @@ def test_a_force_limit_that_keeps_a_stage_off_its_reference_is_named(
 ) -> None:
     changes = {"controller.force_limit": limit, "motion.duration": duration}
     answer = friso.check(VARIANTS["rigid, van Dijk, limit"].replace(changes))
-    why = "Its force is at most controller.force_limit, 2.50 N, and break-away takes 3.00 N."
+    why = "with its force at controller.force_limit, 2.50 N, and break-away takes 3.00 N"
     assert answer["given"].force_limit == at
     assert (why in answer.sentences()[0]) == (at is not None)
 

@@ -33,11 +33,12 @@ from patched import patched
 from snapshots import Snapshots
 
 from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing
+from friso.hunting.advice import advised
 from friso.hunting.criteria import Verdict
 from friso.questions.check.figures import check_figures, response_figure
 from friso.questions.check.page import check_html, conclusion, verdict_sentence
 from friso.questions.check.table import rows, rows_behind
-from friso.questions.check.words import answer, edge_text
+from friso.questions.check.words import answer, details_sentences, edge_text
 from friso.shown import pages
 from friso.shown.cases import COLOURS, ShownCase, shown_cases
 from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
@@ -244,8 +245,14 @@ def test_names_and_files_cannot_inject_markup():
 
 
 def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None, **changes: Any) -> str:
+    """All that is said of a made-up case, with the advice that its judgement leads to, and no more than three sentences
+    before the details."""
     case = replace(fake_case(stage=fake_stage(locked=locked)), judgement=judgement, **changes)
-    return verdict_sentence(ShownCase("given", "As given", "#000000", case), cases or {"given": case})
+    faster, slower = advised(case.stage, judgement, case.unstable_bandwidths, None, 0.0)
+    item, cases = ShownCase("given", "As given", "#000000", replace(case, faster=faster, slower=slower)), cases or {}
+    says = verdict_sentence(item, {"given": case, **cases})
+    assert len(re.findall(r"\.(?= [A-Z]|$)", says)) <= 3 + bool(case.unstable or case.unstable_as_built)
+    return " ".join([says, *details_sentences(item, {"given": case, **cases})])
 
 
 def after(fine: float | None, coarse: float | None) -> dict[str, Any]:
@@ -466,7 +473,7 @@ def test_no_conclusion_from_a_case_that_is_not_certain(locked: str, free: str) -
 def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it() -> None:
     """8 Hz: something attracts at 9.7496 Hz, nothing at 9.7984 Hz; 1.2 times that is rounded upward."""
     for edge in (SURE, UNSURE):
-        assert "to 11.8 Hz" in sentence(hunts(margin=edge))
+        assert "crossover 11.8 Hz" in sentence(hunts(margin=edge))
         assert ("(not certain: hunting was found up to 9.749 Hz)" in sentence(hunts(margin=edge))) != edge.certain
     below = sentence(settles(margin=replace(UNSURE, factor=0.91234, crossover=7.29872, quiet=0.92)))
     assert "7.298 Hz" in below
@@ -482,15 +489,15 @@ def test_windows_are_told_beside_the_edge() -> None:
     advised, 1/1.2 of it. Where it hunts again closely below, 4 Hz is advised. All are rounded down."""
     window, lower = AttractionEnd(5.0049, 4.96, True), AttractionEnd(0.505, 0.5004, True)
     assert "40.0 Hz" in sentence(hunts(windows=(BandwidthWindow(window, None),)))
-    assert "to 3.33 Hz" in sentence(hunts(lower=lower))
+    assert "crossover 3.33 Hz" in sentence(hunts(lower=lower))
     again = BandwidthWindow(None, AttractionEnd(0.45, 0.46, True))
-    assert "to 4.00 Hz" in sentence(hunts(lower=lower, windows=(again,)))
+    assert "crossover 4.00 Hz" in sentence(hunts(lower=lower, windows=(again,)))
     soon = BandwidthWindow(AttractionEnd(1.3, 1.29, True), None)  # 10.4 Hz: no room for a distance from the edge
-    assert "to 9.80 Hz" in sentence(hunts(margin=SURE, windows=(soon,)))
+    assert "crossover 9.80 Hz" in sentence(hunts(margin=SURE, windows=(soon,)))
     for low, high, to in ((1.3, 1.302, "11.8 Hz"), (1.3, 1.32, "9.80 Hz")):
         narrow = BandwidthWindow(AttractionEnd(low, low, False), AttractionEnd(high, high, False))
         says = sentence(hunts(margin=SURE, windows=(narrow,)))
-        assert f"to {to}" in says
+        assert f"crossover {to}" in says
         assert ("within a range" in says) == (high == 1.302)
     one = BandwidthWindow(AttractionEnd(0.39685, 0.393, False), AttractionEnd(0.39685, 0.4, False))  # seen at one value
     says = sentence(hunts(windows=(one,)))
@@ -530,15 +537,14 @@ def test_no_bandwidth_is_advised_at_which_the_loop_is_unstable() -> None:
     one from 9.6 Hz on no bandwidth above it is advised."""
     soon, at_once = (BandwidthWindow(AttractionEnd(low, 0.999 * low, True), None) for low in (1.3, 1.2))
     says = sentence(hunts(), unstable_bandwidths=(soon,))
-    assert "to 9.80 Hz" in says
-    assert "loop becomes unstable" in says
-    assert "hunting begins again" not in says
-    assert "to 9.80 Hz" not in sentence(hunts(), unstable_bandwidths=(at_once,))
-    assert "to 11.8 Hz" in sentence(hunts())
+    assert "crossover 9.80 Hz" in says
+    assert "just beyond" in says
+    assert "crossover 9.80 Hz" not in sentence(hunts(), unstable_bandwidths=(at_once,))
+    assert "crossover 11.8 Hz" in sentence(hunts())
     lower = AttractionEnd(0.5047, 0.5, True)
     below = BandwidthWindow(None, AttractionEnd(0.502, 0.5025, True))
-    assert "lower the bandwidth" in sentence(hunts(lower=lower))
-    assert "lower the bandwidth" not in sentence(hunts(lower=lower), unstable_bandwidths=(below,))
+    assert "crossover 3.33 Hz" in sentence(hunts(lower=lower))
+    assert "crossover 3.33 Hz" not in sentence(hunts(lower=lower), unstable_bandwidths=(below,))
 
 
 @given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))

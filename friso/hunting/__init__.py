@@ -4,6 +4,7 @@ They may also import from `friso.hunting.criteria` and `friso.hunting.measures`.
 change.
 """
 
+from friso.hunting.advice import Advice
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt, moves_that_hunt, pushes_that_hunt
@@ -65,6 +66,7 @@ __all__ = [
     "LONG_RUN_RTOL",
     "MORE_WORK",
     "SEARCH_LIMITS",
+    "Advice",
     "AttractionEnd",
     "BandwidthWindow",
     "Bifurcation",

@@ -18,6 +18,7 @@ from friso.engine.simulate import SIMULATION_RTOL, sampled_outputs, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.motion import size, stands
 from friso.equations.structure import structure
+from friso.hunting.advice import Advice, advised
 from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
@@ -28,9 +29,8 @@ from friso.hunting.margin import unstable_bandwidths
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.path import BandwidthWindow
-from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import ToleranceSettings, check_settings
-from friso.hunting.stage_margins import ParameterMargin, friction_margin, keeps_friction_margin
+from friso.hunting.stage_margins import ParameterMargin, friction_margin
 from friso.hunting.tracking import Dwell, Tracking, dwells, tracking
 from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
@@ -75,9 +75,7 @@ class Case:
     - `unstable_as_built`: states in which only sampling and delay make it unstable.
     - `feeding`: with a backlash, the cause without which hunting ends (None also if the search took too much work).
     - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
-    - `advice_keeps_friction`, `slower_keeps_friction`: whether the higher and the lower bandwidth advised, a factor
-      beyond the edge of hunting, still do not hunt with that factor more or less static friction (None: no such advice,
-      or unknown).
+    - `faster`, `slower`: bandwidths advised to a stage that hunts, or that settles close to hunting (None: no advice).
     - `dwells`: how the stage settles at each place, if its reference stands at more than two.
     - `tracking`: how it follows a reference that keeps moving (None: one that stands in the end).
     - `trace`: the time response, if asked for.
@@ -102,8 +100,8 @@ class Case:
     unstable_as_built: tuple[LoopState, ...] = ()
     feeding: Feeding | None = None
     static_friction: ParameterMargin | None = None
-    advice_keeps_friction: bool | None = None
-    slower_keeps_friction: bool | None = None
+    faster: Advice | None = None
+    slower: Advice | None = None
     dwells: tuple[Dwell, ...] = ()
     tracking: Tracking | None = None
     trace: xr.Dataset | None = None
@@ -248,15 +246,17 @@ def _case(
     if judgement.swing and structure(flat).plays:
         fed = _fed(stage, max(work - spent.used, check_settings.feeding_work_share * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
-    static_friction, keeps = None, (None, None)
+    static_friction, lost = None, unstable_bandwidths(stage) if judgement.hunting.possible else ()
     if margins:
         begin(CheckPart.FRICTION)
-        static_friction, keeps = _friction(stage, judgement, work)
+        with allowance(check_settings.friction_margin_work_share * work):
+            static_friction = friction_margin(stage, judgement)
         if static_friction and static_friction.open_sides:
             judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
     if stage.doubt:
         judgement = judgement.uncertain(stage.doubt)
         static_friction = static_friction and static_friction.uncertain()
+    faster, slower = advised(stage, judgement, lost, static_friction, work)
     breakaway = _breakaway(flat)
     # parts left out without an attractor count as done, too
     done.add(PART_COUNT - ended, CheckPart.FRICTION.progress_word)
@@ -276,13 +276,13 @@ def _case(
         breakaway=breakaway,
         force_limit=_holding_limit(flat, runs, judgement, breakaway) if status == Status.DONE else None,
         unstable=unstable(stage),
-        unstable_bandwidths=unstable_bandwidths(stage) if judgement.hunting.possible else (),
+        unstable_bandwidths=lost,
         feeding=fed,
         dwells=dwells(stage, rtol) if len(stands(flat)) > 2 and status == Status.DONE else (),
         tracking=tracking(stage, rtol) if keeps_moving(flat) else None,
         static_friction=static_friction,
-        advice_keeps_friction=keeps[0],
-        slower_keeps_friction=keeps[1],
+        faster=faster,
+        slower=slower,
         trace=simulate(stage, rtol) if traces else None,
     )
 
@@ -297,31 +297,6 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
             return feeding(stage)
     except Exhausted:
         return None
-
-
-def _friction(
-    stage: Stage, judgement: Judgement, work: float
-) -> tuple[ParameterMargin | None, tuple[bool | None, bool | None]]:
-    """Find what static friction starts or ends hunting, and whether the advice allows for it.
-
-    The second result is for the higher and the lower bandwidth advised: true if a stage with it does not hunt with
-    somewhat other static friction, and None if it is not advised. Each result is None if its allowance of work does not
-    suffice.
-    """
-    with allowance(check_settings.friction_margin_work_share * work):
-        margin = friction_margin(stage, judgement)
-    if margin is None or judgement.swing is None:
-        return margin, (None, None)
-    edge, lower = judgement.margin, judgement.slower_advised
-    higher = edge and edge.quiet * SEARCH_LIMITS.edge_distance
-
-    def kept(factor: float | None) -> bool | None:
-        """Tell whether the stage does not hunt with other static friction at a `factor` of its bandwidth."""
-        if factor is None or factor > SEARCH_LIMITS.highest_bandwidth:
-            return None
-        return keeps_friction_margin(stage, factor, check_settings.advice_work_share * work)
-
-    return margin, (kept(higher), kept(lower))
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:

@@ -13,7 +13,8 @@ class SearchLimits:
     factor of ten are `steps_to_edge` where an edge is looked for, and `steps_beyond` where hunting may come back.
     Windows narrower than a step may be missed. Static friction is searched up to `most_friction` times the stage's own,
     and down to its inverse, or to Coulomb friction. Advice stays `edge_distance`, a factor, away from an edge, because
-    machines differ and searches may miss a window. Moves are drawn between `move_shares` of the acceleration, and of
+    machines differ and searches may miss a window. A window is narrow if its ends differ by less than the factor
+    `narrow_window`. Moves are drawn between `move_shares` of the acceleration, and of
     the acceleration time, in the stage file.
     """
 
@@ -22,6 +23,7 @@ class SearchLimits:
     steps_to_edge: int = 20
     steps_beyond: int = 10
     edge_distance: float = 1.2
+    narrow_window: float = 1.01
     most_friction: float = 3.0
     move_shares: tuple[float, float] = (0.1, 2.0)
 

@@ -219,6 +219,9 @@ class CheckSettings(Settings):
     advice_work_share: float = setting(0.1, "")
     """Work for two stages that show whether a bandwidth advised keeps a margin, as a fraction of that of a case."""
 
+    advised_steps: int = setting(4, "")
+    """Bandwidths tried for advice, each farther from the edge by the distance that advice keeps: up to twice."""
+
     check_work: float = setting(8e8, "")
     """Work of a check, about 10 s on one core. Stages that need more say what was left out."""
 

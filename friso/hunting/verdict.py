@@ -137,19 +137,6 @@ class Judgement:
             lower=unsure(self.lower),
         )
 
-    @property
-    def slower_advised(self) -> float | None:
-        """Return the lower bandwidth advised to a stage that hunts, as a factor of its own.
-
-        It keeps a distance from the end of hunting. Returns None without such an end, or if the distance leads below
-        the bandwidths searched, or to other bandwidths at which the stage hunts.
-        """
-        distance, end = SEARCH_LIMITS.edge_distance, self.lower
-        if end is None or (to := end.outside / distance) < SEARCH_LIMITS.lowest_bandwidth:
-            return None
-        highs = [window.high.inside for window in self.windows if window.high]
-        return None if any(to / distance <= high <= end.outside for high in highs) else to
-
 
 def judge(
     stage: Stage,

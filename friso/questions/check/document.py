@@ -87,7 +87,7 @@ def _case(case: hunting.Case) -> dict[str, Any]:
         "windows": _windows(judgement.windows),
         "settles_below": _end(judgement.lower),
         "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
-        **entries(case, "advice_keeps_friction", "slower_keeps_friction"),
+        "advice": {"faster": _advice(case.faster), "slower": _advice(case.slower)},
         "kick": _kick(judgement),
         "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
@@ -142,6 +142,11 @@ def _end(end: hunting.AttractionEnd | None) -> dict[str, Any] | None:
     if end is None:
         return None
     return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve", "kind")}
+
+
+def _advice(advice: hunting.Advice | None) -> dict[str, Any] | None:
+    """Return a bandwidth advised, as a factor of the stage's own; None without one."""
+    return advice and entries(advice, "factor", "just_beyond", "keeps_friction")
 
 
 def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:

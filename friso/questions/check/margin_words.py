@@ -11,8 +11,6 @@ from friso.equations.structure import carrying_force
 from friso.hunting import SEARCH_LIMITS, AttractionEnd, Case, ParameterMargin
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
-    digits_that_differ,
-    listed,
     range_with_unit,
     rounded_down,
     rounded_up,
@@ -22,15 +20,16 @@ from friso.stage.controllers import FORCE_LIMIT
 
 
 def friction_sentences(case: Case) -> list[str]:
-    """Say at which static friction hunting begins or ends.
+    """Say for which static friction the stage hunts, or does not.
 
     Nothing is said if this was not searched, or if the friction law does not separate static from Coulomb friction.
     """
     margin = case.static_friction
     if margin is None:
         return []
-    lowest = "Coulomb friction" if margin.range[0] > 1 / SEARCH_LIMITS.most_friction else ""
-    says = margin_sentence("static friction", margin, _forces(case, margin) or " (Coulomb friction held)", lowest)
+    pairs = static_frictions(case.stage.flat())
+    static = case.stage.flat()[next(iter(pairs))] if len(pairs) == 1 else None
+    says = margin_sentence("static friction", margin, static, "N", ", with Coulomb friction held")
     return [says, *_too_strong(case, margin)]
 
 
@@ -49,24 +48,39 @@ def _too_strong(case: Case, margin: ParameterMargin) -> list[str]:
     return [f"{held}, because the force limit cannot break it away."]
 
 
-def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest: str = "") -> str:
-    """Say at which values of a parameter hunting begins or ends.
+def margin_sentence(
+    name: str, margin: ParameterMargin, own: float | None = None, unit: str = "", remark: str = ""
+) -> str:
+    """Say over which range of a parameter a stage hunts, or does not.
 
-    `name` is the parameter in words, and `remark` is added to the sentence. `lowest` replaces the least multiple
-    searched by a word, such as "no stroke".
+    `name` is the parameter in words, `own` its value [SI `unit`] (None: multiples are told), and `remark` is added.
     """
-    does, starts = ("ends", "ends") if margin.attracts else ("begins", "starts")
-    sure = margin.sure and all(end.certain for end in (margin.below, margin.above) if end)
-    doubt = "" if sure else "; this is not certain"
-    left = listed([_side(side) for side in margin.open_sides], "and")
-    if left:
-        doubt += f"; {left} yours it was not determined"
-    if ways := margin_ways(margin):
-        return f"Hunting {does} with {name} {listed(ways, 'or')}{remark}{doubt}."
-    if left:
-        return f"Whether {name} {left} yours {starts} hunting was not determined."
-    low, high = margin.range
-    return f"No {name} tried from {lowest or f'{low:.2g}'} to {high:g} times yours {starts} hunting{remark}{doubt}."
+    open_ones = {side: f"{_side(side)} yours it was not determined" for side in margin.open_sides}
+    doubts = [] if margin.sure and all(end.certain for end in (margin.below, margin.above) if end) else ["not certain"]
+    doubt = f" ({'; '.join([*doubts, *open_ones.values()])})" if doubts or open_ones else ""
+    low, high = (_kept_to(margin, side) for side in (-1, 1))
+    distance = SEARCH_LIMITS.edge_distance
+    thin = any(max(end.outside, 1 / end.outside) < distance for end in (margin.below, margin.above) if end)
+    does = "Hunts" if margin.attracts else "No hunting" if thin else "Robust: no hunting"
+    if len(open_ones) == 2:
+        return f"Whether another {name} {'ends' if margin.attracts else 'starts'} hunting was not determined."
+    least, most = 1.0 if -1 in open_ones else low, 1.0 if 1 in open_ones else high
+    return f"{does} for {name} {_extent(least, most, own, unit)}{remark}{doubt}."
+
+
+def _kept_to(margin: ParameterMargin, side: int) -> float:
+    """Return the multiple of a parameter up to which nothing changes on a side, rounded towards the stage's own."""
+    end = margin.end(side)
+    if end is None:
+        return margin.range[max(side, 0)]
+    return (rounded_up if side < 0 else rounded_down)(margin.same(end))
+
+
+def _extent(low: float, high: float, own: float | None, unit: str) -> str:
+    """Write a range of multiples of a parameter whose value is `own` [SI `unit`]; of multiples if that is None."""
+    if own is None:
+        return f"{plain_factor(low)} to {plain_factor(high)} times yours"
+    return range_with_unit(rounded_up(low * own), rounded_down(high * own), unit)
 
 
 def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
@@ -74,7 +88,7 @@ def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
 
     `margins` holds the margins by their keys.
     """
-    return [margin_sentence(key.replace(".", " "), margin, " (joint free)") for key, margin in margins.items()]
+    return [margin_sentence(key.replace(".", " "), margin, remark=" (joint free)") for key, margin in margins.items()]
 
 
 def margin_ways(margin: ParameterMargin) -> list[str]:
@@ -128,24 +142,3 @@ def _factors(end: AttractionEnd) -> tuple[float, float]:
     """Return the multiples of a parameter between which hunting begins or ends, rounded as they are told."""
     low, high = sorted((end.inside, end.outside))
     return rounded_down(low), rounded_up(high)
-
-
-def _forces(case: Case, margin: ParameterMargin) -> str:
-    """Write static friction, and static minus Coulomb friction [N], where hunting begins or ends.
-
-    The numbers follow from the rounded multiples that stand before them, so that a reader finds one from another.
-    The text is empty for a stage with several friction laws, or unless hunting changes on one side only.
-    """
-    flat = case.stage.flat()
-    pairs = static_frictions(flat)
-    ends = [end for end in (margin.below, margin.above) if end]
-    if len(pairs) != 1 or len(ends) != 1:
-        return ""
-    ((static, coulomb),) = pairs.items()
-    (end,) = ends
-    held = flat[coulomb]
-    least, most = (max(flat[static] * factor, held) for factor in _factors(end))
-    above = range_with_unit(least - held, most - held, "N")
-    digits = digits_that_differ([least, most, held])
-    at = range_with_unit(least, most, "N", digits)
-    return f" ({at}: {above} above Coulomb friction, which is held at {with_unit(held, 'N', digits)})"

@@ -117,17 +117,22 @@ class CheckAnswer(Answer):
         return [*tables, behind]
 
     def details(self) -> Sequence[str]:
-        """Return what the search for the edge may miss, joint margins, and a doubt on friction.
+        """Return more on each case, what the search for the edge may miss, joint margins, and a doubt on friction.
 
         The doubt is that a friction law may give energy back, which no friction does.
         """
         from friso.questions.check.margin_words import joint_sentences
-        from friso.questions.check.words import between_surveyed
+        from friso.questions.check.words import between_surveyed, details_of
         from friso.questions.convert.words import activity_sentences
         from friso.stage.tables import passive_where
 
         activity = activity_sentences(passive_where(self.stage.flat()))
-        return [*between_surveyed(self.result), *joint_sentences(self.joint_margins), *activity]
+        return [
+            *details_of(self.result),
+            *between_surveyed(self.result),
+            *joint_sentences(self.joint_margins),
+            *activity,
+        ]
 
     def document_of_details(self) -> dict[str, Any]:
         """Return the margins in the joint's stroke and stiffness as a document."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from friso.equations.bandwidth import bandwidth
 from friso.hunting import (
     MORE_WORK,
     SEARCH_LIMITS,
+    Advice,
     AttractionEnd,
     BandwidthWindow,
     Case,
@@ -16,7 +17,6 @@ from friso.hunting import (
     Decline,
     Feeding,
     Kick,
-    Margin,
     MoveShare,
 )
 from friso.hunting.criteria import ATTRACTED, Verdict
@@ -63,9 +63,6 @@ IN_SHORT: Mapping[Verdict, str] = {
 }
 """Words for the verdict on a stage before its margin is known."""
 
-ONE_PLACE = 1.01
-"""Ratio of the ends of a window of bandwidths below which its centre and its greatest width are stated instead."""
-
 ROUGH_EDGE = 5e-4
 """Relative uncertainty of an edge above which it is mentioned, because the shown digits are not certain."""
 
@@ -74,26 +71,46 @@ ROUGHER = 10 * ROUGH_EDGE
 
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
-    """Say what the stage does in one case, such as with its joint locked, and what to do.
+    """Say in at most three sentences what the stage does in one case, what to do, and how far it is from changing.
 
     `cases` holds all cases of the check, so that advice on one may use the others.
     """
-    case = item.case
-    says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
-    says |= {"none": _following}
-    if case.runs_away:
-        return _after_loop(case, "runs away from its reference for good.")
-    if case.verdict not in says and case.solver.done:
-        return _after_loop(case, _UNFINISHED)
-    if case.verdict not in says:
-        return _after_loop(case, f"could not be simulated to the end of its motion ({case.solver.status}).")
+    case, first = item.case, _verdict(item.case)
+    if case.runs_away or case.verdict not in _SAYS:
+        return _after_loop(case, first[0])
+    after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
+    return _after_loop(
+        case, " ".join([f"{first[0][:-1]}{_doubt_of(case)}.", *after[:1], *friction_sentences(case)[:1]])
+    )
+
+
+def details_sentences(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
+    """Say more about one case: what feeds hunting, other bandwidths, dwells, and what was not determined."""
+    case, first = item.case, _verdict(item.case)
+    if case.runs_away or case.verdict not in _SAYS:
+        return []
+    attracted = case.verdict in ATTRACTED
     feeds = feeding_sentences(case.feeding) if case.feeding else []
     feeds += [f"{_too_much('What feeds it')}."] if CheckPart.FEEDING in case.judgement.given_up else []
-    after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
-    after += [*_loop_lost(case), *friction_sentences(case)]
-    stands = dwell_sentences(case.dwells) if case.verdict not in ATTRACTED else []
-    sentences = [says[case.verdict](case), *stands, *feeds, *_doubts(case), *_running_away(case), *after]
-    return _after_loop(case, " ".join(sentences))
+    after = _remedy(item, cases) if attracted else _outlook(case)
+    stands = [] if attracted else dwell_sentences(case.dwells)
+    return [*first[1:], *stands, *feeds, *after[1:], *_loop_lost(case), *friction_sentences(case)[1:]]
+
+
+def details_of(cases: Mapping[str, Case]) -> list[str]:
+    """Return the details of all cases, each with the name of its case."""
+    return [f"{item.label}: {text}" for item in shown_cases(cases) for text in details_sentences(item, cases)]
+
+
+def _verdict(case: Case) -> list[str]:
+    """Say what the stage does in one case; sentences after the first are details."""
+    if case.runs_away:
+        return ["runs away from its reference for good."]
+    if case.verdict in _SAYS:
+        return _SAYS[case.verdict](case)
+    if case.solver.done:
+        return [_UNFINISHED]
+    return [f"could not be simulated to the end of its motion ({case.solver.status})."]
 
 
 def _after_loop(case: Case, sentences: str) -> str:
@@ -162,39 +179,40 @@ def at_the_end(case: Case) -> str:
     return length_at_rest(case.peak_to_peak)
 
 
-def _hunting(case: Case) -> str:
+def _hunting(case: Case) -> list[str]:
     """Describe a stage that hunts, and say whether the verdict rests on simulations alone."""
-    if not case.judgement.observed:
-        return f"hunts, {_swing(case)}."
-    seen = "This rests on long simulations: no attracting orbit could be closed."
-    if case.judgement.hunting.passing:
-        return f"hunts, {_swing(case)} when its run was stopped. {seen}"
-    if case.judgement.swing:
-        return f"hunts, {_swing(case)}. {seen}"
-    size, after = with_unit(case.judgement.lasting, "m"), with_unit(case.judgement.followed, "s")
-    return f"hunts, still {size} peak to peak after {after}. {seen}"
+    judgement, seen = case.judgement, ["This rests on long simulations: no attracting orbit could be closed."]
+    if not judgement.observed:
+        return [f"hunts, {_swing(case)}."]
+    if judgement.hunting.passing:
+        return [f"hunts, {_swing(case)} when its run was stopped.", *seen]
+    if judgement.swing:
+        return [f"hunts, {_swing(case)}.", *seen]
+    size, after = with_unit(judgement.lasting, "m"), with_unit(judgement.followed, "s")
+    return [f"hunts, still {size} peak to peak after {after}.", *seen]
 
 
-def _bistable(case: Case) -> str:
+def _bistable(case: Case) -> list[str]:
     """Describe a stage that settles after this move but hunts after others.
 
-    The sentences name the smallest kicks, and the fraction of moves, that start hunting.
+    The sentence names the smallest kicks, and the fraction of moves, that start hunting.
     """
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
-        spread = f"spread evenly over {moves_tried(case, moves)}"
-        starts.append(f"{percent(moves.fraction)} of the {moves.count} moves tried ({spread})")
+        starts.append(f"{percent(moves.fraction)} of the {moves.count} moves tried")
     first = f"settles after this move{_later(case)}{_stuck(case)}"
     if not starts and CheckPart.STARTS in case.judgement.given_up:
-        return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
+        return [f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."]
     if case.judgement.hunting.passing:
         after = _AFTERWARDS[case.judgement.hunting.lower_gains or "unknown"]
-        return f"{first}, but another move or a kick may start a swing that {after}."
+        return [f"{first}, but another move or a kick may start a swing that {after}."]
     if not starts:
-        return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
-    seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
-    return f"{first}, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
+        return [f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."]
+    seen = ["Hunting was observed in simulations; no orbit that attracts could be closed."]
+    drawn = [f"Moves were spread evenly over {moves_tried(case, moves)}."] if moves and moves.hunting else []
+    says = f"{first}, but {listed(starts, 'or')} can start hunting, {_swing(case)}."
+    return [says, *(seen if case.judgement.observed else []), *drawn]
 
 
 def moves_tried(case: Case, moves: MoveShare) -> str:
@@ -208,10 +226,10 @@ def moves_tried(case: Case, moves: MoveShare) -> str:
     return listed(ranges, "and")
 
 
-def _following(case: Case) -> str:
+def _following(case: Case) -> list[str]:
     """Describe a stage whose reference keeps moving; there is no verdict on its hunting."""
     follows = following_sentence(case.tracking) if case.tracking else "could not be followed on its periodic response."
-    return f"{follows} There is no verdict on hunting, because {case.judgement.hunting.reason}."
+    return [f"{follows} There is no verdict on hunting, because {case.judgement.hunting.reason}."]
 
 
 def _too_much(what: str) -> str:
@@ -225,7 +243,7 @@ def _kick(name: str, kick: Kick, unit: str) -> str:
     return f"a {name} of {with_unit(least, unit)}{' (the smallest tried)' if least == kick.searched[0] else ''}"
 
 
-def _transient(case: Case) -> str:
+def _transient(case: Case) -> list[str]:
     """Describe a stage without attracting cycle that has not settled at the end of its run.
 
     The sentences say how fast it settles afterwards, or what keeps it from its reference.
@@ -233,33 +251,26 @@ def _transient(case: Case) -> str:
     judgement, end = case.judgement, _end(case)
     if not judgement.hunting.possible:
         if case.tracking:
-            return f"{following_sentence(case.tracking)} It cannot hunt, because {judgement.hunting.reason}."
+            return [f"{following_sentence(case.tracking)} It cannot hunt, because {judgement.hunting.reason}."]
         cannot = f"cannot hunt, because {judgement.hunting.reason}; but this motion "
-        says = f"{cannot if judgement.hunting.certain else ''}has not settled at its end ({end})."
-        return " ".join([says, *_held(case)])
-    attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
-    says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
+        return [f"{cannot if judgement.hunting.certain else ''}has not settled at its end ({end}){_held(case)}."]
     leaks = _held_by_a_leak(case)
     if leaks and case.peak_to_peak < _TEN_MICRON and judgement.hunting.certain and not judgement.runs_away:
         stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
-        return f"does not hunt ({attracts}), but {leaks}{stays}."
-    chance = ""
+        return [f"does not hunt, but {leaks}{stays}."]
+    first = f"does not hunt, but has not settled at the end of its run ({end}){_held(case)}"
+    if judgement.runs_away:
+        first += "; afterwards it runs away from its reference"
+    elif judgement.settled_after is not None:
+        first += f"; it settles to within {band_text(_TEN_MICRON)} in {with_unit(judgement.settled_after, 's')}"
+    elif judgement.followed is not None:
+        first += f"; it does not in {with_unit(judgement.followed, 's')} either"
+    seen_to_its_end = judgement.settled_after or judgement.followed or judgement.runs_away
+    more = [] if seen_to_its_end else [f"{_too_much('How long it takes to settle')}."]
     if judgement.cycle:
         grows = f"a factor of e in {with_unit(judgement.cycle.time_constant, 's')}"
-        says.append(f"Beside its unstable cycle, deviations grow by {grows}.")
-        chance = ", a time that the least disturbance changes if the motion comes near that cycle"
-    if judgement.runs_away:
-        says.append("Afterwards it runs away from its reference.")
-    elif judgement.settled_after is None and judgement.followed is None:
-        says.append(f"{_too_much('How long it takes to settle')}.")
-    elif judgement.settled_after is None:
-        says.append(
-            f"It does not settle to within {band_text(_TEN_MICRON)} in {with_unit(judgement.followed, 's')} either."
-        )
-    else:
-        time = with_unit(judgement.settled_after, "s")
-        says.append(f"It settles to within {band_text(_TEN_MICRON)} in {time}{chance}.")
-    return " ".join(says)
+        more.append(f"Beside its unstable cycle, deviations grow by {grows}: a disturbance there changes this time.")
+    return [f"{first}.", *more]
 
 
 def _held_by_a_leak(case: Case) -> str:
@@ -269,13 +280,13 @@ def _held_by_a_leak(case: Case) -> str:
     return f"rests {length_at_rest(abs(case.offset))} off its reference: the leak of its integral holds it there"
 
 
-def _held(case: Case) -> list[str]:
+def _held(case: Case) -> str:
     """Say how large the force limit is, and if break-away takes more; empty without a limit."""
     if case.force_limit is None:
-        return []
+        return ""
     limit, least = _forces(case.force_limit, case.breakaway)
     more = f", and break-away takes {least}" if case.force_limit < case.breakaway else ""
-    return [f"Its force is at most {FORCE_LIMIT}, {limit}{more}."]
+    return f", with its force at {FORCE_LIMIT}, {limit}{more}"
 
 
 def _forces(*forces: float) -> list[str]:
@@ -284,11 +295,12 @@ def _forces(*forces: float) -> list[str]:
     return [with_unit(force, "N", digits) for force in forces]
 
 
-def _settling(case: Case) -> str:
+def _settling(case: Case) -> list[str]:
     """Describe a stage that settles, and say why it cannot hunt, if that is certain."""
-    hunting = case.judgement.hunting
-    says = _settling_sentence(case)
-    return says if hunting.possible or not hunting.certain else f"{says} It cannot hunt, because {hunting.reason}."
+    hunting, says = case.judgement.hunting, _settling_sentence(case)
+    if not hunting.possible and hunting.certain:
+        return [f"{says[:-1]}; it cannot hunt, because {hunting.reason}."]
+    return [f"{says[:-1]}, barely." if thin_margins(case) else says]
 
 
 def _later(case: Case) -> str:
@@ -328,7 +340,7 @@ def _settling_sentence(case: Case) -> str:
     if far := _at_the_far_end(case, _TEN_MICRON):
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(case.in_the_end[_TEN_MICRON] or 0.0, 's')}"
         return f"{within}{stuck}, but not{far}."
-    return " ".join([f"settles{stuck}, but not to within {band_text(_TEN_MICRON)} ({_end(case)}).", *_held(case)])
+    return f"settles{stuck}, but not to within {band_text(_TEN_MICRON)} ({_end(case)}){_held(case)}."
 
 
 def _at_the_far_end(case: Case, band: float) -> str:
@@ -343,26 +355,20 @@ def _small_swing(case: Case) -> str:
     return f": at its end it swings by {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
 
 
-def _doubts(case: Case) -> Iterator[str]:
-    """Yield why the verdict is not certain, if it is not."""
+def _doubt_of(case: Case) -> str:
+    """Say why the verdict is not certain, as the end of its sentence; empty if it is certain."""
     hunting = case.judgement.hunting
-    if not hunting.certain:
-        searched = hunting.target or hunting.reason == case.stage.doubt
-        yield f"This is not certain ({hunting.reason}){'' if searched else ': other motions may end in hunting'}."
+    return "" if hunting.certain else f" (not certain: {hunting.reason})"
 
 
-def _running_away(case: Case) -> list[str]:
-    """Say that large motions grow without bound, or may do so, and what prevents it."""
-    cause = 'set controller.anti_windup, which is "none", to "clamp".'
+def _running_away(case: Case) -> str:
+    """Say that large motions grow without bound, or may do so, and what prevents it; empty if they do not."""
+    cause = 'set controller.anti_windup, which is "none", to "clamp"'
     if (away := case.judgement.running_away) and away.windows:
-        least = with_unit(away.windows[0][0], "m")
-        return [f"It runs away after a displacement of {least}{_or_more(away)}: {cause}"]
-    return {
-        None: [],
-        "stable": [],
-        "unstable": [f"Large motions may run away: {cause}"],
-        "unknown": [f"It is not known whether large motions run away: {cause}"],
-    }[case.judgement.hunting.lower_gains]
+        return f"it runs away after a displacement of {with_unit(away.windows[0][0], 'm')}{_or_more(away)}: {cause}"
+    may = {"unstable": "large motions may run away", "unknown": "it is not known whether large motions run away"}
+    says = may.get(case.judgement.hunting.lower_gains or "")
+    return f"{says}: {cause}" if says else ""
 
 
 def _or_more(kick: Kick) -> str:
@@ -371,14 +377,18 @@ def _or_more(kick: Kick) -> str:
 
 
 def _outlook(case: Case) -> list[str]:
-    """Say at which other bandwidths the stage hunts, or that none was found."""
-    judgement = case.judgement
+    """Say at which other bandwidths the stage hunts, or that none was found, and what makes a thin margin wider."""
+    judgement, away = case.judgement, _running_away(case)
     says: list[str] = []
     if judgement.margin and not _holds(case.unstable_bandwidths, judgement.margin.factor):
         up_to = "below" if judgement.margin.certain else "up to"
         says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
     elif not judgement.margin and judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
         says.append(f"No hunting was found down to {percent(SEARCH_LIMITS.lowest_bandwidth)} of this bandwidth.")
+    if case.verdict == "settles" and case.faster and case.faster.keeps_friction:
+        says.insert(0, f"{_capital(_to(case, case.faster))} gives it reserve.")
+    if away:
+        says.insert(0, f"{_capital(away)}.")
     return [*says, *_windows(case), *_unsearched(case)]
 
 
@@ -461,7 +471,7 @@ def _loop_lost(case: Case) -> list[str]:
 def _window(case: Case, window: BandwidthWindow) -> str:
     """Write a range of bandwidths, such as one beyond the edge of hunting in which the stage hunts again."""
     low, high = window.low, window.high
-    if low and high and high.inside < low.inside * ONE_PLACE:
+    if low and high and high.inside < low.inside * SEARCH_LIMITS.narrow_window:
         width = percent(high.outside / low.outside - 1)
         middle = (low.inside + high.inside) / 2
         return f"within a range of at most {width} about {_bandwidth(case, middle, up=None, digits=5)}"
@@ -491,24 +501,26 @@ def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """Say what keeps a stage from hunting: a faster or slower controller, or a free joint."""
-    judgement = item.case.judgement
+    case, judgement = item.case, item.case.judgement
     grows = judgement.hunting.passing and judgement.hunting.lower_gains == "unstable"  # the faster the loop, the sooner
-    edge, lower, lost = judgement.margin, judgement.lower, item.case.unstable_bandwidths
-    ways = [_faster(item.case, edge)] if edge and not grows and not _holds(lost, edge.quiet) else []
-    ways += [_slower(item.case, lower)] if lower and not _holds(lost, lower.outside) else []
+    ways = [_to(case, case.faster)] if case.faster and not grows else []
+    ways += [_to(case, case.slower)] if case.slower else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
-    says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
+    away = _running_away(case)
+    cure = [f"Cure: {listed(ways, 'or')}{away and f'; {away}'}."] if ways else [f"{_capital(away)}."] if away else []
     if judgement.margin or CheckPart.BANDWIDTHS in judgement.given_up:
-        return [*says, *_windows(item.case), *_unsearched(item.case)]
+        return [*cure, *_windows(case), *_unsearched(case)]
     if judgement.hunting.target is None:
-        return says
+        return cure
+    still = "is still possible" if judgement.hunting.certain else "was still found"
+    highest = f"{still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth"
+    to_the_top = (
+        f"{still} up to where the loop itself is unstable" if _holds(case.unstable_bandwidths, math.inf) else highest
+    )
+    tune = "" if ways else "; friso tune looks for other settings"
     given_up = CheckPart.LOWER_BANDWIDTHS in judgement.given_up
     open_below = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
-    still = "is still possible" if judgement.hunting.certain else "was still found"
-    tune = "" if ways else " friso tune looks for other settings."
-    highest = f"{still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth"
-    to_the_top = f"{still} up to where the loop itself is unstable" if _holds(lost, math.inf) else highest
-    return [f"Hunting {to_the_top}.{tune}", *says, *open_below]
+    return [*cure, f"Hunting {to_the_top}{tune}.", *open_below]
 
 
 def _holds(windows: Iterable[BandwidthWindow], factor: float) -> bool:
@@ -516,82 +528,34 @@ def _holds(windows: Iterable[BandwidthWindow], factor: float) -> bool:
     return any(window.holds(factor) for window in windows)
 
 
-def _slower(case: Case, end: AttractionEnd) -> str:
-    """Say to which bandwidth the controller has to be slowed down for the stage to settle.
-
-    `end` is the lower end of the bandwidths at which hunting attracts. The bandwidth advised keeps a distance from it,
-    unless the stage hunts, or its loop is unstable, closely below. The text says if the end is not certain.
-    """
-    doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
-    distance, to = SEARCH_LIMITS.edge_distance, case.judgement.slower_advised
-    near = [window.high for window in case.unstable_bandwidths if window.high]
-    if to is None or any(to <= high.inside <= end.outside for high in near):
-        return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)} (just below the edge){doubt}"
-    kept = f"at most 1/{distance:g} of the edge of hunting{_with_other_friction(case, case.slower_keeps_friction)}"
-    return f"lower the bandwidth to {_bandwidth(case, to, up=False)} ({kept}){doubt}"
-
-
-def _faster(case: Case, edge: Margin) -> str:
-    """Say how much faster the controller has to be for the stage to settle.
-
-    The bandwidth advised keeps a distance from the edge of hunting.
-    """
-    controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
-    apart = _distance(case, edge)
-    near = {"the loop becomes unstable": case.unstable_bandwidths, "hunting begins again": case.judgement.windows}
-    why = next((f": {comes} closely" for comes, windows in near.items() if _again(edge, windows)), "")
-    kept = (
-        f", at least {apart:g} times the edge of hunting{_with_other_friction(case, case.advice_keeps_friction)}"
-        if apart > 1
-        else f", just above the edge{why}"
-    )
-    doubt = "" if edge.certain else f" (not certain: hunting was found up to {highest})"
-    if edge.crossover is not None:
-        crossover = edge.crossover / edge.factor
-        to = rounded_up(crossover * edge.quiet * apart)
-        by = rounded_up(to - crossover)
-        name = _elsewhere(case) or f"the {controller.bandwidth_name}"
-        return f"raise {name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}{kept}){doubt}"
-    factor = rounded_up(edge.quiet * apart)
-    powers = controller.speeds_up.items()
-    gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
-    return f"make the controller {plain_factor(factor)} times faster{kept} ({', '.join(gains)}){doubt}"
+def _to(case: Case, advice: Advice) -> str:
+    """Name the bandwidth advised, with the edge of hunting, and what it does not allow for."""
+    up, crossover = advice.factor >= 1, _present_bandwidth(case)
+    edge = advice.edge
+    known = _bandwidth(case, edge.inside, up=None) if edge.inside != edge.outside else ""
+    remarks = [f"edge {known}"] if known and edge.certain else []
+    if not edge.certain:
+        found = _bandwidth(case, edge.inside, up=not up, digits=4)
+        remarks.append(f"not certain: hunting was found {'up' if up else 'down'} to {found}")
+    if advice.just_beyond:
+        remarks.append("just beyond it, as more would not be safe")
+    if advice.keeps_friction is not None:
+        friction = other_static_friction(case.stage.flat())
+        remarks.append(f"also {friction}" if advice.keeps_friction else f"but hunting returns there {friction}")
+    remark = f" ({'; '.join(remarks)})" if remarks else ""
+    if crossover is not None:
+        name = _elsewhere(case) or case.stage.controller.bandwidth_name
+        value = (rounded_up if up else rounded_down)(advice.factor * crossover)
+        return f"{name.replace('_', ' ') if '.' not in name else name} {with_unit(value, 'Hz')}{remark}"
+    factor = (rounded_up if up else rounded_down)(advice.factor)
+    powers = case.stage.controller.speeds_up.items()
+    gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(case.stage.controller, name)]
+    return f"a controller {plain_factor(factor)} times as fast ({', '.join(gains)}){remark}"
 
 
-def _with_other_friction(case: Case, kept: bool | None) -> str:
-    """Say whether the bandwidth advised is `kept` free of hunting with other static friction.
-
-    The text is empty if this was not examined.
-    """
-    friction = other_static_friction(case.stage.flat())
-    says = f"; nor does it hunt there {friction}" if kept else f"; but hunting returns there {friction}"
-    return "" if kept is None else says
-
-
-def _distance(case: Case, edge: Margin) -> float:
-    """Return the factor by which the bandwidth advised lies above the edge of hunting.
-
-    Usually it is the distance that advice keeps. It is 1 if within that distance the stage hunts again, or its loop is
-    unstable, over a range wide or close enough to matter. It is also 1 if the distance leads beyond the bandwidths
-    searched.
-    """
-    distance = SEARCH_LIMITS.edge_distance
-    again = _again(edge, (*case.judgement.windows, *case.unstable_bandwidths))
-    return 1.0 if again or edge.quiet * distance > SEARCH_LIMITS.highest_bandwidth else distance
-
-
-def _again(edge: Margin, windows: Iterable[BandwidthWindow]) -> bool:
-    """Tell whether a window of bandwidths lies between the edge of hunting and the bandwidth advised.
-
-    A narrow window well below the bandwidth advised does not count.
-    """
-    to = edge.quiet * SEARCH_LIMITS.edge_distance
-    return any(
-        edge.factor < low.inside <= to * (1 + ROUGH_EDGE)
-        and (high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2))
-        for low, high in ((window.low, window.high) for window in windows)
-        if low is not None
-    )
+def _capital(text: str) -> str:
+    """Return a text with a capital letter."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
@@ -654,3 +618,13 @@ def _doubt(*declines: Decline) -> list[str]:
     certain = all(decline.certain for decline in declines)
     doubt = "That is not certain: some simulations were given up, or swings too small for them to see may last."
     return [] if certain else [doubt]
+
+
+_SAYS: Mapping[str, Callable[[Case], list[str]]] = {
+    "hunts": _hunting,
+    "bistable": _bistable,
+    "transient": _transient,
+    "settles": _settling,
+    "none": _following,
+}
+"""Sentences for each verdict."""
