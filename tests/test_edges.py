@@ -13,8 +13,8 @@ from friso.errors import InputError, StageError
 from friso.identification.logs import mapping
 from friso.identification.logs.read import read_frequency_response
 from friso.stage import Stage, loads, numeric_keys, parse_set
-from friso.stage.files import parsed
 from friso.stage.plausible import implausible_values
+from friso.stage.tables_of_files import parsed
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")

@@ -25,7 +25,7 @@ from friso.equations.component import state
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
-from friso.stage.files import MOST_BYTES
+from friso.stage.tables_of_files import MOST_BYTES
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -18,7 +18,7 @@ from systems import posix
 import friso
 from friso.errors import InputError
 from friso.interface.inputs import stage_of
-from friso.stage.files import MOST_BYTES
+from friso.stage.tables_of_files import MOST_BYTES
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG = EXAMPLES / "thesis_rig.toml"

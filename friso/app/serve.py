@@ -23,7 +23,8 @@ from friso.app.work import Workshop
 from friso.errors import InputError
 from friso.interface.starting import example
 from friso.platform.early import SIGNALS
-from friso.stage.files import load, text_of
+from friso.stage.files import load
+from friso.stage.tables_of_files import text_of
 
 DEFAULT_PORT = 8741
 """Default port. Browsers keep the contents of a page by its port."""

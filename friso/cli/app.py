@@ -10,6 +10,7 @@ import io
 import logging
 import os
 import sys
+from collections.abc import Callable
 from contextvars import copy_context
 from typing import Annotated, Any, NoReturn, TextIO
 
@@ -167,6 +168,11 @@ def _run() -> int:
         log.removeHandler(messages)
 
 
+def _function_of(command: str) -> Callable[..., None] | None:
+    """Return the function of a command by its name; None for another name."""
+    return COMMANDS[command].function if command in COMMANDS else None
+
+
 def _failed(error: BaseException) -> int:
     """Report an error in one message and return the exit status.
 
@@ -178,7 +184,7 @@ def _failed(error: BaseException) -> int:
     if isinstance(error.__context__ if exits else error, BrokenPipeError):
         sys.stderr.close()
         return 1
-    wrong = error if isinstance(error, InputError) else number_refused(error, sys.argv[1:])
+    wrong = error if isinstance(error, InputError) else number_refused(error, sys.argv[1:], _function_of)
     if wrong is not None:
         say(f"{wrong}{parted_path(sys.argv[1:])}")
         return 2

@@ -13,7 +13,6 @@ from typing import Any, get_args, get_type_hints
 from typer import BadParameter
 from typer.models import ArgumentInfo
 
-from friso.cli.command import COMMANDS
 from friso.errors import InputError
 from friso.platform import paths
 from friso.platform.system import shell_word
@@ -62,16 +61,19 @@ def _named(function: Callable[..., None], name: str) -> tuple[str, str]:
 _NUMBERS = {int: "a whole number", float: "a number"}
 
 
-def number_refused(error: BaseException, arguments: Sequence[str]) -> InputError | None:
+def number_refused(
+    error: BaseException, arguments: Sequence[str], function_of: Callable[[str], Callable[..., None] | None]
+) -> InputError | None:
     """Return friso's error for an option with a missing number, or one out of range.
 
-    Returns None for any other error.
+    `function_of` returns the function of a command by its name (None: no such command). Returns None for any other
+    error.
     """
     parameter, context = (getattr(error, name, None) for name in ("param", "ctx"))
-    command = getattr(context, "info_name", None) or ""
-    if not isinstance(error, BadParameter) or parameter is None or command not in COMMANDS:
+    function = function_of(getattr(context, "info_name", None) or "")
+    if not isinstance(error, BadParameter) or parameter is None or function is None:
         return None
-    function, name = COMMANDS[command].function, str(parameter.name)
+    name = str(parameter.name)
     asked = get_type_hints(function, include_extras=True)[name]
     wanted, info = asked.__origin__, asked.__metadata__[0]
     kind = next((kind for kind in (wanted, *get_args(wanted)) if kind in _NUMBERS), None)

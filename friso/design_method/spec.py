@@ -18,9 +18,9 @@ from friso.errors import InputError, SpecError
 from friso.intervals import Interval, Span
 from friso.materials import materials
 from friso.quantities import Number, Quantity, Value, at_least_1, exactly, inside_0_1, non_negative, positive, quoted
-from friso.stage.files import parsed, text_of
 from friso.stage.flexure import leaf_count, unknown_material
 from friso.stage.section import Section, Table
+from friso.stage.tables_of_files import parsed, text_of
 
 
 @dataclass(frozen=True)

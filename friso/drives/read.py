@@ -18,7 +18,7 @@ from friso.escapes import one_line
 from friso.platform.paths import flaw_of
 from friso.quantities import quoted
 from friso.stage import Stage
-from friso.stage.files import text_of
+from friso.stage.tables_of_files import text_of
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from friso.errors import InputError, StageError
 from friso.quantities import Quantity, exactly, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
-from friso.stage.files import load_changed, load_tables
 from friso.stage.plausible import idle_encoder, implausible_values
 from friso.stage.rig import AS_BUILT, left_out
+from friso.stage.tables_of_files import load_changed, load_tables
 
 StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
 """A stage, the path of a stage file, or its tables as a dictionary."""

@@ -22,7 +22,7 @@ from friso.platform.interrupts import hold_interrupts
 from friso.platform.system import cause_of, check_free, shell_word
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
-from friso.stage.files import parsed, text_of
+from friso.stage.tables_of_files import parsed, text_of
 from friso.version import VERSION
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
-from friso.shown.drawing.figure import Figure
-from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
+from friso.shown.drawing.figure import IMAGE_FORMATS, Figure
+from friso.shown.drawing.images import ON_PAGE, Image, draw_beforehand, save
 
 Content = str | bytes | Callable[[Path], object] | None
 """Content of a file: a text, bytes, or a function that writes the file to a given path. None deletes the file of an
@@ -22,13 +22,13 @@ def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> d
 
     `forms` are the formats, by default all. An image is drawn when its file is written, or when a page shows it.
     """
-    forms = FORMATS if forms is None else (*forms,)
+    forms = IMAGE_FORMATS if forms is None else (*forms,)
     several = [image_files(figure, figure.name, forms, shown=[ON_PAGE]) for figure in figures]
     return {name: content for images in several for name, content in images.items()}
 
 
 def image_files(
-    figure: Figure, stem: str, forms: Iterable[str] = FORMATS, shown: Iterable[Image] = ()
+    figure: Figure, stem: str, forms: Iterable[str] = IMAGE_FORMATS, shown: Iterable[Image] = ()
 ) -> dict[str, Content]:
     """Return the files of a figure in some formats, with names that begin with `stem`.
 

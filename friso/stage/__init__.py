@@ -2,11 +2,12 @@
 
 from friso.quantities import Number, Quantity, Value
 from friso.stage.controllers import ControllerSection, register_controller
-from friso.stage.files import load, loads, parse_set, save
+from friso.stage.files import load, loads, save
 from friso.stage.lists import Several, Values, element_keys
 from friso.stage.section import Rule, Section
 from friso.stage.stage import Stage, numeric_keys, violations
 from friso.stage.tables import FrictionSection, register_friction
+from friso.stage.tables_of_files import parse_set
 
 __all__ = [
     "ControllerSection",

@@ -20,6 +20,7 @@ from friso.errors import InputError
 from friso.platform import paths
 from friso.quantities import quoted
 from friso.stage.stage import Stage
+from friso.stage.tables_of_files import read_stage
 
 Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
@@ -267,9 +268,7 @@ def near_words(word: str, words: Iterable[str]) -> str:
 
 def _read_stage(source: Any) -> Stage:
     """Return the stage of a file, or of tables in a mapping."""
-    from friso.stage.files import load
-
-    return Stage(**source) if isinstance(source, Mapping) else load(source)
+    return Stage(**source) if isinstance(source, Mapping) else read_stage(source)
 
 
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:

@@ -20,9 +20,9 @@ from friso.errors import InputError, StageError
 from friso.intervals import NORMAL_COVERAGE
 from friso.quantities import LARGEST_INTEGER, as_toml, percent, quoted
 from friso.stage.controllers import as_tuned
-from friso.stage.files import parsed, text_of
 from friso.stage.section import unknown_key
 from friso.stage.stage import Stage, violations
+from friso.stage.tables_of_files import parsed, text_of
 
 _EXPECTED = "a file with keys and the matrix of their correlations"
 _EXAMPLE = 'keys = ["friction.coulomb", "friction.viscous"] and matrix = [[1.0, -0.8], [-0.8, 1.0]]'

@@ -18,7 +18,7 @@ from friso.identification.logs.roles import role_of
 from friso.identification.logs.settings import settings
 from friso.platform.system import shell_word
 from friso.quantities import Bound, Quantity, as_toml, quoted
-from friso.stage.files import parsed, text_of
+from friso.stage.tables_of_files import parsed, text_of
 
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)

@@ -19,15 +19,15 @@ from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import caveats, failures, headline, meanings, own_place, verification
 from friso.questions.map.places import SHOWN, with_places
 from friso.questions.map.words import grouped, tallied, tally, variable
-from friso.shown.drawing.figure import Figure
-from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
+from friso.shown.drawing.figure import IMAGE_FORMATS, Figure
+from friso.shown.drawing.images import ON_PAGE, Image, draw_beforehand, save
 from friso.shown.drawing.packing import packed_json
 from friso.shown.files import Content
 from friso.shown.pages import Report, print_image, script
 from friso.shown.unknown import unknown_condition
 from friso.studies.traces import Traces
 
-FORMS = (*FORMATS, "html")
+FORMS = (*IMAGE_FORMATS, "html")
 """Suffixes of the files of a map."""
 
 PRINTED = ON_PAGE._replace(noted=False)
@@ -41,7 +41,7 @@ def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Trac
     runs that the page shows, or None if they are too many.
     """
     figure = marked_figure(runs, metric)
-    draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
+    draw_beforehand([figure], [*map(Image, IMAGE_FORMATS), PRINTED])
     files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
     return {**files, FORMS[-1]: map_html(runs, metric, rerun, draw(), figure)}
 

@@ -18,6 +18,9 @@ from friso.shown.drawing.palette import GREY
 
 Array = npt.NDArray[np.float64]
 Dash = Literal["solid", "dashed", "dotted"]
+IMAGE_FORMATS = ("png", "svg", "pdf")
+"""Formats of the image of a figure."""
+
 Symbol = Literal["circle", "triangle", "cross", "target", "patch"]
 
 

@@ -19,8 +19,6 @@ from friso.platform.helper_process import HelperProcess
 from friso.platform.system import usable_cores
 from friso.shown.drawing.figure import Figure
 
-FORMATS = ("png", "svg", "pdf")
-
 PROGRAM, MOST_PROCESSES = "friso.shown.drawing.artist", 2
 """Module that a drawing process runs, and the largest number of such processes."""
 
@@ -28,7 +26,7 @@ PROGRAM, MOST_PROCESSES = "friso.shown.drawing.artist", 2
 class Image(NamedTuple):
     """What is wanted of a figure's image: its format, and whether it has heading and note.
 
-    The format is one of FORMATS. An image without heading or note is cut off there.
+    The format is one of `IMAGE_FORMATS`. An image without heading or note is cut off there.
     """
 
     form: str
@@ -43,7 +41,8 @@ ON_PAGE = Image("svg", headed=False)
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
     """Return an image of a figure as the bytes of a file.
 
-    It has the heading if `headed`, and the note if `noted`. `form` is one of FORMATS. Raises ValueError for any other.
+    It has the heading if `headed`, and the note if `noted`. `form` is one of the formats
+    of images. Raises ValueError for any other.
     """
     if artists := _ARTISTS.get():
         drawn = artists.drawn(figure, Image(form, headed, noted))

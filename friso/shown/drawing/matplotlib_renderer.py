@@ -26,8 +26,7 @@ from matplotlib.transforms import Bbox
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.shown.drawing.drawable import drawable, word_ticks
-from friso.shown.drawing.figure import Band, Figure, Markers, Panel, Series
-from friso.shown.drawing.images import FORMATS
+from friso.shown.drawing.figure import IMAGE_FORMATS, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.matplotlib_maps import LINE_HEIGHT, add_colour_bars, add_footer, draw_coloured, footer_height
 from friso.shown.drawing.palette import GREY, INK
 
@@ -136,11 +135,11 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
     """Return the figure as the bytes of a file.
 
-    The image has the heading if `headed`, and the note if `noted`. `form` is one of FORMATS. Raises ValueError for any
-    other.
+    The image has the heading if `headed`, and the note if `noted`. `form` is one of the formats
+    of images. Raises ValueError for any other.
     """
-    if form not in FORMATS:
-        raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
+    if form not in IMAGE_FORMATS:
+        raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(IMAGE_FORMATS)}, e.g. 'png'")
     with _style():
         return _laid_out(figure).image(form, headed, noted)
 
