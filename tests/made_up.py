@@ -112,6 +112,7 @@ class FakeCase:
     slower: Any = None
     dwells: tuple[Any, ...] = ()
     tracking: Any = None
+    stick_slip: Any = None
 
     @property
     def verdict(self) -> str:

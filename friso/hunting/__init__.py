@@ -53,6 +53,7 @@ from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
 from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
+from friso.hunting.sliding import StickSlip
 from friso.hunting.stage_margins import ParameterMargin, joint_margins
 from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement
@@ -106,6 +107,7 @@ __all__ = [
     "Space",
     "Spot",
     "StageAttractors",
+    "StickSlip",
     "Swing",
     "Swinging",
     "Target",

@@ -30,6 +30,7 @@ from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.path import BandwidthWindow
 from friso.hunting.settings import ToleranceSettings, check_settings
+from friso.hunting.sliding import StickSlip, is_moved_evenly, stick_slip
 from friso.hunting.stage_margins import ParameterMargin, friction_margin
 from friso.hunting.tracking import Dwell, Tracking, dwells, tracking
 from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
@@ -78,6 +79,7 @@ class Case:
     - `faster`, `slower`: bandwidths advised to a stage that hunts, or that settles close to hunting (None: no advice).
     - `dwells`: how the stage settles at each place, if its reference stands at more than two.
     - `tracking`: how it follows a reference that keeps moving (None: one that stands in the end).
+    - `stick_slip`: at which constant speeds it sticks and slips, if its reference moves at one (None: not decided).
     - `trace`: the time response, if asked for.
     """
 
@@ -104,6 +106,7 @@ class Case:
     slower: Advice | None = None
     dwells: tuple[Dwell, ...] = ()
     tracking: Tracking | None = None
+    stick_slip: StickSlip | None = None
     trace: xr.Dataset | None = None
 
     @property
@@ -280,6 +283,7 @@ def _case(
         feeding=fed,
         dwells=dwells(stage, rtol) if len(stands(flat)) > 2 and status == Status.DONE else (),
         tracking=tracking(stage, rtol) if keeps_moving(flat) else None,
+        stick_slip=stick_slip(stage, work) if is_moved_evenly(stage) else None,
         static_friction=static_friction,
         faster=faster,
         slower=slower,

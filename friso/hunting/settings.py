@@ -304,6 +304,42 @@ class TrackingSettings(Settings):
     closed_distance: float = setting(1e-4, "of the scales of the states")
     """Largest distance between states one period apart on a closed response, of which three digits are shown."""
 
+    speeds_tried: tuple[float, float] = setting((3e-3, 300.0), "of the speed of the reference")
+    """Lowest and highest constant speed at which stick-slip is looked for."""
+
+    speed_count: int = setting(41, "")
+    """Speeds tried at first, a third apart. Ranges of stick-slip narrower than a step are missed."""
+
+    speeds_between: int = setting(8, "")
+    """Speeds tried between two with different results. They bracket the change to three per cent."""
+
+    swings_followed: float = setting(20.0, "")
+    """Length of a run at constant speed, in times of sticking, slipping and swinging of the loop."""
+
+    longer_run: float = setting(3.0, "")
+    """Length of the next run, which shows whether a swing lasts, in lengths of the last one."""
+
+    longer_runs: int = setting(2, "")
+    """Most runs that follow the first at a speed. A swing that changes slowly is not decided then."""
+
+    most_sliding_steps: int = setting(2_000_000, "")
+    """Most steps of a run at constant speed. A speed that needs more is not decided."""
+
+    no_swing_share: float = setting(1e-4, "of the deflection at break-away")
+    """Swing below which a stage slides smoothly."""
+
+    lasting_share: float = setting(0.8, "of the swing of the last run")
+    """Least swing of the next run that lasts."""
+
+    dying_share: float = setting(0.3, "of the swing of the last run")
+    """Largest swing of the next run that dies out."""
+
+    samples_of_a_course: int = setting(20_000, "")
+    """Samples of the run at the speed of the reference, some hundred in each swing."""
+
+    standing_speed_share: float = setting(0.02, "of the speed of the reference")
+    """Speed below which a stage stands."""
+
 
 tolerance_settings = ToleranceSettings.live()
 basin_settings = BasinSettings.live()

@@ -98,6 +98,7 @@ def _case(case: hunting.Case) -> dict[str, Any]:
         **({"feeding": _feeding(case.feeding)} if case.feeding else {}),
         **({"dwells": dwells_document(case.dwells)} if case.dwells else {}),
         **({"tracking": tracking_document(case.tracking)} if case.tracking else {}),
+        **({"stick_slip": _stick_slip(case.stick_slip)} if case.stick_slip else {}),
         "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],
         "certain": judgement.hunting.certain,
         "solver": entries(case.solver, "status", "steps", "rejected", "rtol"),
@@ -142,6 +143,16 @@ def _end(end: hunting.AttractionEnd | None) -> dict[str, Any] | None:
     if end is None:
         return None
     return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve", "kind")}
+
+
+def _stick_slip(found: hunting.StickSlip) -> dict[str, Any]:
+    """Return at which constant speeds the stage sticks and slips."""
+    return {
+        **entries(found, "lasts", "sticks", "period_s", "open_speeds"),
+        "swing_m": found.swing,
+        "speeds_m_per_s": [{"begins": below, "ends": above} for below, above in found.ranges],
+        "tried_m_per_s": found.tried,
+    }
 
 
 def _advice(advice: hunting.Advice | None) -> dict[str, Any] | None:

@@ -34,7 +34,7 @@ from friso.shown.drawing.prefixes import (
     with_unit,
 )
 from friso.shown.loop_words import unstable_where
-from friso.shown.motion_words import dwell_sentences, following_sentence
+from friso.shown.motion_words import dwell_sentences, following_sentence, stick_slip_sentences
 from friso.shown.unknown import if_so
 from friso.stage.controllers import FORCE_LIMIT, integral_leak
 from friso.stage.motion import motion_of
@@ -106,6 +106,8 @@ def _verdict(case: Case) -> list[str]:
     """Say what the stage does in one case; sentences after the first are details."""
     if case.runs_away:
         return ["runs away from its reference for good."]
+    if case.stick_slip:
+        return stick_slip_sentences(case.stick_slip, abs(case.stage.flat()["motion.velocity"]))
     if case.verdict in _SAYS:
         return _SAYS[case.verdict](case)
     if case.solver.done:

@@ -1,0 +1,164 @@
+"""Tell whether a stage that is moved at constant speed slides smoothly, or sticks and slips."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.engine.allowance import Exhausted, allowance
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.motions.ramp import VELOCITY
+from friso.equations.structure import structure
+from friso.hunting.attractors.rounds import SURVEY_RTOL
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.measures import LAST_QUARTER
+from friso.hunting.settings import tracking_settings
+from friso.stage import Stage
+from friso.stage.motion import DURATION
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """How a stage moves at the constant speed of its reference, and at other speeds, always from rest.
+
+    - `lasts`: its error keeps swinging (None: not decided); `sticks`: it stands still in each swing.
+    - `swing` [m] of the error, peak to peak, and `period` [s]: of the last quarter of a long run.
+    - `ranges`: speeds [m/s] at which the error keeps swinging, each from (none, swings) to (swings, none): the last
+      speed tried without and the first with a swing, and the reverse; None where the range reaches the end of the
+      search.
+    - `tried`: lowest and highest speed tried [m/s]; `open_speeds`: at how many of them it was not decided.
+    """
+
+    lasts: bool | None
+    sticks: bool
+    swing: float
+    period: float | None
+    ranges: tuple[tuple[tuple[float, float] | None, tuple[float, float] | None], ...]
+    tried: tuple[float, float]
+    open_speeds: int
+
+
+def is_moved_evenly(stage: Stage) -> bool:
+    """Tell whether the reference of a stage moves at one constant speed, against friction."""
+    flat = stage.flat()
+    return flat["motion.kind"] == "ramp" and bool(flat[VELOCITY]) and flat.get("friction.model", "none") != "none"
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def stick_slip(stage: Stage, work: float) -> StickSlip | None:
+    """Find out at which speeds a stage sticks and slips; None if that takes more than the given `work`.
+
+    Speeds are tried over some decades about that of the reference, and more closely where the result changes.
+    """
+    flat, own = stage.flat(), float(stage.flat()[VELOCITY])
+    factors, lasts, decided = np.ones(1), np.zeros(1, bool), np.zeros(1, bool)
+    try:
+        with allowance(work):
+            lasts, decided, swing = _lasting(flat, np.array([own]))
+            period, sticks = _course(flat, own) if lasts[0] else (None, False)
+    except Exhausted:
+        return None
+    own_lasts = bool(lasts[0]) if decided[0] else None
+    with suppress(Exhausted), allowance(work):
+        others = np.geomspace(*tracking_settings.speeds_tried, tracking_settings.speed_count)
+        for _ in range(2):
+            columns = zip((lasts, decided), _lasting(flat, own * others)[:2], strict=True)
+            lasts, decided = (np.append(*pair) for pair in columns)
+            factors = np.append(factors, others)
+            order = np.argsort(factors)
+            factors, lasts, decided = factors[order], lasts[order], decided[order]
+            changes = np.flatnonzero(decided[:-1] & decided[1:] & (lasts[:-1] != lasts[1:]))
+            if not changes.size:
+                break
+            count = tracking_settings.speeds_between + 2
+            others = np.concatenate([np.geomspace(factors[k], factors[k + 1], count)[1:-1] for k in changes])
+    speeds = abs(own) * factors
+    return StickSlip(
+        own_lasts,
+        sticks,
+        float(swing[0]),
+        period,
+        _ranges(speeds[decided], lasts[decided]),
+        (float(speeds[0]), float(speeds[-1])),
+        int(np.count_nonzero(~decided)),
+    )
+
+
+def _ranges(
+    speeds: np.ndarray, lasts: np.ndarray
+) -> tuple[tuple[tuple[float, float] | None, tuple[float, float] | None], ...]:
+    """Return the ranges of ascending speeds in which a swing lasts, each with the brackets of its ends."""
+    ends = np.flatnonzero(np.diff(lasts.astype(int), prepend=0, append=0))
+
+    def bracket(first: int, second: int) -> tuple[float, float]:
+        return float(speeds[first]), float(speeds[second])
+
+    return tuple(
+        (
+            bracket(first - 1, first) if first else None,
+            bracket(after - 1, after) if after < len(speeds) else None,
+        )
+        for first, after in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
+    )
+
+
+def _durations(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
+    """Return times [s] in which stages moved at these speeds stick and slip many times, (count,).
+
+    A swing takes as long as the reference needs to deflect the loop to break-away and back, and the loop to swing.
+    """
+    stage = Ensemble.held({**flat, VELOCITY: float(speeds[0])}, 1)
+    swing = 2 * np.pi / stage.number("rate")[0] + 2 * stage.length[0] / np.abs(speeds)
+    return np.asarray(tracking_settings.swings_followed * swing)
+
+
+def _lasting(flat: Mapping[str, Any], speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return at which speeds the error keeps swinging, where that is decided, and the swing [m], each (count,).
+
+    Each run is compared with a longer one, until its swing has lasted or is dying out.
+    """
+    shape, length = kernel(structure(flat)), float(Ensemble.held(flat, 1).length[0])
+    count = len(speeds)
+    lasts, decided, swings = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
+    left, durations = np.arange(count), _durations(flat, speeds)
+    for number in range(1 + tracking_settings.longer_runs):
+        moved = {**flat, VELOCITY: speeds[left], DURATION: durations[left]}
+        budget = tracking_settings.most_sliding_steps
+        options = RunOptions(SURVEY_RTOL, window=LAST_QUARTER, record_from=np.inf, least_swing=np.inf, budget=budget)
+        swing = np.full(len(left), np.nan)
+        for runs in run_chunks(shape, moved, len(left), options):
+            spread = runs.statistic("deviation_max") - runs.statistic("deviation_min")
+            swing[runs.numbers] = np.where(done(runs.results), spread, np.nan)
+        before = swings[left]
+        swings[left] = np.where(np.isfinite(swing), swing, before)
+        small = swing < tracking_settings.no_swing_share * length
+        if number:
+            lasts[left] = ~small & (swing > tracking_settings.lasting_share * before)
+        dies = small | (swing < tracking_settings.dying_share * before)
+        decided[left] = lasts[left] | dies
+        left = left[~decided[left] & np.isfinite(swing)]
+        if not left.size:
+            break
+        durations[left] *= tracking_settings.longer_run
+    return lasts, decided, swings
+
+
+def _course(flat: Mapping[str, Any], speed: float) -> tuple[float | None, bool]:
+    """Return the period of the error's swing [s] (None: too few swings), and whether the stage sticks in it."""
+    shape, duration = kernel(structure(flat)), float(_durations(flat, np.array([speed]))[0])
+    interval = duration / tracking_settings.samples_of_a_course
+    options = RunOptions(SURVEY_RTOL, interval=interval, record_from=np.inf, least_swing=np.inf)
+    (runs,) = run_chunks(shape, {**flat, DURATION: duration}, 1, options)
+    samples = runs.results.samples[0]
+    late = slice(int(LAST_QUARTER * len(samples)), None)
+    error = samples[late, shape.cart_position] - speed * np.arange(len(samples))[late] * interval
+    moved = np.diff(samples[late, shape.cart_position]) / (speed * interval)
+    middle = (error.max() + error.min()) / 2
+    rises = np.flatnonzero((error[:-1] < middle) & (error[1:] >= middle))
+    period = float(np.diff(rises).mean()) * interval if len(rises) > 2 else None
+    return period, bool((moved < tracking_settings.standing_speed_share).any())
