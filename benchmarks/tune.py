@@ -4,10 +4,10 @@ Options are `[--axes N ...] [--settings N] [--fresh N]`. Axes with four controll
 and with a parasitic mode (24, by their numbers) are tuned remedy by remedy, the joint kept. A Sobol sequence of
 settings over the same ranges is measured by the same moves and margins on the same machines. The best setting at which
 no machine hunts, and which meets the goal on a hundred others, is compared with the tuned one in the settling time of
-95 %. If tuning found nothing, anything that the brute search finds counts as missed. All tuned stages, including the
-least change, are measured on fresh machines, and the fraction that meets the goal is counted. `--thesis` tunes the rig
-of the thesis instead; `--findings` tests on it two statements about friction isolators: that they narrow the stable
-range of gains, and that they help less at some step sizes.
+95 %. If tuning found nothing, anything that the brute search finds counts as missed. All tuned stages are measured on
+fresh machines, and the fraction that meets the goal is counted. `--thesis` tunes the rig of the thesis instead;
+`--findings` tests on it two statements about friction isolators: that they narrow the stable range of gains, and that
+they help less at some step sizes.
 """
 
 from __future__ import annotations
@@ -238,11 +238,10 @@ def main() -> None:
         goal = advice.goal
         seconds = process_time() - begun
         machines = machines_of_search(stage, Correlations(), Budget(), advice.seed, goal, stage)
-        machines = machines.take(np.arange(Budget().machines))
         fresh = draw_fleet(stage, Correlations(), options.fresh, 77, goal.moves)
         for outcome in advice.outcomes:
             tuned_stage = outcome.stage if outcome.certainty == "works" else None
-            compared, share = ("", "", ""), ""  # the least change does not settle soonest
+            compared, share = ("", "", ""), ""  # the bandwidth does not settle soonest
             if outcome.remedy.name in {*options.ways} - {BANDWIDTH}:
                 search = Search(outcome.remedy, goal, machines, advice.machines, stage, Budget(), lambda label: None)
                 tuned = float(search.measured(outcome.shares[None]).settling[0]) if tuned_stage else np.inf

@@ -633,7 +633,7 @@ def test_what_stops_it_says_of_which_machine_and_gives_no_other_one_its_command(
         page.click("#tune")
     browsed.change({"masses.cart": "1.3 kg"})
     said = {"sentences": ["Found."], "tables": [], "details": [], "failure": "", "notes": [], "figures": []}
-    way = {"name": "gains: the least change", "toml": RIG.read_text(encoding="utf-8")}
+    way = {"name": "isolator and gains", "toml": RIG.read_text(encoding="utf-8")}
     held[0].fulfill(body=frame({"kind": "answer", **said, "ways": [way], "command": "friso tune of the rig"}))
     page.wait_for_selector("text=Of thesis_rig.toml as it was opened")
     page.click("#out")
@@ -642,7 +642,7 @@ def test_what_stops_it_says_of_which_machine_and_gives_no_other_one_its_command(
     assert page.locator("[inert] >> text=Take over").count() == 1
     page.click("#undo")  # the machine that it is of is shown again
     page.click("text=Take over")
-    page.wait_for_selector("#machine-1 >> text=gains_the_least_change")
+    page.wait_for_selector("#machine-1 >> text=isolator_and_gains")
 
 
 def test_a_picture_that_is_waited_for_says_so(browsed: Browsed) -> None:

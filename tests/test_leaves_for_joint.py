@@ -168,7 +168,7 @@ def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) ->
 
 
 def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The least change comes first in the answer, and its search differs from that of its parent remedy."""
+    """The least change comes first in the answer."""
     (isolator, _), tried = tuning.outcomes, []
     monkeypatch.setattr(_Session, "_verified", lambda self, search, shares: isolator)
     monkeypatch.setattr(_Session, "tries", lambda self, remedy: tried.append(remedy.makes))

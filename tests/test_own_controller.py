@@ -160,7 +160,7 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
 
 def test_tune(locked: Stage, tmp_path: Path) -> None:
     """The answer knows the stage's cycles and tunes its bandwidth; with so few machines no remedy is sure to work."""
-    tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=3)
+    tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=12, further=12)
     with patched({method: {"Budget": lambda: tiny, "remedies": lambda *goal: remedies(*goal)[:1]}}):
         document = answer(tmp_path, locked, "tune", "--only", "controller", "--within", "5 um", status=2)
     way = document["ways"]["bandwidth"]

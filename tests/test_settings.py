@@ -28,7 +28,7 @@ LITERALS = {
     "friso/leaf_springs": 13,
     "friso/platform": 11,
     "friso/questions": 104,
-    "friso/remedies": 9,
+    "friso/remedies": 8,
     "friso/shown": 36,
     "friso/stage": 15,
     "friso/studies": 93,

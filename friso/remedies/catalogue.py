@@ -62,12 +62,9 @@ class Variable:
         return float(np.log(value / self.low) / np.log(self.high / self.low))
 
 
-def of_key(key: str, low: float, high: float, present: float = float("nan")) -> Variable:
-    """Return a key of the stage file as a variable between `low` and `high`.
-
-    Close to the `present` value, the variable takes exactly that value; NaN means that there is none.
-    """
-    return Variable(key, low, high, lambda flat, value: {key: value}, present)
+def of_key(key: str, low: float, high: float) -> Variable:
+    """Return a key of the stage file as a variable between `low` and `high`."""
+    return Variable(key, low, high, lambda flat, value: {key: value})
 
 
 def bandwidth_factor(present: float = float("nan")) -> Variable:
@@ -133,16 +130,6 @@ class Remedy:
             changed |= change
         return changed
 
-    def values(self, shares: np.ndarray) -> np.ndarray:
-        """Return the SI values of the variables at points of the search, shape (points, variables).
-
-        `shares` are the points, by coordinates from 0 to 1. A key has its value after all variables that change it,
-        such as the bandwidth.
-        """
-        changed = self.changes(shares)
-        columns = [changed.get(v.name, v.at(share)) for v, share in zip(self.variables, shares.T, strict=True)]
-        return np.stack(columns, axis=1)
-
     @property
     def verifiable(self) -> bool:
         """Tell whether limit cycles can verify the remedy: not if dither keeps the stage moving."""
@@ -164,13 +151,10 @@ class Remedy:
     def tuned(self, shares: np.ndarray) -> Stage:
         """Return the stage at a point of the search, `shares` with coordinates 0 to 1, (variables,).
 
-        Numbers are rounded to four digits; unchanged numbers are kept exactly.
+        Numbers are rounded to four digits.
         """
-        numbers = {key: float(values[0]) for key, values in self.changes(shares[None]).items()}
-        present = {variable.name: variable.present for variable in self.variables}
-        return self.stage.with_numbers(
-            {key: value if value == present.get(key) else float(f"{value:.4g}") for key, value in numbers.items()}
-        )
+        changed = self.changes(shares[None])
+        return self.stage.with_numbers({key: float(f"{values[0]:.4g}") for key, values in changed.items()})
 
 
 def remedies(stage: Stage, goal: Goal) -> list[Remedy]:

@@ -22,9 +22,8 @@ from friso.hunting import Case
 from friso.platform.extras import missing
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import BANDWIDTH, Remedy, remedies, with_bandwidth
-from friso.remedies.least import ChangeSize, change_size, least_changes, least_remedy, of_one_key, size_cost
+from friso.remedies.least import ChangeSize, change_size, least_factors
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
-from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
 from friso.remedies.settings import settings
@@ -38,7 +37,6 @@ from friso.remedies.verified import (
     moving,
     unsettled_parts,
 )
-from friso.remedies.window import windows
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.stage.motion import motion_of
@@ -56,11 +54,8 @@ class Advice:
 
     `case` is the check of the stage, and `present` the performance of the stage as it is on machines. `unmet` are the
     parts of the goal that it misses or may miss, by names of `friso.questions.tune.present_words.DOUBTS`. `limits`
-    gives the bandwidths with enough margin, and `sensitivities` the derivatives of the edge of hunting.
-
-    `relaxed` tells which parts of the goal to relax if nothing works; `relaxed_all` is true if all remedies were
-    considered for that. `interrupted` is true if the search was ended early, and `least_sought` if the smallest change
-    was searched before that.
+    gives the bandwidths with enough margin, and `sensitivities` the derivatives of the edge of hunting. `interrupted`
+    is true if the search was ended early.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -72,17 +67,14 @@ class Advice:
     present: Performance
     limits: Limits
     outcomes: tuple[RemedyOutcome, ...]
-    relaxed: tuple[RelaxedGoal, ...]
     machines: Fleet
     seed: int
     interrupted: bool = False
-    least_sought: bool = True
     sensitivities: Sensitivities | None = None
     as_built: Mapping[str, Any] = field(default_factory=dict)
     correlations: Correlations = field(default_factory=Correlations)
     unmade: Mapping[str, Unmade] = field(default_factory=dict)
     unmet: tuple[str, ...] = ()
-    relaxed_all: bool = True
 
     @property
     def needed(self) -> bool:
@@ -209,9 +201,7 @@ def tune(
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
-    later = (settings.setting_pairs + 2) * (
-        _generations(budget) + 4 + settings.progress_steps
-    )  # an estimate, for pairs and the least change
+    later = settings.setting_pairs * (_generations(budget) + 4 + settings.progress_steps)
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later)
     progress(0, 0, "compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
@@ -225,15 +215,12 @@ def tune(
     progress(0, 0, "the stage as it is")
     present, case = moving(ideal, unseen, goal, stage), None
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report)
-    relaxed: tuple[RelaxedGoal, ...] = ()
     sensitivities: Sensitivities | None = None
-    relaxed_all = True
     interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
         if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
-            session.tries_one_factor(listed.pop(0), len(listed) > 0)
+            session.tries(listed.pop(0))
             answered(session.outcomes[0])
-            session.adds_windows()
         report("the stage as it is", 0)
         case, present = checked(ideal), present.surveyed(ideal, unseen, goal)
         unmet = missed_parts(present, goal) or unsettled_parts(confirmed(ideal, goal), present, goal)
@@ -246,35 +233,28 @@ def tune(
                 several = [remedy for remedy in listed if remedy.buys_joint == joint]
                 session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
         session.makes_leaves()
-        session.adds_windows()
-        if session.outcomes and not session.works:
-            with allowance(settings.relaxing_work) as relaxing:
+        if not session.works:
+            with allowance(settings.large_moves_work):
                 session.tries_large_moves()
-                report("which part of the goal to relax")
-                relaxed = relaxations(session.outcomes, goal, machines.take(np.arange(budget.machines)))
-            relaxed_all = not relaxing.exhausted
         sensitivities = edge_sensitivities(ideal, case.judgement.margin)
     except KeyboardInterrupt:
         interrupted = True
         session.interrupted()
     return Advice(
-        ideal,
-        goal,
-        case or checked(ideal),
-        present,
-        limits(linear_flat(stage, stage.flat())),
-        tuple(session.outcomes),
-        relaxed,
-        fresh,
-        seed,
-        interrupted,
-        session.tried_less or session.is_least or not interrupted,
-        sensitivities,
-        {name: table for name, table in stage.as_written().items() if name in AS_BUILT},
-        correlations,
-        session.unmade,
-        unmet,
-        relaxed_all,
+        stage=ideal,
+        goal=goal,
+        case=case or checked(ideal),
+        present=present,
+        limits=limits(linear_flat(stage, stage.flat())),
+        outcomes=tuple(session.outcomes),
+        machines=fresh,
+        seed=seed,
+        interrupted=interrupted,
+        sensitivities=sensitivities,
+        as_built={name: table for name, table in stage.as_written().items() if name in AS_BUILT},
+        correlations=correlations,
+        unmade=session.unmade,
+        unmet=unmet,
     )
 
 
@@ -289,7 +269,7 @@ def machines_of_search(
     """Return the machines on which searches try settings.
 
     In so small a sample, a machine far less robust than nearly all others would weigh too much. It is left out, and
-    another machine counts twice. Sampling and delay come from the stage `drive`.
+    another one stands in for it. If too few are left, some count twice. Sampling and delay come from the stage `drive`.
     """
     machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed, goal.moves)
     many = draw_fleet(stage, correlations, settings.usual_machines, seed + settings.usual_seed)
@@ -300,17 +280,16 @@ def machines_of_search(
     common = np.flatnonzero(
         seen >= settings.far_margin_share * np.quantile(usual, settings.few_share * (1 - goal.share))
     )
-    return machines.take(np.resize(common, machines.count)) if common.size else machines
+    return machines.take(np.resize(common if common.size else np.arange(machines.count), budget.machines))
 
 
 @dataclass
 class _Session:
     """Search for remedies of one stage: what was tried, how it ended, and what is next.
 
-    `outcomes` are the results so far, `searching` is the current search, and `searches` has all searches.
-    While `least_factor` is true, the smallest bandwidth that works is searched; `is_least` is true if it was found.
-    `allowed` limits the work of all remedies together. Settings are searched on `machines`, and verified on `unseen`
-    ones, then on `further` ones if the result is unclear.
+    `outcomes` are the results so far, and `searching` is the current search. `allowed` limits the work of all remedies
+    together. Settings are searched on `machines`, and verified on `unseen` ones, then on `further` ones if the result
+    is unclear.
     """
 
     stage: Stage
@@ -324,11 +303,7 @@ class _Session:
     report: _Report
     outcomes: list[RemedyOutcome] = field(default_factory=list)
     searching: Search | None = None
-    tried_less: bool = False
-    least_factor: bool = False
-    is_least: bool = False
     allowed: Allowance | None = None
-    searches: list[Search] = field(default_factory=list)
     unmade: dict[str, Unmade] = field(default_factory=dict)
 
     @property
@@ -336,30 +311,10 @@ class _Session:
         """Tell whether any remedy works so far."""
         return any(outcome.certainty == "works" for outcome in self.outcomes)
 
-    def tries_one_factor(self, remedy: Remedy, others: bool) -> None:
-        """Search the smallest factor on the bandwidth that works, as a first answer.
-
-        If there is none, or no `others` follow that may be smaller changes, the factor that settles soonest is
-        searched.
-        """
-        search = self._begun(remedy, self.budget.machines)
-
-        def points() -> Iterator[np.ndarray]:
-            if others:
-                self.least_factor = True
-                yield from of_one_key(search, enough=1.0)
-            self.least_factor = False
-            search.optimise()
-            yield from search.surveyed()
-
-        self._ended(search, points())
-        self.is_least = self.least_factor and self.outcomes[-1].certainty == "works"
-        self.least_factor = False
-
     def tries_all(
         self, listed: Sequence[Remedy], further: Callable[[Sequence[RemedyOutcome], Goal], list[Remedy]]
     ) -> None:
-        """Try remedies, smaller changes first; then the smallest change; then `further` remedies.
+        """Try remedies, smaller changes first; then `further` remedies.
 
         `further` chooses remedies from the outcomes so far. Settings against friction with more keys than a working
         remedy are left out, and so are combinations of remedies that work alone. Remedies that cannot be verified come
@@ -372,10 +327,8 @@ class _Session:
                 small = not remedy.of_setting or len(remedy.variables) <= keys
                 if small and (remedy.stage is self.stage) == own and not self._combines(remedy):
                     self.tries(remedy)
-            self.tries_less()
         for remedy in further(self.outcomes, self.goal):
             self.tries(remedy)
-        self.tries_less()
         for remedy in listed:
             if not remedy.verifiable and not self.works:
                 self.tries(remedy)
@@ -390,22 +343,18 @@ class _Session:
         alone = [varied for one in working if (varied := {variable.name for variable in one.variables}) < names]
         return set().union(*alone) == names
 
-    def adds_windows(self) -> None:
-        """Find how far each number of the smallest change, and of the fastest remedy, may vary."""
-        working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes]
-        shown = [min(working, key=rank) for rank in (self._size, lambda one: slowest(one, self.goal)) if working]
-        for place, outcome in enumerate(self.outcomes):
-            if any(outcome is one for one in shown) and not outcome.windows:
-                self.report(f"{outcome.remedy.name}: how far each number may vary")
-                search = next(one for one in self.searches if one.remedy is outcome.remedy)  # names may be equal
-                self.outcomes[place] = replace(outcome, windows=windows(search, outcome.shares))
-
     def tries(self, remedy: Remedy) -> None:
-        """Search a remedy for the settings that settle soonest, unless all allowed work is used up."""
+        """Search a remedy for the settings that settle soonest, unless all allowed work is used up.
+
+        Of the bandwidth, the smallest factor that works is searched first.
+        """
         if self.allowed is not None and self.allowed.left <= 0:
             self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), cut=True, untried=True))
             return
-        search = self._begun(remedy, self.budget.machines)
+        search = self._begun(remedy)
+        if remedy.name == BANDWIDTH:
+            self._ended(search, _factors(search))
+            return
         search.optimise()
         self._ended(search, search.surveyed())
 
@@ -424,54 +373,6 @@ class _Session:
         else:
             made = Remedy(f"{remedy.name}, of leaf springs", stage, (), True, remedy.name)
             self.tries(made)
-
-    def tries_less(self) -> None:
-        """Search once for the smallest change of the present controller.
-
-        The search starts from the working remedy of this controller that changes most. If it finds nothing smaller than
-        the smallest change so far, a second search starts from that change. If no change of this controller works, the
-        search starts from the smallest of the other changes. If a result leaves some keys unchanged, the others are
-        searched again, and the new result is taken if it changes less.
-        """
-        working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
-        own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
-        if not working or self.tried_less or (self.allowed is not None and self.allowed.left <= 0):
-            return
-        first = len(self.outcomes)
-        least, *others = sorted(own or working, key=self._size)
-        most = others[-1] if own and others else least
-        self.tried_less = self._tries_less_than(most)
-        works = [outcome for outcome in self.outcomes if outcome.certainty == "works"]
-        is_least = self.is_least and least.remedy.name == BANDWIDTH and self._size(least).keys == 1
-        if least is not most and not is_least and min(works, key=self._size, default=None) is least:
-            self.tried_less |= self._tries_less_than(least)
-        for place in range(first, len(self.outcomes)):
-            outcome = self.outcomes[place]
-            if outcome.certainty == "works" and 1 < self._size(outcome).keys < len(outcome.remedy.variables):
-                self._tries_less_than(outcome)
-                fewer = self.outcomes.pop()
-                if fewer.certainty == "works" and self._size(fewer) < self._size(outcome):
-                    self.outcomes[place] = fewer
-
-    def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
-        """Search for the smallest change of the keys that a working remedy changes.
-
-        Returns False if none of these keys can be searched.
-        """
-        assert outcome.stage is not None
-        less = least_remedy(self.stage, outcome.stage, outcome.remedy)
-        if less is None:
-            return False
-        works = (one for one in self.outcomes if one.certainty == "works" and one.remedy.buys_joint == less.buys_joint)
-        least = min(works, key=self._size, default=outcome)
-        size = self._size(least)
-        search = self._begun(less, settings.machine_factor * self.budget.machines)
-        self._ended(
-            search, least_changes(search, float(size_cost(size.keys, settings.worthwhile_share * np.log(size.factor))))
-        )
-        if self.outcomes[-1].stage is None and least.certainty == "works" and not search.cut:
-            self.outcomes.pop()  # no smaller change works
-        return True
 
     def tries_large_moves(self) -> None:
         """Verify settings that serve large moves only, first those that begin at the smallest move.
@@ -505,14 +406,12 @@ class _Session:
         assert outcome.stage is not None
         return change_size(self.stage, outcome.stage)
 
-    def _begun(self, remedy: Remedy, machines: int) -> Search:
-        """Start the search for a remedy on the first `machines` of those drawn for searches."""
+    def _begun(self, remedy: Remedy) -> Search:
+        """Start the search for a remedy."""
         self.report.begins(_steps(remedy, self.budget))
-        several = self.machines.take(np.arange(machines))
-        search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
+        search = Search(remedy, self.goal, self.machines, self.fresh, self.drive, self.budget, self.report)
         # replaced when the search ends
         self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))
-        self.searches.append(search)
         self.searching = search
         return search
 
@@ -542,7 +441,7 @@ class _Session:
             if tries == settings.most_tries or worked > settings.verifying_work or "given up" in outcome.doubts:
                 break
         tried = search.points if search.tried else None
-        none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted, cut=search.cut)
+        none = RemedyOutcome(search.remedy, None, None, None, (), tried, search.attracted, cut=search.cut)
         self.outcomes[-1] = unsure or none
 
     def makes_leaves(self) -> None:
@@ -583,8 +482,15 @@ class _Session:
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, further.take(part), goal, self.drive)
             doubted = () if measured.decides(goal) else ("together",)
-        parts = remedy, tuned, measured, confirmation, doubted, (), search.points, search.attracted
+        parts = remedy, tuned, measured, confirmation, doubted, search.points, search.attracted
         return RemedyOutcome(*parts, shares=shares, moves_from=moves_from)
+
+
+def _factors(search: Search) -> Iterator[np.ndarray]:
+    """Yield factors on the bandwidth to verify: the smallest that work, then those that settle soonest."""
+    yield from least_factors(search)
+    search.optimise()
+    yield from search.surveyed()
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:

@@ -24,9 +24,6 @@ from friso.remedies.settings import settings
 from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.stage import Stage
 
-Wanted = Callable[[np.ndarray], np.ndarray]
-"""Quantity of points (points, variables), shape (points,), that a search minimises."""
-
 
 @dataclass(frozen=True)
 class Budget:
@@ -105,8 +102,8 @@ class TriedPoints(ArrayColumns):
         some &= ~np.any([broken[name] for name in ("bandwidth", "margin", "force")], axis=0) & ~self.meets(goal)
         return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
-    def cost(self, goal: Goal, wanted: Wanted | None = None) -> np.ndarray:
-        """Return the cost of points, (n,): the settling time, or the quantity `wanted` if given.
+    def cost(self, goal: Goal) -> np.ndarray:
+        """Return the cost of points, (n,): the settling time.
 
         Points that break constraints cost more than all others, the more they break them.
         """
@@ -116,8 +113,7 @@ class TriedPoints(ArrayColumns):
         excess += 4.0 * (1 - self.nearness)
         time = np.where(np.isfinite(self.settling), self.settling, 100.0)
         excess += _excess(time, goal.settle)
-        minimised = time if wanted is None else wanted(self.shares)
-        return np.asarray(np.where(self.meets(goal), minimised, settings.worst_time * (1 + excess) + time))
+        return np.asarray(np.where(self.meets(goal), time, settings.worst_time * (1 + excess) + time))
 
 
 def _most(limit: float | None) -> float:
@@ -160,14 +156,10 @@ class Search:
         """Return all settings tried, if any, including those that were stopped early."""
         return TriedPoints.joined(self.tried or [TriedPoints.none(len(self.remedy.variables))])
 
-    def optimise(self, wanted: Wanted | None = None, start: np.ndarray | None = None) -> None:
-        """Try settings until they no longer improve, or until that takes too much work (`cut`).
-
-        The search minimises the settling time, or the quantity `wanted`: a function from points (points, variables) to
-        numbers (points,). A search of several variables may begin with the points `start`.
-        """
+    def optimise(self) -> None:
+        """Try settings until they no longer settle sooner, or until that takes too much work (`cut`)."""
         with self._allowed(self._work):
-            self._optimise(wanted, start)
+            self._optimise()
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
         """Try settings, as points (points, variables), in batches; yield those that meet the goal."""
@@ -208,11 +200,11 @@ class Search:
             except Exhausted:
                 self.cut = True
 
-    def _optimise(self, wanted: Wanted | None, start: np.ndarray | None) -> None:
-        """Minimise the settling time, or the quantity `wanted` if given, over a remedy's variables.
+    def _optimise(self) -> None:
+        """Minimise the settling time over a remedy's variables.
 
         One variable is searched on a grid, which is then refined. Several variables are searched by differential
-        evolution, if given from the points `start`, then again in smaller ranges around the best point.
+        evolution, then again in smaller ranges around the best point.
         """
         variables = len(self.remedy.variables)
         if variables == 0:
@@ -222,28 +214,25 @@ class Search:
         def cost(shares: np.ndarray, most: np.ndarray | float = np.inf) -> np.ndarray:
             self.report(f"{self.remedy.name}: trying settings")
             points = np.clip(shares.T, 0, 1)
-            self.tried.append(self.measured(points, most, wanted))
-            return self.tried[-1].cost(self.goal, wanted)
+            self.tried.append(self.measured(points, most))
+            return self.tried[-1].cost(self.goal)
 
         if variables == 1:
             count = self.budget.points * 6
             grid = np.linspace(0, 1, count)
             cost(np.union1d(grid, self._at_the_limit(grid))[None])
             points = self.points
-            at = points.shares[points.cost(self.goal, wanted).argmin(), 0]
+            at = points.shares[points.cost(self.goal).argmin(), 0]
             cost(np.clip(np.linspace(at - 1 / count, at + 1 / count, self.budget.points * 2), 0, 1)[None])
             return
         size = max(5, min(self.budget.points * variables, settings.generation_points))
         drawn = np.random.default_rng(settings.optimiser_seed).random((size, variables))
-        if start is not None:
-            few = start[: size // 2]
-            drawn[: len(few)] = few
         _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations, self._is_hopeless)
         for away in settings.near_ranges:
             points = self.points
             if not points.meets(self.goal).any() and points.nearness.max() < settings.hopeful_nearness:
                 return
-            best = points.shares[points.cost(self.goal, wanted).argmin()]
+            best = points.shares[points.cost(self.goal).argmin()]
             ends = [(max(0.0, at - away), min(1.0, at + away)) for at in best]
             low, high = np.array(ends).T
             near = low + (high - low) * drawn
@@ -276,9 +265,7 @@ class Search:
         """Return the bandwidths [Hz] of the stage file's machine at settings (points, variables)."""
         return loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), len(shares))
 
-    def measured(
-        self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: Wanted | None = None
-    ) -> TriedPoints:
+    def measured(self, shares: np.ndarray, most: np.ndarray | float = np.inf) -> TriedPoints:
         """Simulate moves of the machines with each of several settings, and return how they perform.
 
         `shares` are the settings, as points (points, variables). Moves are simulated only if the loop is stable with
@@ -287,8 +274,7 @@ class Search:
 
         A point is nearer to settling the more machines settle: within the tolerance, within the looser one, and within
         the looser one at the lower bandwidth. So progress shows before any machine is in position. A point is stopped
-        as soon as it must cost more than `most`, where cost is settling time or the quantity `wanted`. The machines
-        that are slowest most often are tried first.
+        as soon as it must cost more than `most`. The machines that are slowest most often are tried first.
         """
         goal, count, machines = self.goal, len(shares), self.machines.count
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
@@ -308,7 +294,7 @@ class Search:
             return TriedPoints(shares, times, loosely, slowly, forces, margin, bandwidth, nearness, whole, reach)
 
         def worth_it(left: np.ndarray) -> np.ndarray:
-            goes_on = (so_far().cost(goal, wanted) <= most)[left]
+            goes_on = (so_far().cost(goal) <= most)[left]
             whole[left[~goes_on]] = False
             return left[goes_on]
 
@@ -335,11 +321,10 @@ class Search:
         self.slowest += np.bincount(settling[settle].argmax(axis=1), minlength=machines)
         return so_far()
 
-    def _whole(self, batch: np.ndarray, wanted: Wanted | None) -> np.ndarray:
+    def _whole(self, batch: np.ndarray) -> np.ndarray:
         """Return the settings of a batch that meet the goal once all machines were run.
 
-        Both batch and result are points (points, variables). The best come first: they settle soonest, or have the
-        least `wanted`.
+        Both batch and result are points (points, variables). Those that settle soonest come first.
         """
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
@@ -347,7 +332,7 @@ class Search:
         points = self.points
         at = _same(batch, points.shares).argmax(axis=1)
         at = at[points.meets(self.goal)[at]]
-        return points.shares[at[np.argsort(_order(points, wanted)[at], kind="stable")]]
+        return points.shares[at[np.argsort(points.settling[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
         """Tell with which settings, (points, variables), the surveyed machines do not hunt.
@@ -377,19 +362,18 @@ class Search:
             meets[robust] &= in_time & (moves.force <= _most(goal.force_limit))
         return np.asarray(meets.mean(axis=1))
 
-    def surveyed(self, wanted: Wanted | None = None) -> Iterator[np.ndarray]:
+    def surveyed(self) -> Iterator[np.ndarray]:
         """Yield the best settings with which enough surveyed machines do not hunt (see `clear`).
 
-        Settings are points of shape (variables,). Points that settle soonest, or have the least of the quantity
-        `wanted`, come first. Enough fresh machines must meet the goal. Nearly equal points count as one. After a batch
-        without success, the next points are taken farther away, because the best points are often at the limit of what
-        works.
+        Settings are points of shape (variables,). Points that settle soonest come first. Enough fresh machines must
+        meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
+        farther away, because the best points are often at the limit of what works.
 
         If no point has enough fresh machines, the one with the most is yielded, unless surveyed machines hunt there.
         """
         points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
-        left, apart = points.shares[free[np.argsort(_order(points, wanted)[free], kind="stable")]], settings.alike_share
+        left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], settings.alike_share
         away = np.full(len(left), np.inf)  # distance from the inspected points
         enough, any_clear = self.goal.surely(self.fresh.count), False
         best, most = np.zeros((0, points.shares.shape[1])), 0.0
@@ -403,7 +387,7 @@ class Search:
                 and apart > settings.alike_share
             ):
                 apart = max(settings.alike_share, apart / settings.widened_factor)
-            looked_at, batch = batch, self._whole(batch, wanted)
+            looked_at, batch = batch, self._whole(batch)
             away = np.minimum(away, _distance(left, looked_at[~_same(looked_at, batch).any(axis=1)]))
             if not len(batch):
                 continue
@@ -414,7 +398,7 @@ class Search:
             clear = self.clear(few) if len(few) else np.zeros(0, bool)
             any_clear |= bool(clear.any())
             if clear.any() and not _same(few[clear][:1], soonest).any():
-                yield from self._closer(few[clear][0], wanted)
+                yield from self._closer(few[clear][0])
             yield from few[clear]
             apart = (
                 settings.alike_share
@@ -426,22 +410,21 @@ class Search:
         if not any_clear and len(best) and most < enough:
             yield from best[self.clear(best)]
 
-    def _closer(self, point: np.ndarray, wanted: Wanted | None) -> list[np.ndarray]:
-        """Return better settings near a point (variables,), the best first.
+    def _closer(self, point: np.ndarray) -> list[np.ndarray]:
+        """Return settings near a point (variables,) that settle sooner, the soonest first.
 
-        The best settle soonest, or have the least `wanted` if given. The `point` was taken because better ones failed:
-        there machines hunted, or too few met the goal. New points are drawn at random around it. Once a better one
-        works, further points are drawn around that one.
+        The `point` was taken because better ones failed: there machines hunted, or too few met the goal. New points are
+        drawn at random around it. Once a better one works, further points are drawn around that one.
         """
         goal, closer = self.goal, list[np.ndarray]()
-        cost = self.measured(point[None]).cost(goal, wanted)[0]
+        cost = self.measured(point[None]).cost(goal)[0]
         for number in range(settings.most_closer):
             low, high = np.clip(point - settings.around_share, 0, 1), np.clip(point + settings.around_share, 0, 1)
             drawn = low + (high - low) * qmc.Sobol(point.size, rng=settings.optimiser_seed + number).random(
                 settings.points_around
             )
-            self.tried.append(tried := self.measured(drawn, cost, wanted))
-            costs = np.where(tried.whole, tried.cost(goal, wanted), np.inf)
+            self.tried.append(tried := self.measured(drawn, cost))
+            costs = np.where(tried.whole, tried.cost(goal), np.inf)
             better = _apart(
                 drawn[np.argsort(costs, kind="stable")[: np.count_nonzero(costs < cost)]],
                 settings.points_looked_at,
@@ -465,11 +448,6 @@ def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     order = np.argsort(-sizes, kind="stable")
     count = np.logical_and.accumulate(settles[:, order], axis=1).sum(axis=1)
     return np.where(count > 0, sizes[order][count - 1], np.inf)
-
-
-def _order(points: TriedPoints, wanted: Wanted | None) -> np.ndarray:
-    """Return the quantity that sorts points, (n,): the settling time, or `wanted` if given."""
-    return points.settling if wanted is None else wanted(points.shares)
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:

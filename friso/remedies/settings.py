@@ -14,26 +14,12 @@ class RemedySettings(Settings):
     unchanged_share: float = setting(1e-6, "")
     """Largest relative difference between numbers that is rounding, not a change."""
 
-    factor_beyond: float = setting(4.0, "")
-    """Factor by which keys may go beyond the first settings. A smaller one misses smaller changes of other keys."""
-
-    factor_away: float = setting(2.0, "")
-    """Factor by which keys may go in the other direction, which rarely is a smaller change."""
-
-    other_settings: int = setting(24, "")
-    """Settings that are inspected, from the smallest change on. Each further one costs moves."""
-
-    values_alone: int = setting(24, "")
-    """Values tried for a single key. Fewer overshoot its smallest change; each costs a move of all machines."""
-
-    finer_values: int = setting(8, "")
-    """Values tried between the last two of a single key. They narrow the smallest change down by three halvings."""
-
-    change_parts: tuple[float, ...] = setting((0.15, 0.3, 0.5, 0.7), "")
-    """Fractions of the way from the smallest change to the working settings at which other points are tried."""
+    factors_tried: int = setting(24, "")
+    """Factors on the bandwidth tried either way. Fewer overshoot the smallest change; each costs a move of all
+    machines."""
 
     machine_factor: int = setting(2, "")
-    """Factor on the number of machines for the smallest change. It lies at the limit of what works and often fails."""
+    """Factor on the number of machines drawn for searches, so that others stand in for those that are left out."""
 
     smallest_move: float = setting(10.0, "")
     """Smallest move without [moves], in tolerances. A stage in position hardly leaves its place for shorter ones."""
@@ -89,24 +75,8 @@ class RemedySettings(Settings):
     few_share: float = setting(0.2, "")
     """Fraction, of the machines that may miss the goal, whose margins lie below what is usual."""
 
-    relaxing_work: float = setting(8e8, "")
-    """Work to find which settings serve large moves only and which part of the goal to relax, about 10 s on one core.
-    """
-
-    relaxed_points: int = setting(3, "")
-    """Points for one relaxation. More take minutes."""
-
-    relaxed_machines: int = setting(8, "")
-    """Machines for relaxations, as many as in the search."""
-
-    reasonable_factor: float = setting(3.0, "")
-    """Largest factor by which one part of the goal is relaxed, if that is possible."""
-
-    wider_tolerances: tuple[float, ...] = setting((1.5, 2.0, 3.0, 5.0), "")
-    """Factors of the tolerance that are proposed; the smallest that works is the answer."""
-
-    most_relaxed: int = setting(64, "")
-    """Points tried with wider tolerances, the fastest first. More take minutes."""
+    large_moves_work: float = setting(8e8, "")
+    """Work to verify settings that serve large moves only, about 10 s on one core."""
 
     optimiser_seed: int = setting(27, "")
     """Seed of the optimiser. A fixed one gives equal answers for equal input."""
@@ -231,21 +201,6 @@ class RemedySettings(Settings):
 
     rounded_share: float = setting(2e-3, "")
     """Largest relative error of margin and bandwidth by rounding of tuned numbers."""
-
-    window_points: int = setting(16, "")
-    """Points over the range of a window. Fewer step over a narrow one."""
-
-    window_halvings: int = setting(4, "")
-    """Halvings that locate the end of a window, to a sixteenth of a step."""
-
-    window_end_share: float = setting(0.05, "")
-    """Fraction of a window, next to its end, in which a number is reported to lie at that end."""
-
-    surveyed_halvings: int = setting(2, "")
-    """Halvings that locate the end of a window where machines begin to hunt. Each costs surveys of all machines."""
-
-    worthwhile_share: float = setting(0.85, "")
-    """Ratio of the logarithms of two changes above which the smaller one is not worth verifying."""
 
 
 settings = RemedySettings.live()

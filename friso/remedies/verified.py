@@ -35,7 +35,6 @@ from friso.remedies.machines import Fleet, Goal, MoveRange
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
-from friso.remedies.window import VariableWindow
 from friso.shares import DOUBT_PROBABILITY, Share, share
 from friso.stage import Stage
 from friso.studies.compare.measures import quantile_interval
@@ -310,8 +309,8 @@ class RemedyOutcome:
     """Outcome of a remedy: its best `stage`, how machines perform with it, and whether it works.
 
     `stage` is None if no settings were good enough. `doubts` are the reasons why the remedy is not sure to work;
-    without any, it works. `windows` give how far each number may vary. `confirmation` is the search for hunting of the
-    stage itself; None if too many machines miss the goal.
+    without any, it works. `confirmation` is the search for hunting of the stage itself; None if too many machines miss
+    the goal.
 
     `points` are all settings tried; `attracted` counts the settings dropped because machines hunted. `shares` are the
     coordinates of the stage in the remedy's ranges. `cut` is true if the search took too much work, and `untried` if
@@ -324,7 +323,6 @@ class RemedyOutcome:
     measured: Performance | None
     confirmation: Confirmation | None
     doubts: tuple[str, ...]
-    windows: tuple[VariableWindow, ...] = ()
     points: TriedPoints | None = None
     attracted: int = 0
     interrupted: bool = False

@@ -35,14 +35,6 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
             "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict, "doubts": [*tuning.unmet]},
             "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
             "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
-            "relaxed": [
-                {
-                    "way": relaxed.remedy.name,
-                    "values": {relaxation.key: relaxation.needed for relaxation in relaxed.relaxations},
-                    "factor": relaxed.factor,
-                }
-                for relaxed in tuning.relaxed
-            ],
         }
     )
 
@@ -61,7 +53,6 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
         "factor": tuning.size(outcome).factor,
         "verdict": confirmation.verdict if confirmation else None,
         "certain": bool(confirmation and confirmation.certain and not outcome.stage.unknown_keys),
-        "windows": [asdict(window) for window in outcome.windows],
         **_performance(outcome.measured, tuning),
     }
 

@@ -14,11 +14,10 @@ from friso.frequency.members import limit_cases
 from friso.frequency.system import DriveTiming
 from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome
-from friso.shown.drawing.figure import Axis, Dash, Figure, Markers, Panel, Series
+from friso.shown.drawing.figure import Axis, Dash, Figure, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
-from friso.stage.controllers import CONTROLLER
 from friso.studies.compare.options import linear_flat
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
@@ -35,15 +34,14 @@ RESPONSE_RTOL = 1e-7
 
 
 def tune_figures(tuning: Advice) -> list[Figure]:
-    """Return one figure of the response, settling times, sensitivities, and settings that work."""
+    """Return one figure of the response, settling times and sensitivities."""
     lines = drawn_stages(tuning)
-    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(tuning, lines), *_windows(tuning))
+    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(tuning, lines))
     caption = (
         "Deviation of the stage of the file from its reference after the last corner of its own motion; the share of "
         f"fresh machines in position within {with_unit(tuning.goal.within, 'm')}; the sensitivity of the loop in its "
-        "limit cases, whose largest value is one over the modulus margin; the numbers between which the least change "
-        "works, each varied by itself. Drawn are what changes least and what settles soonest, with the controller "
-        "alone and with a joint; the table has all."
+        "limit cases, whose largest value is one over the modulus margin. Drawn are what changes least and what "
+        "settles soonest, with the controller alone and with a joint; the table has all."
     )
     return [Figure("tune", "Before and after", caption, panels, subject=tuning.stage.name)]
 
@@ -140,26 +138,6 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
             series.append(Series(x, np.repeat(100 * np.arange(len(ordered) + 1) / len(times), 2), *line))
     axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
     return Panel("In position to stay", axis, Axis("Share of machines", "%", (-3.0, 103.0)), tuple(series))
-
-
-def _windows(tuning: Advice) -> list[Panel]:
-    """Draw in which range each number of the least change still works, the others as tuned.
-
-    Ranges are given as factors of the tuned numbers. The list is empty if no change works, or its ranges are not known.
-    """
-    least = tuning.least
-    if least is None or not least.windows:
-        return []
-    ends = [(window.low / window.value, window.high / window.value) for window in least.windows]
-    rows = tuple(window.name.removeprefix(f"{CONTROLLER}.") for window in least.windows)
-    series = tuple(
-        Series(np.array(pair), np.full(2, float(row)), "works" * (row == 0), BLUE, width=6)
-        for row, pair in enumerate(ends)
-    )
-    marks = (Markers(np.ones(len(rows)), np.arange(len(rows), dtype=float), "as tuned", INK),)
-    reach = 1.2 * max(1.2, *(max(high, 1 / low) for low, high in ends))
-    x, y = Axis("Factor of the tuned number", "", (1 / reach, reach), log=True), (-0.5, len(rows) - 0.5)
-    return [Panel("Where the least change works", x, Axis("Setting", "", y, words=rows), series, marks)]
 
 
 def _sensitivity(tuning: Advice, lines: Lines) -> Panel:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from friso.questions.tune.figures import tune_figures
 from friso.questions.tune.gain_words import gain_facts
 from friso.questions.tune.sensitivity_words import sensitivity_sentences
-from friso.questions.tune.words import COLUMNS, answer, assumptions, failing, rows, window_facts
+from friso.questions.tune.words import COLUMNS, answer, assumptions, failing, rows
 from friso.remedies.method import Advice
 from friso.shown.files import Content
 from friso.shown.pages import Report
@@ -43,9 +43,6 @@ def tune_files(tuning: Advice) -> dict[str, Content]:
     behind = [
         Behind("What does not work, and why", failing(tuning), open=True),
         Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),
-        Behind(
-            "Where each number may lie on the machines of the search, the others as tuned", (), window_facts(tuning)
-        ),
         Behind("What matters for the edge of hunting", sensitivity_sentences(tuning)),
         Behind("What is assumed, and how machines were drawn", assumptions(tuning)),
     ]
@@ -68,7 +65,7 @@ def stage_files(tuning: Advice) -> dict[str, Content]:
     for outcome in tuning.outcomes:
         if outcome.stage is None:
             continue
-        slug = outcome.remedy.name.replace(",", "").replace(":", "").replace(" ", "-")
+        slug = outcome.remedy.name.replace(",", "").replace(" ", "-")
         unsure = {"works": "", "large moves": LARGE_MOVES}.get(outcome.certainty, NOT_SURE)
         files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
     least = tuning.least

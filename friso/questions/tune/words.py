@@ -25,14 +25,11 @@ from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
 from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.remedies.catalogue import BANDWIDTH
-from friso.remedies.least import LEAST, ChangeSize
+from friso.remedies.least import ChangeSize
 from friso.remedies.machines import Goal
 from friso.remedies.method import Advice
-from friso.remedies.relax import RelaxedGoal
 from friso.remedies.search import TriedPoints
-from friso.remedies.settings import settings
 from friso.remedies.verified import Performance, RemedyOutcome
-from friso.remedies.window import VariableWindow
 from friso.shown.drawing.prefixes import (
     NOTHING,
     digits_that_differ,
@@ -57,15 +54,6 @@ COLUMNS = (
     "Modulus margin",
     "Stiffness under load",
 )
-
-OPTIONS = {
-    "within": "--within",
-    "settle": "--settle",
-    "force_limit": "--force-limit",
-    "bandwidth_limit": "--bandwidth-limit",
-    "margin": "--margin",
-}
-"""Options that state the parts of a goal."""
 
 ABSENT = "never"
 
@@ -137,7 +125,8 @@ def answer(tuning: Advice) -> list[str]:
         return [*lines, *_nothing(tuning), as_it_is(tuning)]
     least, *others = tuning.recommended
     lines += _in_short(tuning)
-    lines += _works(least, tuning, _least_words(tuning))
+    so_far = " so far" if tuning.interrupted else ""
+    lines += _works(least, tuning, f"The least of the changes that work{_for_all(tuning)}{so_far}")
     for other in others:
         lines += _works(other, tuning, "What settles soonest" if other is tuning.fastest else "The next best")
     goal = f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}"
@@ -155,7 +144,7 @@ def _in_short(tuning: Advice) -> Iterator[str]:
     times = [slowest_time(outcome.measured, tuning.goal) for outcome in (least, fastest) if outcome.measured]
     if len(times) == 2:
         yield (
-            f"Least change{_for_all(tuning)}: {least.remedy.name.removesuffix(LEAST)}, in position after {times[0]}. "
+            f"Least change{_for_all(tuning)}: {least.remedy.name}, in position after {times[0]}. "
             f"Soonest: {fastest.remedy.name}, after {times[1]}."
         )
 
@@ -165,21 +154,6 @@ def _for_all(tuning: Advice) -> str:
     least = tuning.least
     every = least is not None and tuning.for_all_moves(least)
     return " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))
-
-
-def _least_words(tuning: Advice) -> str:
-    """Introduce the least change that works.
-
-    The words say if the search for a smaller change was cut short or not reached.
-    """
-    sought = [outcome for outcome in tuning.outcomes if outcome.remedy.name.endswith(LEAST)]
-    if not tuning.interrupted:
-        given_up = any(outcome.certainty == "given up" for outcome in sought)
-        smaller = " (the search for a smaller one was given up, as it takes too much computing)" * given_up
-        return f"The least change that works{_for_all(tuning)}{smaller}"
-    if tuning.least_sought or any(not outcome.interrupted for outcome in sought):
-        return f"The least change so far that works{_for_all(tuning)}"
-    return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
 
 
 def _of_the_drive(tuning: Advice) -> str:
@@ -374,7 +348,7 @@ def factor_text(factor: float) -> str:
 
 
 def _nothing(tuning: Advice) -> list[str]:
-    """Say that no remedy surely works, which ones might, and what to relax."""
+    """Say that no remedy surely works, and which ones might."""
     unsure = [outcome for outcome in tuning.outcomes if outcome.certainty == "unsure"]
     lines = [f"No option was found that certainly meets the goal: {goal_words(tuning.goal)}."]
     for outcome in tuning.for_large_moves:
@@ -385,44 +359,14 @@ def _nothing(tuning: Advice) -> list[str]:
         for outcome in unsure
         if outcome.stage is not None
     ]
-    lines += [_relax(relaxed, tuning.stage) for relaxed in tuning.relaxed]
     if not (tuning.goal.controller and tuning.goal.joint):
         lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
-    if not tuning.relaxed and not tuning.interrupted:
-        lines.append(_no_relaxation(tuning))
-    if not tuning.relaxed_all:
-        lines.append("Not all relaxations of the goal were tried, as that takes too much computing.")
     return lines
 
 
 def length_from(outcome: RemedyOutcome) -> str:
     """Write the smallest move [m] that a remedy serves, if it serves large moves only."""
     return with_unit(outcome.moves_from or 0.0, "m")
-
-
-def _no_relaxation(tuning: Advice) -> str:
-    """Say that no relaxation was found, or that none was sought."""
-    if tuning.outcomes and not any(outcome.remedy.verifiable for outcome in tuning.outcomes):
-        return "Relaxations of the goal were not sought: no cycle verifies a stage with dither."
-    return (
-        "No relaxation of up to three parts of the goal was found with which an option meets it (of the limit of "
-        f"the bandwidth up to {settings.reasonable_factor:g} times, of the tolerance up to "
-        f"{settings.looser_tolerance:g})."
-    )
-
-
-def _relax(relaxed: RelaxedGoal, before: Stage) -> str:
-    """Say which parts of the goal to relax, and what would then be set."""
-    crossing = {"bandwidth_limit": ", at which the loop last crosses 0 dB,"}
-    parts = [
-        f"{OPTIONS.get(part.key, part.requirement)} of {number(part.needed, part.unit)}{crossing.get(part.key, '')} "
-        f"instead of {number(part.value, part.unit)}"
-        for part in relaxed.relaxations
-    ]
-    return (
-        f"With a {listed(parts, 'and')}, {relaxed.remedy.name} would work on the machines tried "
-        f"({listed(changes(before, relaxed.stage), 'and')}; not verified by cycles: run friso tune again with it)."
-    )
 
 
 def unsure_why(outcome: RemedyOutcome) -> str:
@@ -445,35 +389,14 @@ def failing(tuning: Advice) -> list[str]:
     return lines
 
 
-def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
-    """Tell whether a search over bandwidth alone failed, but another remedy found a bandwidth.
-
-    The other remedy works, and its stage differs in bandwidth alone from the stage as it is.
-    """
-    key = tuning.stage.controller.bandwidth_key
-    if outcome.stage is not None or key is None or [v.name for v in outcome.remedy.variables] != [BANDWIDTH]:
-        return False
-    before, stages = tuning.stage.flat(), (one.stage.flat() for one in tuning.working if one.stage is not None)
-    return any(after.keys() == before.keys() and _differing(before, after) == [key] for after in stages)
-
-
 def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
     """Say in a few words whether a remedy works."""
-    if _met_by_another(outcome, tuning):
-        return "see the others"
     some = outcome.points is not None and bool(outcome.points.meets(tuning.goal).any())
     return NONE_FOUND if some and outcome.certainty == "does not work" else outcome.certainty
 
 
-def _differing(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Return the keys of `before` that have another value in `after`."""
-    return [key for key, value in before.items() if not np.array_equal(after[key], value)]
-
-
 def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
     """Say why no setting of a remedy meets the goal."""
-    if _met_by_another(outcome, tuning):
-        return "Its own search found no setting, but that of another option did, which changes the bandwidth alone."
     if outcome.untried:
         return "It was not tried: the others took all the computing that is allowed."
     if outcome.points is None:
@@ -603,57 +526,6 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
     ]
 
 
-def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
-    """Write the range of a number in which the remedy still works, all else as tuned.
-
-    The bandwidth is given by its key, or by where the loop last crosses 0 dB.
-    """
-    stage, name, ends = outcome.stage, window.name, np.array([window.low, window.high])
-    assert stage is not None
-    if name == BANDWIDTH:
-        stated, factors = bandwidth(stage.flat()), ends / window.value
-        ends = bandwidths_at(stage, factors) if stated is None else stated * factors
-        name = stage.controller.bandwidth_key or name
-    keys = stage.numeric_keys()
-    unit = "Hz" if name == BANDWIDTH else keys[name].unit if name in keys else ""
-    first, last = (number(float(value), unit) for value in ends)
-    first = f"{first} (the least tried)" if window.open_below else first
-    last = f"{last} (the most tried)" if window.open_above else last
-    near = settings.window_end_share * (window.high - window.low)
-    gaps = {"lower": window.value - window.low, "upper": window.high - window.value}
-    end, gap = min(gaps.items(), key=lambda item: item[1])
-    return f"{name}: from {first} to {last}{f', set at its {end} end' if gap < near else ''}"
-
-
-def window_lines(tuning: Advice) -> list[str]:
-    """Say in which range each number of the least change works, the others as tuned.
-
-    The list is empty if no change works, or if it varies no number.
-    """
-    least = tuning.least
-    if least is None or not least.remedy.variables:
-        return []
-    if not least.windows:
-        return [
-            f"No window is given for {least.remedy.name}: on the machines of the search it misses the goal itself, or "
-            "what attracts these takes too much computing."
-        ]
-    return [
-        f"{least.remedy.name} meets the goal on the few machines of the search with each number varied separately, for "
-        f"{'; '.join(_windows(least))}. Near the ends, more of other machines may miss it."
-    ]
-
-
-def window_facts(tuning: Advice) -> list[tuple[str, str]]:
-    """Return the ranges in which the numbers of every working remedy work."""
-    return [(outcome.remedy.name, "; ".join(_windows(outcome))) for outcome in tuning.working if outcome.windows]
-
-
-def _windows(outcome: RemedyOutcome) -> list[str]:
-    """Write the ranges in which a remedy's numbers work, each varied alone."""
-    return [window_words(window, outcome) for window in outcome.windows]
-
-
 def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
     """Yield what was not tried because friction is too small; nothing without friction.
 
@@ -712,5 +584,5 @@ def tables(tuning: Advice) -> list[AnswerTable]:
 
 
 def details(tuning: Advice) -> list[str]:
-    """Return gains for drives, where the numbers may lie, what matters most, and assumptions."""
-    return [*gain_lines(tuning), *window_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)]
+    """Return gains for drives, what matters most, and assumptions."""
+    return [*gain_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)]
