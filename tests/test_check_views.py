@@ -32,8 +32,7 @@ from pages import NAMESPACES, Page, packed_values
 from patched import patched
 from snapshots import Snapshots
 
-from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing
-from friso.hunting.advice import advised
+from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing, advised
 from friso.hunting.criteria import Verdict
 from friso.questions.check.figures import check_figures, response_figure
 from friso.questions.check.page import check_html, conclusion, verdict_sentence

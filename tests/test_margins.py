@@ -23,13 +23,13 @@ from friso.hunting import (
     AttractionEnd,
     BandwidthWindow,
     ParameterMargin,
+    advised,
     check,
     edge_search,
     find_attractors,
     joint_margins,
     path_search,
 )
-from friso.hunting.advice import advised
 from friso.hunting.attractors import Attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.path import key_path

@@ -27,7 +27,7 @@ LITERALS = {
     "friso/interface": 4,
     "friso/leaf_springs": 13,
     "friso/platform": 11,
-    "friso/questions": 104,
+    "friso/questions": 103,
     "friso/remedies": 8,
     "friso/shown": 36,
     "friso/stage": 15,

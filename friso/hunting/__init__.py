@@ -4,7 +4,7 @@ They may also import from `friso.hunting.criteria` and `friso.hunting.measures`.
 change.
 """
 
-from friso.hunting.advice import Advice
+from friso.hunting.advice import BandwidthAdvice, advised
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt, moves_that_hunt, pushes_that_hunt
@@ -53,7 +53,7 @@ from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
 from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
-from friso.hunting.sliding import StickSlip
+from friso.hunting.sliding import StickSlipSpeeds
 from friso.hunting.stage_margins import ParameterMargin, joint_margins
 from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement
@@ -67,8 +67,8 @@ __all__ = [
     "LONG_RUN_RTOL",
     "MORE_WORK",
     "SEARCH_LIMITS",
-    "Advice",
     "AttractionEnd",
+    "BandwidthAdvice",
     "BandwidthWindow",
     "Bifurcation",
     "Branch",
@@ -107,11 +107,12 @@ __all__ = [
     "Space",
     "Spot",
     "StageAttractors",
-    "StickSlip",
+    "StickSlipSpeeds",
     "Swing",
     "Swinging",
     "Target",
     "Tracking",
+    "advised",
     "can_hunt",
     "cannot_hunt",
     "check",

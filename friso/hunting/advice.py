@@ -14,7 +14,7 @@ from friso.stage import Stage
 
 
 @dataclass(frozen=True)
-class Advice:
+class BandwidthAdvice:
     """A bandwidth at which a stage stops hunting, as a `factor` of its own.
 
     It keeps a distance from the `edge` of hunting, or lies `just_beyond` it, because the stage hunts again, or its loop
@@ -34,7 +34,7 @@ def advised(
     unstable: tuple[BandwidthWindow, ...],
     margin: ParameterMargin | None,
     work: float,
-) -> tuple[Advice | None, Advice | None]:
+) -> tuple[BandwidthAdvice | None, BandwidthAdvice | None]:
     """Return the higher and the lower bandwidth advised to a stage; None where there is none.
 
     Both keep a distance from the edge of hunting. A stage that settles, but begins to hunt with little change of static
@@ -60,7 +60,9 @@ def _is_thin(margin: ParameterMargin) -> bool:
     return any(max(end, 1 / end) < SEARCH_LIMITS.edge_distance for end in ends)
 
 
-def _beyond(stage: Stage, edge: AttractionEnd, windows: tuple[BandwidthWindow, ...], work: float) -> Advice | None:
+def _beyond(
+    stage: Stage, edge: AttractionEnd, windows: tuple[BandwidthWindow, ...], work: float
+) -> BandwidthAdvice | None:
     """Return the bandwidth advised beyond an edge of hunting; None if the loop is unstable or the stage hunts there.
 
     `windows` are bandwidths at which the stage hunts again or its loop is unstable.
@@ -68,7 +70,7 @@ def _beyond(stage: Stage, edge: AttractionEnd, windows: tuple[BandwidthWindow, .
     ahead = -1 if edge.outside < edge.inside else 1
     if _within(windows, edge.outside, edge.outside):
         return None
-    first: Advice | None = None
+    first: BandwidthAdvice | None = None
     for steps in range(1, check_settings.advised_steps + 1):
         factor = edge.outside * SEARCH_LIMITS.edge_distance ** (ahead * steps)
         within = SEARCH_LIMITS.lowest_bandwidth <= factor <= SEARCH_LIMITS.highest_bandwidth
@@ -76,10 +78,10 @@ def _beyond(stage: Stage, edge: AttractionEnd, windows: tuple[BandwidthWindow, .
         if not within or _within(windows, *sorted((edge.outside, reach))):
             break
         kept = keeps_friction_margin(stage, factor, work) if work else None
-        first = first or Advice(factor, edge, False, kept)
+        first = first or BandwidthAdvice(factor, edge, False, kept)
         if kept is not False:
-            return Advice(factor, edge, False, kept)
-    return first or Advice(edge.outside, edge, True, None)
+            return BandwidthAdvice(factor, edge, False, kept)
+    return first or BandwidthAdvice(edge.outside, edge, True, None)
 
 
 def _within(windows: Iterable[BandwidthWindow], low: float, high: float) -> bool:

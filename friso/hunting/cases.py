@@ -18,7 +18,7 @@ from friso.engine.simulate import SIMULATION_RTOL, sampled_outputs, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.motion import size, stands
 from friso.equations.structure import structure
-from friso.hunting.advice import Advice, advised
+from friso.hunting.advice import BandwidthAdvice, advised
 from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
@@ -30,7 +30,7 @@ from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.path import BandwidthWindow
 from friso.hunting.settings import ToleranceSettings, check_settings
-from friso.hunting.sliding import StickSlip, is_moved_evenly, stick_slip
+from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, stick_slip
 from friso.hunting.stage_margins import ParameterMargin, friction_margin
 from friso.hunting.tracking import Dwell, Tracking, dwells, tracking
 from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
@@ -102,11 +102,11 @@ class Case:
     unstable_as_built: tuple[LoopState, ...] = ()
     feeding: Feeding | None = None
     static_friction: ParameterMargin | None = None
-    faster: Advice | None = None
-    slower: Advice | None = None
+    faster: BandwidthAdvice | None = None
+    slower: BandwidthAdvice | None = None
     dwells: tuple[Dwell, ...] = ()
     tracking: Tracking | None = None
-    stick_slip: StickSlip | None = None
+    stick_slip: StickSlipSpeeds | None = None
     trace: xr.Dataset | None = None
 
     @property

@@ -23,7 +23,7 @@ from friso.stage.motion import DURATION
 
 
 @dataclass(frozen=True)
-class StickSlip:
+class StickSlipSpeeds:
     """How a stage moves at the constant speed of its reference, and at other speeds, always from rest.
 
     - `lasts`: its error keeps swinging (None: not decided); `sticks`: it stands still in each swing.
@@ -50,7 +50,7 @@ def is_moved_evenly(stage: Stage) -> bool:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def stick_slip(stage: Stage, work: float) -> StickSlip | None:
+def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
     """Find out at which speeds a stage sticks and slips; None if that takes more than the given `work`.
 
     Speeds are tried over some decades about that of the reference, and more closely where the result changes.
@@ -78,7 +78,7 @@ def stick_slip(stage: Stage, work: float) -> StickSlip | None:
             count = tracking_settings.speeds_between + 2
             others = np.concatenate([np.geomspace(factors[k], factors[k + 1], count)[1:-1] for k in changes])
     speeds = abs(own) * factors
-    return StickSlip(
+    return StickSlipSpeeds(
         own_lasts,
         sticks,
         float(swing[0]),

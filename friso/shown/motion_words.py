@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.axis import axis_shown
 from friso.equations.motion import initial_displacement, reference, rests
-from friso.hunting import Dwell, StickSlip, Tracking
+from friso.hunting import Dwell, StickSlipSpeeds, Tracking
 from friso.hunting.criteria import REST_BAND
 from friso.hunting.measures import BANDS
 from friso.shown.drawing.prefixes import listed, with_unit
@@ -30,30 +30,30 @@ def following_sentence(tracking: Tracking) -> str:
     return f"{says}{ends}."
 
 
-def stick_slip_sentences(found: StickSlip, speed: float) -> list[str]:
+def stick_slip_sentences(speeds: StickSlipSpeeds, speed: float) -> list[str]:
     """Say whether a stage slides smoothly at the constant `speed` [m/s] of its reference, and at which others."""
     at = f"at {with_unit(speed, 'm/s')}"
-    if found.lasts is None:
+    if speeds.lasts is None:
         first = (
             f"{at}, whether it slides smoothly was not decided: its error still changes at the end of the longest run"
         )
-    elif not found.lasts:
+    elif not speeds.lasts:
         first = f"slides smoothly {at}"
     else:
-        often = f" every {with_unit(found.period, 's')}" if found.period else ""
-        does = "sticks and slips" if found.sticks else "swings about its reference"
-        first = f"{does} {at}, by {with_unit(found.swing, 'm')} peak to peak{often}"
-    low, high = (with_unit(value, "m/s") for value in found.tried)
-    if not found.ranges:
+        often = f" every {with_unit(speeds.period, 's')}" if speeds.period else ""
+        does = "sticks and slips" if speeds.sticks else "swings about its reference"
+        first = f"{does} {at}, by {with_unit(speeds.swing, 'm')} peak to peak{often}"
+    low, high = (with_unit(value, "m/s") for value in speeds.tried)
+    if not speeds.ranges:
         return [f"{first}; no stick-slip from {low} to {high}."]
     texts = []
-    for below, above in found.ranges:
+    for below, above in speeds.ranges:
         begins = with_unit(below[1], "m/s") if below else f"{low} (the lowest tried)"
         ends = with_unit(above[0], "m/s") if above else f"{high} (the highest tried)"
         texts.append(f"from {begins} to {ends}")
-    last = found.ranges[-1][1]
+    last = speeds.ranges[-1][1]
     smooth = f"; smooth from {with_unit(last[1], 'm/s')} on" if last else ""
-    left = [f"It was not decided at {found.open_speeds} of the speeds tried."] if found.open_speeds else []
+    left = [f"It was not decided at {speeds.open_speeds} of the speeds tried."] if speeds.open_speeds else []
     return [f"{first}. Started from rest, its error keeps swinging {listed(texts, 'and')}{smooth}.", *left]
 
 

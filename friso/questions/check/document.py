@@ -145,17 +145,17 @@ def _end(end: hunting.AttractionEnd | None) -> dict[str, Any] | None:
     return {"factor": end.inside, "settles_at_factor": end.outside, **entries(end, "certain", "reserve", "kind")}
 
 
-def _stick_slip(found: hunting.StickSlip) -> dict[str, Any]:
+def _stick_slip(speeds: hunting.StickSlipSpeeds) -> dict[str, Any]:
     """Return at which constant speeds the stage sticks and slips."""
     return {
-        **entries(found, "lasts", "sticks", "period_s", "open_speeds"),
-        "swing_m": found.swing,
-        "speeds_m_per_s": [{"begins": below, "ends": above} for below, above in found.ranges],
-        "tried_m_per_s": found.tried,
+        **entries(speeds, "lasts", "sticks", "period_s", "open_speeds"),
+        "swing_m": speeds.swing,
+        "speeds_m_per_s": [{"begins": below, "ends": above} for below, above in speeds.ranges],
+        "tried_m_per_s": speeds.tried,
     }
 
 
-def _advice(advice: hunting.Advice | None) -> dict[str, Any] | None:
+def _advice(advice: hunting.BandwidthAdvice | None) -> dict[str, Any] | None:
     """Return a bandwidth advised, as a factor of the stage's own; None without one."""
     return advice and entries(advice, "factor", "just_beyond", "keeps_friction")
 

@@ -9,8 +9,8 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting import (
     MORE_WORK,
     SEARCH_LIMITS,
-    Advice,
     AttractionEnd,
+    BandwidthAdvice,
     BandwidthWindow,
     Case,
     CheckPart,
@@ -530,15 +530,15 @@ def _holds(windows: Iterable[BandwidthWindow], factor: float) -> bool:
     return any(window.holds(factor) for window in windows)
 
 
-def _to(case: Case, advice: Advice) -> str:
+def _to(case: Case, advice: BandwidthAdvice) -> str:
     """Name the bandwidth advised, with the edge of hunting, and what it does not allow for."""
     up, crossover = advice.factor >= 1, _present_bandwidth(case)
     edge = advice.edge
-    known = _bandwidth(case, edge.inside, up=None) if edge.inside != edge.outside else ""
-    remarks = [f"edge {known}"] if known and edge.certain else []
+    at_edge = _bandwidth(case, edge.inside, up=None) if edge.inside != edge.outside else ""
+    remarks = [f"edge {at_edge}"] if at_edge and edge.certain else []
     if not edge.certain:
-        found = _bandwidth(case, edge.inside, up=not up, digits=4)
-        remarks.append(f"not certain: hunting was found {'up' if up else 'down'} to {found}")
+        seen = _bandwidth(case, edge.inside, up=not up, digits=4)
+        remarks.append(f"not certain: hunting was found {'up' if up else 'down'} to {seen}")
     if advice.just_beyond:
         remarks.append("just beyond it, as more would not be safe")
     if advice.keeps_friction is not None:
