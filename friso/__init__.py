@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from friso.questions.boundary.question import boundary
     from friso.questions.check.question import check
     from friso.questions.compare.question import compare
-    from friso.questions.convert.question import convert
     from friso.questions.design.question import design
     from friso.questions.doctor.question import doctor
     from friso.questions.export.question import export
@@ -72,7 +71,6 @@ __all__ = [
     "boundary",
     "check",
     "compare",
-    "convert",
     "describing",
     "design",
     "doctor",

@@ -49,7 +49,6 @@ NEEDS: dict[str, tuple[object, ...]] = {
     "design": (RIG, EXAMPLES / "specs" / "thesis.toml"),
     "logs": (RIG,),
     "export": ("gains", RIG),
-    "convert": (RIG, "--friction", "gms"),
     "identify": (RIG,),
     "rig": ("stiffness", DRIVE),
     "compare": (DRIVE,),

@@ -180,7 +180,7 @@ def test_a_command_and_a_function_of_a_package_are_listed_and_answer(resting: Pa
     assert (listed.returncode, listed.stderr) == (0, "")
     rows = listed.stdout.partition("Why does it hunt?")[2].splitlines()
     names = [line.split()[0] for line in rows if line[2:3].strip()]
-    assert names.index("convert") < names.index("resting") < names.index("reproduce")
+    assert names.index("bode") < names.index("resting") < names.index("reproduce")
     assert "Example: friso resting rig.toml" in answered(resting, "resting", "--help")
     changed = ("resting", example("thesis_rig"), "--set", "friction.static=6 N")
     document = json.loads(answered(resting, *map(str, changed), "--json", "--out", "out"))

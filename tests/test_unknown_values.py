@@ -12,6 +12,7 @@ import friso
 from friso.design_method.method import NoDesign
 from friso.questions.design.document import refused_document
 from friso.stage import Stage
+from friso.studies.laws.conversion import convert
 
 KEY = "friction.bristle_stiffness"
 
@@ -56,7 +57,7 @@ def test_what_follows_from_an_unknown_value_is_unknown(guessed: Stage) -> None:
     assert guessed.with_numbers({KEY: 2e5, "friction.static": 4.0}).unknown_keys == (KEY,)
     cell = friso.sweep(guessed, {"friction.static": "2 N..4 N:2"}, metric="outcome").cell(1)
     assert cell.unknown_keys == (KEY,)
-    converted = friso.convert(guessed, "gms").stage
+    converted = convert(guessed, "gms").stage
     assert converted.unknown_keys == ("friction",)
     assert friso.loads(converted.to_toml()) == converted
 

@@ -69,9 +69,9 @@ def test_a_file_whose_name_is_no_text_is_answered(tmp_path: Path) -> None:
     for name, stem in ((b"r\xffg", "r_g"), ("ä".encode() * 120, "ä" * 75)):
         file = tmp_path / os.fsdecode(name + b".toml")
         file.write_bytes((EXAMPLES / "lugre_stick_slip.toml").read_bytes())
-        done = friso_inside(tmp_path, "convert", file, "--friction", "gms", "--out", out)
+        done = friso_inside(tmp_path, "simulate", file, "--out", out)
         assert done.returncode == 0, done.stderr
-        assert (out / f"{stem}_gms.toml").exists()
+        assert (out / f"{stem}_response.csv").exists()
 
 
 def test_a_stage_is_not_saved_over_a_file_that_appears_meanwhile(
@@ -209,11 +209,11 @@ def test_a_choice_of_another_type_is_refused(choice: Any) -> None:
             ask()
 
 
-@pytest.mark.parametrize("elements", ["6", b"3", None, True, 2.5, pytest.param(10**5000, id="long")])
-def test_a_whole_number_of_another_type_is_refused(elements: object) -> None:
-    with refused("elements") as refusal:
-        friso.convert(RIG, "gms", elements=elements)  # type: ignore[arg-type]
-    assert ("from 1 to 12" in refusal.value.expected) == (type(elements) is int)
+@pytest.mark.parametrize("draws", ["6", b"3", True, 2.5, pytest.param(10**5000, id="long")])
+def test_a_whole_number_of_another_type_is_refused(draws: object) -> None:
+    with refused("draws") as refusal:
+        friso.check(RIG, draws=draws)  # type: ignore[arg-type]
+    assert ("from 1 to 100000" in refusal.value.expected) == (type(draws) is int)
 
 
 def test_changes_of_another_type_are_refused() -> None:

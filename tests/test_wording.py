@@ -31,7 +31,6 @@ MISTAKES = {
     "design": (RIG, RIG),
     "logs": ("nowhere.csv",),
     "export": ("gain", RIG),
-    "convert": (RIG, "--friction", "gsm"),
     "identify": ("nowhere.csv",),
     "rig": ("stifness", DRIVE),
     "compare": (DRIVE, "--machines", "19"),
@@ -52,7 +51,6 @@ RUNS = {
     "bode": ("bode", RIG, "--out", "out"),
     "boundary": ("boundary", RIG, "--set", "joint.locked=true", "--x", "controller.crossover=9.5 Hz..10 Hz"),
     "flexure": ("flexure", LEAVES, "--out", "out"),
-    "convert": ("convert", RIG, "--friction", "gms", "--out", "out"),
     "rig": ("rig", "stiffness", DRIVE, "--out", "out"),
     "export": ("export", "gains", RIG, "--out", "out"),
 }

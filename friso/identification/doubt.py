@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 IMITATED = "what the model lacks would pass for it"
 """Reason for not reporting bristles or friction at low speed: effects that the model lacks may look like them."""
 
-Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
+Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage"]
 """Moment of an analysis at which a doubt is examined, which decides the argument of `find`.
 
 - record: a `RecordCase`, of any log of moves, before the fit;
@@ -53,8 +53,7 @@ Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve
 - curve: a `KeyCase`, whether fitted parameters can be trusted;
 - key: a `KeyCase`, each in turn, with the estimates as changed by earlier doubts;
 - response: a `Bench`, the analysis of a frequency response;
-- stage: the identified stage with all estimates;
-- laws: the compared friction laws with that stage.
+- stage: the identified stage with all estimates.
 """
 
 

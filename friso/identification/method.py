@@ -18,7 +18,6 @@ from friso.identification.doubt import words_of
 from friso.identification.estimate import Estimate
 from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
 from friso.identification.kinds import KINDS, in_order
-from friso.identification.laws.comparison import LawComparison, compare_laws
 from friso.identification.logs.log import Log
 from friso.identification.stage_file import identified_stage, origins, with_unknown
 from friso.identification.stage_keys import Fitting, fitting
@@ -46,7 +45,7 @@ class Identification:
     are for the engineer.
 
     `doubts` are sentences against trusting the result, and `failed` tells whether an analysis failed, even if parts of
-    it hold. `origins` has the origin of each key of the stage; `laws` compares friction laws, if requested.
+    it hold. `origins` has the origin of each key of the stage.
     """
 
     stage: Stage | None
@@ -57,7 +56,6 @@ class Identification:
     doubts: tuple[str, ...] = ()
     failed: bool = False
     origins: Mapping[str, str] = field(default_factory=dict)
-    laws: LawComparison | None = None
 
 
 @dataclass(frozen=True)
@@ -111,21 +109,6 @@ def identify(
     shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes, *unknown))
     correlated = _correlations(experiments, estimates, fits, fitted)
     return Identification(fitted, correlated, *shown, doubts, failed, sources)
-
-
-def with_laws(
-    identification: Identification, logs: Sequence[Source], base: Stage, progress: Progress = silent
-) -> Identification:
-    """Return an identification with the friction laws that its logs support.
-
-    Laws are fitted from the friction of `base`, or of the identified stage where the law of `base` does not allow that.
-    Raises InputError if no log shows friction before sliding, and for a law without stiction.
-    """
-    estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
-    times = [log for log in logs if isinstance(log, Log)]
-    stage = identification.stage or base
-    laws = compare_laws(times, stage, Prior(base, True, estimates), progress)
-    return replace(identification, laws=laws, doubts=(*identification.doubts, *words_of("laws", (laws, stage))))
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:

@@ -44,7 +44,6 @@ FrequencyBand: TypeAlias = str
 LengthRange: TypeAlias = str
 """Texts with a range: 'controller.crossover="1 Hz..40 Hz"', with ":41" for points behind it, "0.1 Hz..1 kHz"."""
 
-LawName: TypeAlias = str
 KindName: TypeAlias = str
 MetricName: TypeAlias = str
 SettingName: TypeAlias = str

@@ -32,7 +32,6 @@ TEXT_KINDS = {
     "FrequencyBand": '"FIRST..LAST"',
     "LengthRange": '"SMALLEST..LARGEST"',
     "Changeable": "PART",
-    "LawName": "LAW",
     "KindName": "KIND",
     "MetricName": "NAME",
     "SettingName": "SETTING",

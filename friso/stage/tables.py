@@ -107,19 +107,6 @@ class FrictionSection(UncertainSection):
         """
         return {}
 
-    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
-    """Parameters that a fit determines besides steady friction, and stiffness and damping before sliding. For each:
-    lower bound, initial value, upper bound; all are greater than 0."""
-
-    @staticmethod
-    def shaped(measured: Any, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return keys [SI] of the law for measured steady friction, stiffness and damping.
-
-        `shape` has the values of the parameters in the class's `shape`. A law that declares these can be fitted
-        (`friso.identification.laws`).
-        """
-        return {}
-
     @staticmethod
     def left_open(measured: Any) -> dict[str, tuple[float, float]]:
         """Return the keys that measured friction does not determine, and their ranges [SI]."""

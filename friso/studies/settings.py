@@ -81,60 +81,8 @@ class StudySettings(Settings):
     rows_together: int = setting(100_000, "")
     """Rows written together, some tens of megabytes."""
 
-    most_knots: int = setting(40, "")
-    """Most knots of a virgin curve, more bends than a measurement can show."""
-
-    knot_distance: float = setting(1e-6, "")
-    """Distance of knots of a virgin curve below which they are one, relative to the last knot."""
-
-    rounded_points: float = setting(1e-6, "")
-    """Rounding error of measured forces in files, relative to the force at the end."""
-
-    end_weight: float = setting(1e4, "")
-    """Weight with which a virgin curve is tied to its end. A smaller one lets noise decide."""
-
-    blurred_scatters: float = setting(10.0, "")
-    """Range about 0, in units of the scatter of x, within which a curve cannot be seen to bend."""
-
-    least_noise: float = setting(0.01, "")
-    """Least noise, relative to the end of a curve, assumed if points are too few to show it."""
-
-    fit_steps: int = setting(10_000, "")
-    """Most steps of a fit of a virgin curve. One that needs more does not converge."""
-
-    hopeless_criterion: float = setting(100.0, "")
-    """Excess of Akaike's criterion over the best from which no further knots are left out."""
-
-    least_points: int = setting(3, "")
-    """Fewest points of a virgin curve; two are a line."""
-
-    most_points: int = setting(100_000, "")
-    """Most points of a virgin curve. More take seconds and improve nothing."""
-
-    reached_friction: float = setting(0.9, "")
-    """Friction that a curve must reach, relative to static friction, to show break-away."""
-
-    late_points: int = setting(20, "")
-    """Share of points, one in so many, whose mean must nearly reach static friction. A single outlier then does not
-    count."""
-
-    backward_share: float = setting(0.01, "")
-    """Largest backward displacement that is noise, not a turn."""
-
     curve_error: float = setting(0.02, "")
     """Largest difference of virgin curves that a measurement cannot resolve."""
-
-    number_gain: int = setting(4, "")
-    """Penalty for each free number of a fit, twice as large as in Akaike's criterion."""
-
-    likely_difference: float = setting(8.0, "")
-    """Difference of Akaike's criterion below which fits are as likely as the best."""
-
-    slope_errors: float = setting(3.0, "")
-    """Range of the initial slope within which fits agree, in its standard errors."""
-
-    first_friction: float = setting(1 / 3, "")
-    """Largest force of the first point, over static friction, that shows the initial stiffness."""
 
     finer_factor: int = setting(4, "")
     """Refinement of a boundary per axis. Eight would take most of the runs."""

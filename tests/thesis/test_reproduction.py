@@ -627,7 +627,7 @@ def test_claims_asked_for_have_a_page_and_conclusions_of_their_own() -> None:
     page = str(reproduce_files(asked)["reproduction.html"])
     assert [claim for claim in judged if f'id="claim-{claim}"' not in page] == []
     assert "default-src 'none'" in page
-    with patched({module("laws"): {"kept_laws": lambda rig, elements: ((None,), {})}}):
+    with patched({module("laws"): {"kept_laws": lambda rig: ((None,), {})}}):
         by_law = conclusions_by_law(asked)
     assert [item.claim.id for item in by_law.conclusions] == ["E1"]
 

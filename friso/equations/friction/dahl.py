@@ -77,11 +77,6 @@ class Dahl(FrictionSection):
             "friction.bristle_stiffness": measured.stiffness,
         }
 
-    @staticmethod
-    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys for measured friction; `shape` is ignored, as no key shapes the law."""
-        return Dahl.keeping(measured, 1)
-
 
 NO_SPEED = 1e-3
 """Stribeck velocity [m/s] for a law whose friction does not depend on speed. Its value does not matter."""

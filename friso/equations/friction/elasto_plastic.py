@@ -99,17 +99,6 @@ class ElastoPlastic(StribeckSection):
         """Return keys with measured bristles; the break-away deflection fits the virgin curve best."""
         return keeping_bristle(measured, breakaway_deflection=best(*_break_away_candidates(measured)))
 
-    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"elastic_share": (0.02, 0.5, 0.98)}
-
-    @staticmethod
-    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys for measured friction, with a break-away deflection from `shape`.
-
-        "elastic_share" is the fraction of the largest possible deflection at which bristles begin to slip.
-        """
-        begins = shape["elastic_share"] * _most(measured)
-        return keeping_bristle(measured, breakaway_deflection=begins)
-
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Return the range of break-away deflections that the measured virgin curve allows."""

@@ -30,7 +30,6 @@ from friso.equations.friction.measured import (
     MeasuredFriction,
     levels_of,
     levels_under_conditions,
-    power_law,
     virgin_displacements,
 )
 from friso.quantities import Number, Quantity, Value, non_negative, positive
@@ -46,9 +45,6 @@ SLIPS_AT = 1 - 1e-9
 
 MOST_ELEMENTS = 12
 """Largest number of elements."""
-
-FITTED_ELEMENTS, SPACING_EXPONENT = 4, 1.5
-"""Number of elements fitted to a record, and the exponent that spaces their tangents on the virgin curve."""
 
 
 class Elements(NamedTuple):
@@ -181,31 +177,6 @@ class GeneralisedMaxwellSlip(StribeckSection):
         """
         return _elements_with(measured, *polygon(measured, elements)) | {
             "friction.attraction": measured.stiffness * measured.levels.stribeck_velocity
-        }
-
-    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {
-        "rolling_exponent": (0.1, 1.0, 4.0),
-        **{f"stiffer_{n}": (0.1, 1.0, 10.0) for n in range(2, FITTED_ELEMENTS + 1)},
-        "lag": (0.01, 1.0, 100.0),
-    }
-
-    @staticmethod
-    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return `FITTED_ELEMENTS` elements on a virgin curve of rolling friction, at evenly spaced slopes.
-
-        `shape` has the exponent of the rolling friction, and factors. For each element but the first, one factor makes
-        the element stiffer. The factor "lag" lengthens the lag of friction, relative to LuGre at the Stribeck velocity.
-        """
-        levels, stiffness = measured.levels, measured.stiffness
-        way = virgin_displacements(levels.static, stiffness)
-        curve = power_law(levels.static, stiffness, shape["rolling_exponent"], way)
-        whole = MeasuredFriction(levels, stiffness, measured.damping, way, curve)
-        springs, slips = _tangents(whole, (1 - np.arange(FITTED_ELEMENTS + 1) / FITTED_ELEMENTS) ** SPACING_EXPONENT)
-        springs = springs * [1.0, *(shape[f"stiffer_{n}"] for n in range(2, FITTED_ELEMENTS + 1))]
-        springs *= stiffness / springs.sum()
-        slips *= levels.static / (springs @ slips)
-        return _elements_with(whole, springs, slips) | {
-            "friction.attraction": stiffness * levels.stribeck_velocity / shape["lag"]
         }
 
     @staticmethod

@@ -59,11 +59,6 @@ class LuGre(StribeckSection):
         return keeping_bristle(measured)
 
     @staticmethod
-    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys for measured friction; `shape` is ignored, as no key shapes the law."""
-        return keeping_bristle(measured)
-
-    @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
         """Return the condition of passivity if it is violated: sigma_2 >= sigma_1 (F_s - F_c)/F_c.
 

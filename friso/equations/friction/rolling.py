@@ -86,13 +86,6 @@ class Rolling(StribeckSection):
         """Return the law's keys for measured friction, its exponent fitted to the virgin curve."""
         return keeping_bristle(measured, rolling_exponent=best(*_exponent_candidates(measured)))
 
-    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"rolling_exponent": (1.0, 1.5, 4.0)}
-
-    @staticmethod
-    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys for measured friction, with the exponent in `shape`."""
-        return keeping_bristle(measured, rolling_exponent=shape["rolling_exponent"])
-
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Return the range of exponents with almost the same virgin curve."""

@@ -119,11 +119,6 @@ class BearingRecord:
         """Return the position [m] on the bearing, shape (n,), without the deflection of a contact."""
         return self.position if self.bent is None else self.position - self.bent
 
-    def beginning(self, count: int) -> BearingRecord:
-        """Return the first `count` samples."""
-        bent = None if self.bent is None else self.bent[:count]
-        return BearingRecord(self.time[:count], self.position[:count], bent, self.force[:count])
-
     def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
         """Return the record low-passed at `cutoff` [Hz] and thinned, with positions from its start.
 

@@ -10,15 +10,28 @@ from typing import TYPE_CHECKING, Any
 from friso.axis import axis_shown
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import percent
-from friso.questions.convert.words import SHOWN
 from friso.shown.cases import case_labels
 from friso.shown.drawing.prefixes import NOTHING, digits_that_differ, listed, range_with_unit, with_unit
 from friso.stage.stage import declared_keys
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from friso.studies.laws.conversion import MeasuredKind
     from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
+
+SHOWN: Mapping[MeasuredKind, str] = {
+    "curve": "steady friction over speed",
+    "static": "break-away",
+    "stiffness": "stiffness before sliding",
+    "virgin": "virgin curve",
+    "conditions": "the conditions of the stage",
+    "damping": "damping at rest",
+    "viscous": "viscous damping",
+    "loop area": "energy lost in a loop",
+    "loop stiffness": "stiffness of a loop",
+}
+"""Names of the properties of friction that measurements show."""
 
 SAME_EDGE = 1e-3
 """Relative difference of edges below which only one edge is stated."""

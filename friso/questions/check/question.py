@@ -122,8 +122,7 @@ class CheckAnswer(Answer):
         The doubt is that a friction law may give energy back, which no friction does.
         """
         from friso.questions.check.margin_words import joint_sentences
-        from friso.questions.check.words import between_surveyed, details_of
-        from friso.questions.convert.words import activity_sentences
+        from friso.questions.check.words import activity_sentences, between_surveyed, details_of
         from friso.stage.tables import passive_where
 
         activity = activity_sentences(passive_where(self.stage.flat()))

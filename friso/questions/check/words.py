@@ -484,6 +484,14 @@ def _window(case: Case, window: BandwidthWindow) -> str:
     return f"from {edge_text(case, low) if low else lowest} to {edge_text(case, high) if high else highest}"
 
 
+def activity_sentences(condition: str) -> list[str]:
+    """Say that a law may give energy back, with the `condition` under which it is passive.
+
+    An empty condition means that the law is passive, and nothing is said.
+    """
+    return [f"The law may give energy back, which no friction does. It is passive where {condition}."] * bool(condition)
+
+
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
     """Say what the survey of bandwidths may have missed between its steps.
 

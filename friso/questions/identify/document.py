@@ -15,7 +15,6 @@ from friso.identification.method import Experiment, Identification, Prediction
 from friso.identification.sources import LogFile
 from friso.questions.identify.estimates import key_document
 from friso.questions.identify.kind_view import view_of
-from friso.questions.identify.laws import laws_document
 from friso.questions.identify.words import headline, prediction_view
 from friso.shown.documents import entries, plain_json
 
@@ -37,7 +36,6 @@ def identify_document(
             {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}
             for prediction in predictions
         ],
-        **({} if identification.laws is None else {"friction_laws": laws_document(identification.laws)}),
         "failed": identification.failed,
         "doubts": [axis_shown().text(doubt) for doubt in identification.doubts],
         "warnings": [axis_shown().text(warning) for warning in identification.warnings],

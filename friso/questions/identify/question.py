@@ -143,7 +143,6 @@ def identify(
     bandwidth: FrequencyLike | None = None,
     band: FrequencyBand | None = None,
     period: TimeLike | None = None,
-    laws: bool = False,
     check: bool = False,
     folder: Path = Path(),
     keep: MappingKeeper | None = None,
@@ -168,8 +167,6 @@ def identify(
         Band of the response: "3 Hz .. 20 Hz".
     period : str or float, optional
         Period of a periodic excitation, "5 s" or a number [s].
-    laws : bool
-        Fit every friction law too, and say which of them the record supports; needs a stage.
     check : bool
         Also say whether the identified stage hunts, as friso check does of the stage file that is written.
     folder : Path
@@ -196,9 +193,6 @@ def identify(
         first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
         wanted = "a stage whose keys to override"
         raise InputError("set", str(first), wanted, "--stage stage.toml (in Python stage=...)")
-    if stage is None and laws:
-        wanted = "the stage, for its masses and what lies before its guide"
-        raise InputError("--laws", "no stage", wanted, "--stage stage.toml")
     tables = {} if stage is None else inputs.tables_of(stage)
     lacking = [name for name in TOLD_BY_LOGS if name not in tables] if "controller" in tables else []
     assumed = None if stage is None or lacking else inputs.stage_of(stage, set)
@@ -223,11 +217,8 @@ def identify(
     check_predictions(sources, others, assumed)
     from friso.identification.method import identify as identification
     from friso.identification.method import predict as predicted
-    from friso.identification.method import with_laws
 
     result = identification(sources, assumed, settings, progress, made_up)
-    if laws and assumed is not None:
-        result = with_laws(result, [source for source, _ in sources], assumed, progress)
     reused = [file.reused for file in held if file.reused]
     left_out = [f"left out: {_in_one_line(error)}" for error in unusable]
     result = replace(result, warnings=(*left_out, *reused, *_taken_from_logs(made_up), *result.warnings))

@@ -16,7 +16,6 @@ from friso.identification.logs.log import Log
 from friso.identification.method import nothing_learnt
 from friso.identification.ways import ways_to_show
 from friso.questions.identify.kind_view import Facts, PredictionView, view_of
-from friso.questions.identify.laws import TITLE, how, law_facts, law_sentence
 from friso.questions.identify.numbers import interval_text, name_of, value_text, with_interval, within
 from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
 
@@ -186,15 +185,9 @@ def _row(estimate: Estimate) -> EstimateRow:
 
 
 def summaries(identification: Identification) -> list[ExperimentSummary]:
-    """Return each experiment in words, then the comparison of friction laws if there is one."""
+    """Return each experiment in words."""
     several = zip(identification.experiments, labels(identification), strict=True)
-    experiments = [_summary(experiment, label) for experiment, label in several]
-    laws = identification.laws
-    return (
-        experiments
-        if laws is None
-        else [*experiments, ExperimentSummary("laws", TITLE, (how(laws),), law_facts(laws), ())]
-    )
+    return [_summary(experiment, label) for experiment, label in several]
 
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
@@ -249,7 +242,6 @@ def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tupl
 def sentences(identification: Identification, predictions: Sequence[Prediction]) -> list[str]:
     """Return the answer, how well other logs are predicted, and notes."""
     lines = [sentence for _, sentence in headline(identification)]
-    lines += [] if identification.laws is None else [law_sentence(identification.laws)]
     lines += [prediction_line(prediction)[1] for prediction in predictions]
     lines += [identification.stage.note] if identification.stage and identification.stage.note else []
     return lines + [f"note: {axis_shown().text(warning)}" for warning in identification.warnings]

@@ -5,11 +5,10 @@ Hysteresis loops over a slow motion to and fro, before sliding, are among what i
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,21 +20,19 @@ from friso.errors import InputError
 from friso.frequency.members import steady_force
 from friso.quantities import exactly
 from friso.stage import Stage
-from friso.stage.section import list_fields, nearest_name, numeric_fields
+from friso.stage.section import list_fields, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
-from friso.studies.laws.virgin import VirginPoints, read_virgin_curve, with_virgin_curve
 from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
 class HysteresisLoop:
-    """A loop of force over displacement, with an `amplitude` [m] to either side of rest.
+    """A loop of force over displacement.
 
     The loop encloses the `area` [J], the energy lost in one period. `stiffness` [N/m] is the difference of the forces
     at both ends, divided by the difference of the displacements.
     """
 
-    amplitude: float
     area: float
     stiffness: float
 
@@ -60,11 +57,11 @@ def hysteresis_loop(flat: Mapping[str, Any], amplitude: float, speed: float) -> 
     middles = (place[1:] + place[:-1])[-points:] / 2
     ends = int(middles.argmax()), int(middles.argmin())
     stiffness = (last[ends[0]] - last[ends[1]]) / (middles[ends[0]] - middles[ends[1]])
-    return HysteresisLoop(amplitude, float(np.sum(last * moved)), float(stiffness))
+    return HysteresisLoop(float(np.sum(last * moved)), float(stiffness))
 
 
-DEFAULT_ELEMENTS = 6
-"""Default number of elements, for a law that has several."""
+ELEMENTS_IN_PARALLEL = 6
+"""Number of elements of a law that has several."""
 
 UNCHANGED_SHARE = 1e-6
 """Relative difference below which a number counts as unchanged."""
@@ -86,19 +83,15 @@ energy lost in a hysteresis loop before sliding, and the loop's stiffness from e
 
 @dataclass(frozen=True)
 class MeasuredChange:
-    """A measured quantity `before` and `after` the conversion of a friction law [unit].
+    """The change of a measured quantity by the conversion of a friction law.
 
     `off` is the error by the conversion: relative to static friction for curves, and relative to the number itself for
-    numbers. An error of at most `allowed` counts as none. `amplitude` [m] is that of a hysteresis loop.
+    numbers. An error of at most `allowed` counts as none.
     """
 
     kind: MeasuredKind
-    unit: str
-    before: float
-    after: float
     off: float
     allowed: float = UNCHANGED_SHARE
-    amplitude: float | None = None
 
     @property
     def kept(self) -> bool:
@@ -110,19 +103,14 @@ class MeasuredChange:
 class LawConversion:
     """A stage converted to another friction law, and how its measured friction changed.
 
-    `source` is the original stage. `compared` has the measured quantities before and after, and `open` the ranges [SI]
-    of the keys that the measurements leave open. `active` names the condition of passivity that the law violates ("" if
-    it is passive). `points` are measured points of the virgin curve (None: the curve is that of the original law).
+    `compared` has the changes of the measured quantities, and `open` the ranges [SI] of the keys that the measurements
+    leave open. `active` names the condition of passivity that the law violates ("" if it is passive).
     """
 
     stage: Stage
-    source: Stage
-    before: MeasuredFriction
-    after: MeasuredFriction
     compared: tuple[MeasuredChange, ...]
     open: Mapping[str, tuple[float, float]]
     active: str
-    points: VirginPoints | None = None
 
     @property
     def law(self) -> str:
@@ -156,39 +144,18 @@ def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
     return law.shown(flat)
 
 
-def convert(
-    stage: Stage, law: str, elements: int = DEFAULT_ELEMENTS, virgin: str | os.PathLike[str] | None = None
-) -> LawConversion:
-    """Replace the friction law of a stage by another that measurements can hardly tell apart.
+def convert(stage: Stage, law: str) -> LawConversion:
+    """Replace the friction law of a stage by another, `convertible` one that measurements can hardly tell apart.
 
-    A law with parallel elements gets `elements` of them. Before sliding, the stage's own law counts as measured, or the
-    points in the file `virgin`. Raises InputError for a law to which friction cannot be converted, and for a stage
-    whose own law does not stick. A file without a usable virgin curve also raises it.
+    Raises InputError for a stage whose own law does not stick.
     """
-    if law not in convertible():
-        near = nearest_name(law, convertible()) or "gms"
-        raise InputError("--friction", f'"{law}"', f"one of {', '.join(convertible())}", f"--friction {near}")
     before = measure_friction(stage.flat())
-    if not before.stiffness and law != stage.flat()["friction.model"]:
+    if not before.stiffness:
         actual = f'"{stage.flat()["friction.model"]}", which does not stick: it has no stiffness before sliding to keep'
         raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
-    flat, made, points = stage.flat(), friction_law(law), None
-    if virgin is not None:
-        before, points = with_virgin_curve(before, *read_virgin_curve(virgin, stage.axis_kind))
-    keys, left_open = made.keeping(before, elements), made.left_open(before)
-    if law == flat["friction.model"]:
-        if points is None and _elements_of(law, flat) <= keys.keys() <= flat.keys():
-            return compared(stage, stage, before)
-        unseen = {key: flat[key] for key in left_open if _shows_the_same(stage, law, keys, keys | {key: flat[key]})}
-        keys |= unseen
-        left_open = {key: ends for key, ends in left_open.items() if key not in unseen}
-    return compared(stage, with_friction(stage, law, keys), before, left_open, points)
-
-
-def _shows_the_same(stage: Stage, law: str, keys: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Tell whether a law has equal virgin curves with two sets of its keys [SI]."""
-    one, two = (measure_friction(with_friction(stage, law, chosen).flat()) for chosen in (keys, other))
-    return bool(np.array_equal(one.force, two.force))
+    made = friction_law(law)
+    converted = with_friction(stage, law, made.keeping(before, ELEMENTS_IN_PARALLEL))
+    return compared(stage, converted, made.left_open(before))
 
 
 def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
@@ -202,29 +169,24 @@ def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
 
 
 def compared(
-    source: Stage,
-    made: Stage,
-    before: MeasuredFriction,
-    left_open: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-    points: VirginPoints | None = None,
+    source: Stage, made: Stage, left_open: Mapping[str, tuple[float, float]] = MappingProxyType({})
 ) -> LawConversion:
-    """Compare the friction of a converted stage, `made`, with the friction measured `before`.
+    """Compare the friction of a converted stage, `made`, with that of the stage before, `source`.
 
-    `source` is the stage before conversion. `left_open` are the ranges [SI] of the keys that measurements leave open in
-    the new stage. `points` are the measured points of the virgin curve, if there are any.
+    `left_open` are the ranges [SI] of the keys that measurements leave open in the new stage.
     """
     flat = made.flat()
-    after = measure_friction(flat)
+    before, after = measure_friction(source.flat()), measure_friction(flat)
     items = (
         _curve(source, made, before),
-        _number("static", "N", before.levels.static, after.levels.static),
-        _number("stiffness", "N/m", before.stiffness, after.stiffness),
-        _virgin_change(before, after, points),
-        _number("damping", "N*s/m", before.damping, after.damping),
-        _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
-        *(_loops(source, made, before) if points is None and before.stiffness and after.stiffness else ()),
+        _number("static", before.levels.static, after.levels.static),
+        _number("stiffness", before.stiffness, after.stiffness),
+        _virgin_change(before, after),
+        _number("damping", before.damping, after.damping),
+        _number("viscous", before.levels.viscous, after.levels.viscous),
+        *(_loops(source, made, before) if before.stiffness and after.stiffness else ()),
     )
-    return LawConversion(made, source, before, after, items, left_open, passive_where(flat), points)
+    return LawConversion(made, items, left_open, passive_where(flat))
 
 
 def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
@@ -235,10 +197,8 @@ def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[Mea
     deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
     for share in settings.loop_amplitudes:
         old, new = (hysteresis_loop(stage.flat(), share * deflection, speed) for stage in (source, made))
-        pairs = (("loop area", "J", old.area, new.area), ("loop stiffness", "N/m", old.stiffness, new.stiffness))
-        for kind, unit, first, second in pairs:
-            change = _number(cast(MeasuredKind, kind), unit, first, second)
-            yield replace(change, allowed=settings.loop_error, amplitude=old.amplitude)
+        yield _number("loop area", old.area, new.area, settings.loop_error)
+        yield _number("loop stiffness", old.stiffness, new.stiffness, settings.loop_error)
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -258,27 +218,18 @@ def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     return table
 
 
-def _elements_of(law: str, flat: Mapping[str, Any]) -> set[str]:
-    """Return the keys of a law's lists, such as "friction.element_stiffness.2", that are not 0.
-
-    `flat` has the stage's keys.
-    """
-    lists = tuple(f"friction.{name}." for name in list_fields(friction_law(law)))
-    return {key for key in flat if key.startswith(lists) and flat[key]}
-
-
 def _text(value: float, unit: str) -> Any:
     """Return a value as text with this unit for a stage file, which reads back exactly."""
     return exactly(value, unit) if unit else value
 
 
-def _number(kind: MeasuredKind, unit: str, before: float, after: float) -> MeasuredChange:
+def _number(kind: MeasuredKind, before: float, after: float, allowed: float = UNCHANGED_SHARE) -> MeasuredChange:
     size = max(abs(before), abs(after)) or 1.0
-    return MeasuredChange(kind, unit, before, after, abs(after - before) / size)
+    return MeasuredChange(kind, abs(after - before) / size, allowed)
 
 
 def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChange:
-    """Return steady friction before and after, at the speed where both laws differ most.
+    """Return the change of steady friction, at the speed where both laws differ most.
 
     Motion forward and back is compared.
     """
@@ -286,27 +237,12 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
     old, new = (
         np.stack([steady_force(stage.flat(), speeds, way) for way in (True, False)]) for stage in (source, made)
     )
-    at = np.unravel_index(int(np.argmax(np.abs(new - old))), old.shape)
-    off = float(np.abs(new - old)[at] / before.levels.static)
-    return MeasuredChange("curve", "N", float(old[at]), float(new[at]), off)
+    return MeasuredChange("curve", float(np.abs(new - old).max() / before.levels.static))
 
 
-def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
-    """Return the virgin curve before and after, at the displacement where it differs most.
-
-    The new law is compared with the old curve or, if there are any, the measured points.
-    """
+def _virgin_change(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
+    """Return the change of the virgin curve, at the displacement where it differs most."""
     if not after.stiffness:
-        return MeasuredChange(
-            "virgin", "N", before.levels.static, 0.0, float(before.stiffness > 0), settings.curve_error
-        )
-    if points is None:
-        old, new = before.force, np.interp(before.displacement, after.displacement, after.force)
-        scatter = 0.0
-    else:
-        new = np.interp(points.displacement, after.displacement, after.force)
-        old, new = points.means(points.force), points.means(new)
-        scatter = min(points.usual / np.sqrt(points.together), 2 * settings.curve_error * before.levels.static)
-    at, static = int(np.argmax(np.abs(new - old))), before.levels.static
-    off, allowed = float(abs(new - old)[at] / static), float(settings.curve_error + scatter / static)
-    return MeasuredChange("virgin", "N", float(old[at]), float(new[at]), off, allowed)
+        return MeasuredChange("virgin", float(before.stiffness > 0), settings.curve_error)
+    new = np.interp(before.displacement, after.displacement, after.force)
+    return MeasuredChange("virgin", before.misfit(new), settings.curve_error)

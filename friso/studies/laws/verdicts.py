@@ -17,15 +17,7 @@ from friso.hunting.criteria import ATTRACTED
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import (
-    DEFAULT_ELEMENTS,
-    LawConversion,
-    MeasuredKind,
-    compared,
-    convert,
-    convertible,
-    measure_friction,
-)
+from friso.studies.laws.conversion import LawConversion, MeasuredKind, compared, convert, convertible
 
 NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "viscous"))
 """Measured quantities that a law must keep to be tried."""
@@ -199,15 +191,12 @@ class VerdictsByLaw:
         return list(dict.fromkeys(filter(None, texts)))
 
 
-def verdicts_by_law(
-    stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = DEFAULT_ELEMENTS, progress: Progress = silent
-) -> VerdictsByLaw:
+def verdicts_by_law(stage: Stage, rtol: float = LONG_RUN_RTOL, progress: Progress = silent) -> VerdictsByLaw:
     """Check a stage for hunting under each friction law that keeps its measured friction.
 
-    Laws with parallel elements get `elements` of them. Raises InputError for a stage whose law cannot say what would be
-    measured.
+    Raises InputError for a stage whose law cannot say what would be measured.
     """
-    conversions, left_out = kept_laws(stage, elements)
+    conversions, left_out = kept_laws(stage)
     planned = [(conversion, [*trials_left_open(conversion).values()]) for conversion in conversions]
     total, done = sum(len(draws) for _, draws in planned), 0
     kernels(set[KernelRequest]().union(*(needed_kernels(conversion.stage) for conversion in conversions)))
@@ -224,20 +213,19 @@ def verdicts_by_law(
     return VerdictsByLaw(stage, tuple(verdicts), left_out)
 
 
-def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
+def kept_laws(stage: Stage) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
     """Return the stage under all laws that keep its measured friction, its own first.
 
-    Also returns, for every other law, the measured quantities that it loses. Laws with parallel elements get `elements`
-    of them.
+    Also returns, for every other law, the measured quantities that it loses.
     """
     own = stage.flat()["friction.model"]
-    kept = [compared(stage, stage, measure_friction(stage.flat()))]
+    kept = [compared(stage, stage)]
     left_out: dict[str, tuple[MeasuredKind, ...]] = {}
     for law in convertible():
         if law == own:
             continue
         try:
-            conversion = convert(stage, law, elements)
+            conversion = convert(stage, law)
         except InputError:
             if stage.conditions is None:
                 raise
@@ -251,7 +239,7 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
     return kept, left_out
 
 
-def frictions_that_keep(stages: Sequence[Stage], elements: int = DEFAULT_ELEMENTS) -> OtherLaws:
+def frictions_that_keep(stages: Sequence[Stage]) -> OtherLaws:
     """Return friction keys of stages under each other law that keeps their measured friction.
 
     The stages differ only in numbers of their friction. The keys come with SI values, by a name of the law: as
@@ -259,7 +247,7 @@ def frictions_that_keep(stages: Sequence[Stage], elements: int = DEFAULT_ELEMENT
     ranges. A law that keeps the measured friction of some stages only is listed as lost, with the indices of the
     others. Raises InputError for a stage whose law cannot say what would be measured.
     """
-    kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
+    kept = [{conversion.law: conversion for conversion in kept_laws(stage)[0][1:]} for stage in stages]
     frictions, lost = {}, {}
     for law in dict.fromkeys(law for conversions in kept for law in conversions):
         if lacking := [number for number, conversions in enumerate(kept) if law not in conversions]:
@@ -286,11 +274,9 @@ def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
     """Return the values [SI] to try for the keys that measurements leave open, by trial.
 
     The trial "" is as converted. In the trials "least" and "most", all open keys are at the lower or the upper ends of
-    their ranges. The stage's own law has one trial.
+    their ranges. The stage's own law, which leaves none open, has one trial.
     """
     trials: dict[str, dict[str, float]] = {"": {}}
-    if conversion.stage == conversion.source:
-        return trials
     flat = conversion.stage.flat()
     for end, name in enumerate(("least", "most")):
         changes = {key: ends[end] for key, ends in conversion.open.items() if not np.isclose(ends[end], flat[key])}

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from friso.quantities import percent
-from friso.questions.convert.words import SHOWN
+from friso.questions.check.laws import SHOWN
 from friso.shown.drawing.prefixes import listed
 from friso_thesis.studies.thesis.plausible import MAP_POINTS
 from friso_thesis.studies.thesis.space import OPEN, draw_name

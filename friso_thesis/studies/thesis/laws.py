@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.studies.laws.conversion import DEFAULT_ELEMENTS, LawConversion, MeasuredKind, compared, measure_friction
+from friso.studies.laws.conversion import LawConversion, MeasuredKind, compared
 from friso.studies.laws.verdicts import kept_laws
 from friso_thesis.studies.thesis.claims import (
     Claim,
@@ -87,7 +87,7 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
         if claim.id in CONCLUSIONS and (entry := registered().get(claim.id)) and claim.id in judged
     }
     evidences = {own: _evidence(reproduction.judged, reproduction.responses, rig)}
-    (_, *kept), left_out = kept_laws(rig, DEFAULT_ELEMENTS)
+    (_, *kept), left_out = kept_laws(rig)
     converted = [_apart(rig, conversion) for conversion in kept]
     for number, conversion in enumerate(converted):
         progress(number, len(converted), conversion.law)
@@ -124,4 +124,4 @@ def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
     if not same:
         return conversion
     far = {key: high for key, (_, high) in conversion.open.items()}
-    return compared(rig, conversion.stage.with_numbers(far), measure_friction(rig.flat()))
+    return compared(rig, conversion.stage.with_numbers(far))

@@ -27,7 +27,7 @@ def sentences(outcome: Outcome) -> list[str]:
     loops = (
         f"{len(result.loops)} loops of force over displacement, to {percent(LOOP_AMPLITUDES[0])} up to "
         f"{percent(LOOP_AMPLITUDES[-1])} of "
-        "static friction, tell friction laws apart: friso identify --laws."
+        "static friction, tell friction laws apart."
     )
     return [*lines, f"True bristles: stiffness {stiffness}, damping {damping}.", loops]
 
