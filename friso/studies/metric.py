@@ -52,16 +52,14 @@ class Word:
     """A word that a cell of a map can have.
 
     The word has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label for legends if that is
-    longer. `inferred` is a paler colour for cells whose word was inferred from neighbours. Words that are verbs stand
-    in the third person ("swings"), for sentences that count cells. With `is_open`, the word says that a cell's result
-    is not certain: findings are stated of the other cells.
+    longer. Words that are verbs stand in the third person ("swings"), for sentences that count cells. With `is_open`,
+    the word says that a cell's result is not certain: findings are stated of the other cells.
     """
 
     text: str
     colour: str
     meaning: str = ""
     label: str = ""
-    inferred: str = ""
     is_open: bool = False
 
 
