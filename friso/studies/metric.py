@@ -1,8 +1,8 @@
 """Define metrics of a map: how a cell's value is computed, coloured and named.
 
-Each metric is a module of `metrics`, named after the metric, which defines `METRIC`. Installed packages name theirs in
-the entry points `friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all follow
-from `METRIC`.
+A metric is an entry in the table of `metrics`, or a module of `metrics` named after it, which defines `METRIC`.
+Installed packages name such modules in the entry points `friso.metrics`. Stores, columns of files, axis labels,
+legends, sentences and `--metric` all follow from the metric.
 """
 
 from __future__ import annotations
