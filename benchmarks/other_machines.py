@@ -44,7 +44,7 @@ DEBIAN, PYTHON, GLIBC = "bookworm", "3.11", 36
 FOLDER = "opt/friso"
 """Folder of friso and its packages in the root."""
 
-MAP = ("--x", "controller.crossover=2 Hz..16 Hz:9", "--y", "friction.viscous=5 N*s/m..40 N*s/m:9", "--verify", "0")
+MAP = ("--x", "controller.crossover=2 Hz..16 Hz:9", "--y", "friction.viscous=5 N*s/m..40 N*s/m:9")
 
 
 @dataclass(frozen=True)

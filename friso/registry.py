@@ -23,8 +23,8 @@ class Registry(Generic[Item]):
     A module `break_away.py` declares "break-away", unless `dashes` are declined. The modules are those of a `package`,
     and, if there is a `group` of entry points, those that installed packages name in it; what the latter declare must
     be of a `kind`. Names and their descriptions, the first line of each module's docstring, are read without importing
-    any module. A module is imported when its declaration is first asked for. `added` takes what is declared elsewhere,
-    as (declared, description), by name.
+    any module. A module is imported when its declaration is first asked for. The package may declare more in a table,
+    TABLE, as (declared, description), by name. `added` takes what is declared elsewhere, in the same way.
     """
 
     def __init__(self, package: str, attribute: str, group: str = "", kind: type = object, dashes: bool = True) -> None:
@@ -34,9 +34,15 @@ class Registry(Generic[Item]):
 
     @cached_property
     def _own(self) -> dict[str, str]:
-        """Return friso's own modules by name."""
+        """Return friso's own modules by name; of an entry in the table, the package."""
         modules = iter_modules(import_module(self.package).__path__)
-        return {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
+        own = {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
+        return own | dict.fromkeys(self._listed, self.package)
+
+    @cached_property
+    def _listed(self) -> dict[str, tuple[Item, str]]:
+        """Return what the table of friso's own package declares."""
+        return getattr(import_module(self.package), "TABLE", {})
 
     @property
     def installed(self) -> Mapping[str, str]:
@@ -60,8 +66,8 @@ class Registry(Generic[Item]):
 
         Raises KeyError for an unknown one, InputError if another package's module declares nothing.
         """
-        if name in self.added:
-            return self.added[name][0]
+        if described := (self._listed | self.added).get(name):
+            return described[0]
         if name in self._own:
             return getattr(import_module(self._own[name]), self.attribute)
         if name not in self.installed:
@@ -84,8 +90,8 @@ class Registry(Generic[Item]):
 
         Its full stop is removed. Raises KeyError for an unknown name.
         """
-        if name in self.added:
-            return self.added[name][1]
+        if described := (self._listed | self.added).get(name):
+            return described[1]
         module = self._own.get(name) or self.installed[name]
         try:
             loader: Any = getattr(find_spec(module), "loader", None)

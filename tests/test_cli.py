@@ -221,7 +221,6 @@ def test_version() -> None:
         (["tune", RIG, "--only", "jont"], "--only"),
         (["reproduce", "--points", "x"], "--points"),
         (["compare", RIG, "--machines=1e3"], "--machines"),
-        (["map", RIG, "--verify", "some"], "--verify"),
         (["check", RIG, "--draws", " "], "--draws"),
         (["app", "--port", "70000"], "--port"),
     ],

@@ -134,7 +134,7 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
             if len(computed) == 3:
                 psutil.Process(pids[0]).kill()
 
-        run_in_store(study, path, crew, 0.0, kill_after_two)
+        run_in_store(study, path, crew, kill_after_two)
     with Store.opened(path, study) as store:
         assert list(store.missing()) == []
         stage = store.read().load()
@@ -184,7 +184,7 @@ def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
         pytest.raises(RuntimeError, match="lost a block"),
         connected(scheduler.scheduler_address) as crew,
     ):
-        run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, 0.0, close)
+        run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, close)
 
 
 def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None:
@@ -193,6 +193,6 @@ def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None
 
     with connected(cluster.scheduler_address) as crew:
         with pytest.raises(KeyboardInterrupt):
-            run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, 0.0, interrupt)
+            run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, interrupt)
         (result,) = run_in_memory([Request(rig, AXES).study()], crew)
     assert (result.outcome != "").all()

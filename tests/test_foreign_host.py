@@ -39,7 +39,7 @@ acceleration_time = "20 ms"
 return_at = "1 s"
 duration = "2 s"
 """
-SPAN = ("--x", "controller.crossover=10 Hz..30 Hz:9", "--y", "masses.stage=2 kg..4 kg:9", "--verify", "0")
+SPAN = ("--x", "controller.crossover=10 Hz..30 Hz:9", "--y", "masses.stage=2 kg..4 kg:9")
 
 on_both = pytest.mark.parametrize("host", ["win32", "darwin"])
 

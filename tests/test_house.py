@@ -7,8 +7,10 @@ import inspect
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
+import grimp
 import pytest
 import typer
 from typer.core import TyperGroup
@@ -275,3 +277,11 @@ def mentions(node: ast.AST, names: set[str]) -> bool:
         or (isinstance(part, ast.Constant) and str(part.value) in names and is_inner(str(part.value)))
         for part in ast.walk(node)
     )
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """A circle of imports is one module in several files; `__init__` modules name what their rooms offer."""
+    graph = grimp.build_graph("friso", "friso_thesis", exclude_type_checking_imports=True, cache_dir=None)
+    sorter = TopologicalSorter({name: graph.find_modules_directly_imported_by(name) for name in graph.modules})
+    sorter.prepare()  # raises CycleError
+    assert sorter.is_active()

@@ -57,8 +57,6 @@ def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     assert runs.peaks.dims == ("controller.crossover", "joint.stroke")
     assert document["cells"] == 20
     assert document["outcomes"]["swings"] == int((runs.outcome == "swings").sum())
-    assert document["verified"]["cells"] == 20
-    assert 0 < document["verified"]["surviving"] <= 20
     assert document["axes"]["joint.stroke"] == {"points": 4, "unit": "m", "first": 0.0, "last": 1e-3}
     done = friso_inside(folder, "map", "a.zarr", "--metric", "peaks", "--json")  # from its store alone
     assert done.returncode == 0, done.stderr
@@ -88,7 +86,7 @@ def test_files_of_the_user_are_not_overwritten(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.csv"]
 
 
-OF_ANOTHER_STUDY = (("--metric", "loudness"), ("--rtol", "1e-4"), ("--refine",), ("--log",), ("--samples", "8"))
+OF_ANOTHER_STUDY = (("--metric", "loudness"), ("--rtol", "1e-4"), ("--log",), ("--samples", "8"))
 
 
 @pytest.mark.parametrize("options", [*OF_ANOTHER_STUDY, ("--set", "controller.alpha=0.2")])
@@ -144,7 +142,6 @@ def _interruptible() -> None:
         (*SMALL, "--out", RIG),
         (*SMALL, "--out", RIG / "below.zarr"),
         (*SMALL, "--rtol", "loose"),
-        (*SMALL, "--verify", "5"),
         (*SMALL, "--export", "a.xls"),
         (*SMALL, "--export", "absent/a.csv"),
         (*SMALL, "--link", "masses.cart=0.7 * mas"),
@@ -174,7 +171,7 @@ def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str,
 
 
 def test_an_invalid_cell_gives_its_reason(tmp_path: Path) -> None:
-    axes = ("--x", "friction.coulomb=1 N, 4 N", "--out", "a.zarr", "--verify", "0")
+    axes = ("--x", "friction.coulomb=1 N, 4 N", "--out", "a.zarr")
     assert friso_inside(tmp_path, "map", RIG, *axes).returncode == 0
     done = friso_inside(tmp_path, "simulate", "--cell", "a.zarr", 1)
     assert done.returncode == 2
@@ -278,7 +275,7 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
 
     monkeypatch.setattr("friso.studies.store_files.FileLock", Denied)
     elsewhere = ("--out", "figures", "--export", "c.csv")
-    done = friso_inside(tmp_path, "map", "a.zarr", *elsewhere, "--verify", "1")
+    done = friso_inside(tmp_path, "map", "a.zarr", *elsewhere)
     assert done.returncode == 0, done.stderr
     assert {file.name for file in (tmp_path / "figures").iterdir()} > {"map.png", "map.html"}
     assert "wrote figures/map.html" in done.stdout
@@ -290,14 +287,14 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
     )
     assert (done.returncode, "cannot be written to" in done.stderr) == (2, True)  # not the runs of the other study
     (tmp_path / "a.png").unlink()
-    monkeypatch.setattr("friso.questions.map.question.verify_cells", None)  # refused before anything is run
+    monkeypatch.setattr("friso.questions.map.question.fill", None)  # refused before anything is run
     assert "example:  friso map a.zarr --out figures" in friso_inside(tmp_path, "map", "a.zarr").stderr
     assert {file.name for file in tmp_path.iterdir()} == {"a.zarr", "figures", "c.csv"}
 
 
 def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
-    other = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--out", "a.zarr", "--verify", "0")
+    other = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--out", "a.zarr")
     assert friso_inside(tmp_path, *other).returncode == 2
     assert friso_inside(tmp_path, *other, "--overwrite").returncode == 0
     with xr.open_zarr(tmp_path / "a.zarr") as stored:
@@ -327,7 +324,7 @@ def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(mapped: tuple[Pa
     more = tmp_path / "b.zarr"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("friso.questions.map.study.with_usual", lambda metric: (*with_usual(metric), "verdict"))
-        small = ("--x", "controller.crossover=4 Hz, 5 Hz", "--out", more, "--verify", "0")
+        small = ("--x", "controller.crossover=4 Hz, 5 Hz", "--out", more)
         assert friso_inside(tmp_path, "map", RIG, *small).returncode == 0
     done = friso_inside(tmp_path, "map", RIG, *small, "--metric", "peaks")
     assert done.returncode == 0, done.stderr

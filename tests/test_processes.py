@@ -29,7 +29,7 @@ AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:
 pytestmark = pytest.mark.xdist_group("rig")
 
 
-def test_processes_of_its_own_verify_too_and_open_no_port(
+def test_processes_of_its_own_give_the_same_and_open_no_port(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The processes also do not run a file in the current folder that has the name of a module they import."""
@@ -44,8 +44,8 @@ def test_processes_of_its_own_verify_too_and_open_no_port(
         assert not [connection for connection in own if connection.status == psutil.CONN_LISTEN]
 
     with processes(2) as crew:
-        (result,) = run_in_memory([Request(rig, AXES).study()], crew, 0.05, look)
-    xr.testing.assert_identical(result, sweep(rig, AXES, verify=0.05))
+        (result,) = run_in_memory([Request(rig, AXES).study()], crew, look)
+    xr.testing.assert_identical(result, sweep(rig, AXES))
     assert seen
     alive = [process for process in seen if process.is_running() and process.status() != psutil.STATUS_ZOMBIE]
     assert not [process for process in alive if "spawn_main" in str(process.cmdline())]
@@ -61,7 +61,7 @@ def test_a_process_that_is_killed_costs_nothing_that_is_done(rig: Stage, tmp_pat
             next(iter(crew.executor._processes.values())).kill()  # pyright: ignore[reportAttributeAccessIssue]
 
     with pytest.raises(RuntimeError, match="lost a block"), processes(2) as crew:
-        run_in_store(study, path, crew, 0.0, kill)
+        run_in_store(study, path, crew, kill)
     with Store.opened(path, study) as store:
         left = sum(map(cells_of, store.missing()))
         assert 0 < left <= study.cells - done_by_then[2]

@@ -312,6 +312,8 @@ def test_what_one_survey_observed_makes_no_edge_certain_unless_a_thorough_one_do
 def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:
     others = (rig.replace({"joint.locked": False}), locked.replace({"controller.error_deadband": "1 um"}))
     assert [has_a_map(Ensemble.held(stage.flat(), 1)) for stage in (locked, *others)] == [True, False, False]
+    with ReturnMapSettings(maps_decide=False).in_use():
+        assert not has_a_map(Ensemble.held(locked.flat(), 1))
 
 
 def test_a_pair_of_landings_beside_a_cycle_that_repels_is_not_taken_for_it(survey: MapSurvey) -> None:

@@ -31,15 +31,14 @@ from systems import posix
 import friso as friso_api
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
-from friso.studies import refine, store_files
 from friso.studies import store as storing
+from friso.studies import store_files
 from friso.studies.axes import Samples
 from friso.studies.execute import local_crew
 from friso.studies.metadata import annotate_metadata, checked_metadata, digest
-from friso.studies.metric import is_text
 from friso.studies.sealed_store import SealedStore
 from friso.studies.settings import StudySettings
-from friso.studies.store import KeptCells, Store, check_store, read_store
+from friso.studies.store import Store, check_store, read_store
 from friso.studies.store_files import LOCK, keep_arrays, kept_arrays, make
 from friso.studies.study import Request, Study, study_of
 from friso.studies.sweep import run_in_store, sweep
@@ -81,16 +80,16 @@ RUN = """
 import sys
 import friso
 from friso.studies.sweep import sweep
-sweep(friso.load(sys.argv[1]), {AXES!r}, store=sys.argv[2], refine=len(sys.argv) > 3, threads=1, rtol=1e-9)
+sweep(friso.load(sys.argv[1]), {AXES!r}, store=sys.argv[2], threads=1, rtol=1e-9)
 """
 
 
-def killed_and_resumed(folder: Path, *options: str) -> tuple[xr.Dataset, int]:
+def killed_and_resumed(folder: Path) -> tuple[xr.Dataset, int]:
     """The study run in processes that are killed once they have written some files; how many were killed."""
     script = folder / "run.py"
     script.write_text(RUN.replace("{AXES!r}", repr(AXES)))
     path = folder / "killed.zarr"
-    command = [sys.executable, str(script), str(EXAMPLES / "thesis_rig.toml"), str(path), *options]
+    command = [sys.executable, str(script), str(EXAMPLES / "thesis_rig.toml"), str(path)]
     random.seed(3)
     kills = 0
 
@@ -109,14 +108,10 @@ def killed_and_resumed(folder: Path, *options: str) -> tuple[xr.Dataset, int]:
     return read_store(path), kills
 
 
-@pytest.mark.parametrize("options", [(), pytest.param(("--refine",), marks=pytest.mark.thorough)])
-def test_a_study_killed_several_times_is_as_if_it_never_was(
-    rig: Stage, tmp_path: Path, options: tuple[str, ...]
-) -> None:
-    resumed, kills = killed_and_resumed(tmp_path, *options)
+def test_a_study_killed_several_times_is_as_if_it_never_was(rig: Stage, tmp_path: Path) -> None:
+    resumed, kills = killed_and_resumed(tmp_path)
     assert kills >= 2
-    same(resumed, sweep(rig, AXES, rtol=1e-9, refine=bool(options)))
-    assert not (tmp_path / "killed.zarr" / ".answers").exists()
+    same(resumed, sweep(rig, AXES, rtol=1e-9))
 
 
 def test_ctrl_c_keeps_what_is_done_and_repeats_the_rest(
@@ -183,7 +178,6 @@ LISTS = {"joint.stroke": ["0.1 mm", "1 mm"], "controller.alpha": [0.1, 0.2]}
         ({}, {"rtol": 1e-5}),
         ({}, {"metrics": ["peaks"]}),
         ({}, {"links": {"friction.static": "3 * friction.coulomb"}}),
-        ({}, {"refine": True}),
         # sampled keys of equal values, fewer keys, or links in another order
         ({"samples": Samples(SAMPLES, 8)}, {"samples": Samples({"masses.cart": "0.5 kg..1 kg"}, 8)}),
         ({"samples": Samples(LISTS)}, {"samples": Samples({"joint.stroke": LISTS["joint.stroke"]})}),
@@ -212,64 +206,35 @@ def test_chunks_that_a_power_cut_took_are_run_again(rig: Stage, whole: xr.Datase
     same(sweep(rig, AXES, store=path), whole)
 
 
-def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A refined study begun by a friso that chose other cells."""
-    path, study = tmp_path / "a.zarr", refine.finer(study_on(rig))
-    asked: list[int] = []
-
-    def stop(done: int, total: int, what: str) -> None:
-        asked.append(done)
-        if len(asked) == 3:
-            raise KeyboardInterrupt
-
-    with StudySettings(lattice_step=6).in_use():
-        with pytest.raises(KeyboardInterrupt), local_crew(2) as crew:
-            run_in_store(study, path, crew, 0.0, stop)
-        monkeypatch.undo()
-        assert (path / ".answers" / "0.npz").exists()
-        same(sweep(rig, AXES, refine=True, store=path), sweep(rig, AXES, refine=True))
-
-
 def unreadable_archive(stream: BinaryIO) -> None:
     """An archive with the header of an array that ends within a bracket, of which NumPy raises a TokenError."""
     with zipfile.ZipFile(stream, "w") as archive:
         archive.writestr("peaks.npy", b"\x93NUMPY\x01\x00\x0a\x00{'descr': \n")
 
 
-def test_answers_are_those_of_their_study_and_no_larger(
-    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Answers of another study of that shape, of other metrics, or with too much in them are computed anew."""
-    study, cells, asked = Request(rig, AXES).study(["peaks", "outcome"]), np.arange(5), []
-
-    def ask(cells: np.ndarray) -> dict[str, np.ndarray]:
-        asked.append(cells)
-        names = refine.asked_for(study).metrics
-        return {name: np.full(len(cells), "rests" if is_text(name) else 1.0) for name in names}
-
-    def keeping(digest: str = "a study") -> int:
-        """Return how many times `ask` has been called so far."""
-        KeptCells(tmp_path, study, digest).keeping(ask)(cells)
-        return len(asked)
-
-    assert [keeping(), keeping(), keeping("another"), keeping("another"), keeping()] == [1, 1, 2, 2, 3]
-    whole = kept_arrays(tmp_path / "0.npz", "a study")
+def test_kept_arrays_are_whole_and_no_larger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays that are damaged, of another file, or with too much in them are not taken."""
+    file, arrays = tmp_path / "0.npz", {"peaks": np.ones(5), "outcome": np.full(5, "rests")}
+    keep_arrays(file, arrays)
+    whole = kept_arrays(file)
     assert whole is not None
-    for change in ({"peaks": whole["peaks"][1:]}, {"peaks": whole["status"]}, {"more": whole["peaks"]}):
-        keep_arrays(tmp_path / "0.npz", {**whole, **change}, "a study")
-        before = len(asked)
-        assert keeping() == before + 1, change
-    content = (tmp_path / "0.npz").read_bytes()
+    assert {name: values.tolist() for name, values in whole.items()} == {
+        name: values.tolist() for name, values in arrays.items()
+    }
+    content = file.read_bytes()
     for place in range(len(content)):
-        (tmp_path / "0.npz").write_bytes(content[:place] + bytes([content[place] ^ 8]) + content[place + 1 :])
-        assert kept_arrays(tmp_path / "0.npz", "a study") is None
+        file.write_bytes(content[:place] + bytes([content[place] ^ 8]) + content[place + 1 :])
+        assert kept_arrays(file) is None
+    (tmp_path / "1.npz").write_bytes(content)
+    assert kept_arrays(tmp_path / "1.npz") is None
     with monkeypatch.context() as patch:  # what others write, with a sound digest
         patch.setattr(np, "savez_compressed", unreadable_archive)
-        keep_arrays(tmp_path / "0.npz", {}, "a study")
-    assert kept_arrays(tmp_path / "0.npz", "a study") is None
-    keep_arrays(tmp_path / "0.npz", {**whole, "more": np.zeros(10**6)}, "a study")
+        keep_arrays(file, {})
+    assert kept_arrays(file) is None
+    keep_arrays(file, {**arrays, "more": np.zeros(10**6)})
+    monkeypatch.setattr(store_files, "MOST_EXPANDED", 10**6)
     monkeypatch.setattr(np, "load", lambda *arguments, **named: pytest.fail("it was expanded"))
-    keeping()
+    assert kept_arrays(file) is None
 
 
 def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -386,7 +351,7 @@ def test_export(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
 def finished(rig: Stage, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store of the study, which is done."""
     path = tmp_path_factory.mktemp("finished") / "a.zarr"
-    sweep(rig, AXES, store=path, verify=0.3)
+    sweep(rig, AXES, store=path)
     return path
 
 
@@ -435,7 +400,7 @@ def test_a_damaged_block_is_run_again(
     with Store.opened(stored, study_on(rig)) as store:
         assert len(list(store.missing())) == 1
     assert "block 1.0" in caplog.text
-    sweep(rig, AXES, store=stored, verify=0.3)
+    sweep(rig, AXES, store=stored)
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
 
@@ -533,8 +498,8 @@ def test_a_folder_in_place_of_a_file_and_a_file_in_place_of_a_folder_are_refused
 ) -> None:
     """Checking the store, continuing it and replacing it all refuse it; once they are removed, it is written again."""
     study, other = study_on(rig), Request(rig, AXES).study(rtol=1e-4)
-    files = [stored / name for name in (".zgroup", "peaks/.zarray", ".blocks/0.0", "peaks/0.0", ".answers/0.npz")]
-    for path in [*files, *(stored / name for name in (".blocks", "peaks", ".answers"))]:
+    files = [stored / name for name in (".zgroup", "peaks/.zarray", ".blocks/0.0", "peaks/0.0")]
+    for path in [*files, *(stored / name for name in (".blocks", "peaks"))]:
         if path.is_dir():
             shutil.rmtree(path)
         path.unlink(missing_ok=True)
@@ -553,7 +518,7 @@ def test_a_folder_in_place_of_a_file_and_a_file_in_place_of_a_folder_are_refused
         shutil.rmtree(path) if path in files else path.unlink()
         with Store.opened(stored, study):
             assert check_store(stored).files == []
-    sweep(rig, AXES, store=stored, verify=0.3)
+    sweep(rig, AXES, store=stored)
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
     assert check_store(stored).damaged == []
 
@@ -592,7 +557,6 @@ FOREIGN = (
     {"chunks": [-1]},
     {"dtype": "<U9999", "chunks": [10**5]},
 )
-VERIFIED = {"verified_cells": 3, "verified_surviving": 1, "verified_rtol": 1e-8}
 
 
 @pytest.mark.parametrize(
@@ -600,8 +564,6 @@ VERIFIED = {"verified_cells": 3, "verified_surviving": 1, "verified_rtol": 1e-8}
     [
         *((f"{array}/.zarray", change) for array in ("joint.stroke", "peaks") for change in FOREIGN),
         (".zattrs", {"rtol": 1e300}),
-        (".zattrs", {**VERIFIED, "verified_cells": 10**400}),
-        (".zattrs", {**VERIFIED, "verified_surviving": "<b>"}),
         ("peaks/.zarray", {"chunks": [1, 1]}),
         ("peaks/.zarray", {"dimension_separator": "/"}),
         ("joint.stroke/.zarray", {"shape": [10**11]}),  # an axis is not longer than what is there of it
@@ -726,7 +688,7 @@ def test_exchanged_chunks_are_run_again(
     for name in names or [*read_store(stored).data_vars, ".blocks"]:
         exchange(stored / str(name) / "0.0", stored / str(name) / "1.0")
     assert check_store(stored).damaged == ["0.0", "1.0"]
-    sweep(rig, AXES, store=stored, verify=0.3)
+    sweep(rig, AXES, store=stored)
     assert "block 0.0" in caplog.text
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
@@ -802,7 +764,7 @@ def test_every_file_of_metadata_is_checked_and_written_anew(stored: Path, finish
 def test_a_store_is_open_to_whom_the_user_lets_read_files(rig: Stage, tmp_path: Path) -> None:
     before = os.umask(0o027)
     try:
-        sweep(rig, {"controller.crossover": "2 Hz, 3 Hz"}, store=tmp_path / "a.zarr", verify=0.5)
+        sweep(rig, {"controller.crossover": "2 Hz, 3 Hz"}, store=tmp_path / "a.zarr")
     finally:
         os.umask(before)
     modes = {file.stat().st_mode & 0o777 for file in (tmp_path / "a.zarr").rglob("*") if file.name != LOCK}

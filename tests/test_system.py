@@ -68,5 +68,5 @@ def test_one_core_runs_no_second_thread(rig: Stage, monkeypatch: pytest.MonkeyPa
             raise AssertionError(f"a pool of {arguments} threads")
 
     monkeypatch.setattr(batch, "ThreadPoolExecutor", Refused)
-    runs = sweep(rig, {"controller.crossover": "2 Hz..16 Hz:24"}, verify=0.0)
+    runs = sweep(rig, {"controller.crossover": "2 Hz..16 Hz:24"})
     assert runs.outcome.size == 24

@@ -29,7 +29,7 @@ from benchmarks.return_map.compared import page
 from benchmarks.truth.classes import classes_of
 from benchmarks.truth.draws import SERIES, draw
 from friso.engine.kernel import kernels
-from friso.hunting import needed_kernels, search_alone
+from friso.hunting import ReturnMapSettings, needed_kernels
 from friso.stage import Stage
 
 HARD = Path(__file__).parents[2] / "tests" / "hard_stages.toml"
@@ -82,7 +82,7 @@ def _answered(record: dict[str, Any], stage: Stage, before: dict[str, Any] | Non
     kernels(needed_kernels(stage))
     with np.errstate(all="ignore"):
         by_map = checked(stage)
-        with search_alone():
+        with ReturnMapSettings(maps_decide=False).in_use():
             by_search = before["searched"] if before else checked(stage)
     print(f"{_key(record)}: {by_search['work'] / 1e6:.0f}e6 and {by_map['work'] / 1e6:.0f}e6", file=sys.stderr)
     day = date.today().isoformat()

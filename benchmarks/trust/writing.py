@@ -150,7 +150,7 @@ def store_versions(rng: random.Random, folder: Path) -> None:
     own, attributes = document["friso"], document["metadata"][".zattrs"]
     own["format"] = rng.choice((0, 1, 2, 3, 99, -1, "2", None, [], 2.5, 10**30))
     attributes["equations"] = rng.choice((attributes["equations"], "9.9.9 (000000000000)", 3, ""))
-    names = ("axes", "links", "rtol", "refined", "stage", "machine", "friso", "verified_cells", "verified_surviving")
+    names = ("axes", "links", "rtol", "stage", "machine", "friso")
     for name in rng.sample(names, rng.randrange(3)):
         attributes[name] = rng.choice((None, "", "{", 3, [], "NaN", "1e999", attributes.get(name)))
     if rng.random() < 0.5:
@@ -214,7 +214,7 @@ def _write_missing(path: Path) -> None:
     with Store.opened(path, _study()) as store:
         for block in list(store.missing()):
             store.write(block, {name: values[block] for name, values in columns.items()})
-        store.annotate({"verified_share": 0.5})
+        store.note(metric="peaks")
 
 
 def _assert_same(path: Path, what: str) -> None:

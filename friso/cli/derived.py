@@ -74,9 +74,8 @@ def _asked(question: Question) -> Iterator[Parameter]:
         parameter = parameters[name]
         kind = _kind_of(str(parameter.annotation))
         if kind is not None and name not in (*OF_THE_CALLER, "out", "overwrite"):
-            default = question.defaults.get(name, parameter.default)
             kind = replace(kind, metavar=question.metavars.get(name, kind.metavar))
-            shown = CommandParameter(name, kind, default, meaning(question.function, name))
+            shown = CommandParameter(name, kind, parameter.default, meaning(question.function, name))
             yield _argument(shown) if name in question.takes else _option(shown)
 
 

@@ -52,12 +52,12 @@ from friso.hunting.many_stages import (
 from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
 from friso.hunting.path import AttractionEnd, BandwidthWindow
+from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
 from friso.hunting.sliding import StickSlipSpeeds
 from friso.hunting.stage_margins import ParameterMargin, joint_margins
 from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement
-from friso.hunting.what_attracts import search_alone
 
 __all__ = [
     "CLOSED",
@@ -101,6 +101,7 @@ __all__ = [
     "Plane",
     "Point",
     "ReturnMap",
+    "ReturnMapSettings",
     "Reversal",
     "SearchLimits",
     "Solver",
@@ -140,7 +141,6 @@ __all__ = [
     "needed_kernels",
     "plane",
     "pushes_that_hunt",
-    "search_alone",
     "sketch_attractors",
     "stuck",
     "tracking",

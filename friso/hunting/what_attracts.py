@@ -6,8 +6,6 @@ Where a map does not decide, stages are searched from many starts.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -237,22 +235,6 @@ def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:
         yield Swinging(stage, size * length, time, period, first, whole, slope=slope)
 
 
-_SEARCHES_ALONE = ContextVar("searches alone", default=False)
-
-
-@contextmanager
-def search_alone() -> Iterator[None]:
-    """Switch return maps off in the `with` block: stages are searched from many starts.
-
-    Comparing both results shows whether maps are right.
-    """
-    token = _SEARCHES_ALONE.set(True)
-    try:
-        yield
-    finally:
-        _SEARCHES_ALONE.reset(token)
-
-
 def map_may_decide(stages: Ensemble) -> bool:
     """Tell whether maps may decide what attracts stages: they have one, and remember no past."""
     return has_a_map(stages) and not stages.remember
@@ -269,9 +251,9 @@ def has_a_map(stages: Ensemble) -> bool:
     - Integrals of several loops wind up separately.
     - The stage may stand anywhere within a dead band or a backlash.
 
-    The result is also false within a block of `search_alone`.
+    The result is also false where the setting `maps_decide` is.
     """
-    if _SEARCHES_ALONE.get():
+    if not settings.maps_decide:
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))
     return not (stages.chatters or stands_anywhere or winds_up_at_a_limit(stages) or stages.outer_integrals)

@@ -109,9 +109,6 @@ class Question:
 
     choices: Choices | None = None
 
-    defaults: Mapping[str, Any] = field(default_factory=dict)
-    """Defaults of the command that differ from those of the function."""
-
     metavars: Mapping[str, str] = field(default_factory=dict)
     """Placeholder of a parameter's value in the help, if the usual placeholder says too little."""
 

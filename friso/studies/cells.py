@@ -97,9 +97,6 @@ def built_runs(
 Columns = dict[str, np.ndarray]
 """Names to arrays of shape (cells,)."""
 
-INFERRED = "inferred"
-"""First words of the status of a cell that was not run, because its neighbours agree."""
-
 
 SURVEYS: Mapping[MetricBasis, Callable[..., StageAttractors]] = {"sketch": sketch_attractors, "survey": find_attractors}
 """Searches for attractors, by the source of the metrics that need them."""

@@ -107,18 +107,13 @@ def seal_metadata(path: Path, axes: Iterable[str]) -> None:
     _write(path, Metadata(document, study, digests, {}))
 
 
-def annotate_metadata(
-    path: Path, attributes: Mapping[str, Any] | None = None, notes: Mapping[str, Any] | None = None
-) -> None:
-    """Add attributes of the study, and friso's notes, to the metadata of the store at `path`.
+def annotate_metadata(path: Path, notes: Mapping[str, Any]) -> None:
+    """Add friso's `notes` to the metadata of the store at `path`.
 
     Raises StoreError if the metadata are damaged or missing, and OSError if they cannot be written.
     """
     metadata = checked_metadata(path)
-    if attributes:
-        files = {**metadata.files, _ATTRIBUTES: {**metadata.attributes, **attributes}}
-        metadata = replace(metadata, document={**metadata.document, "metadata": files})
-    _write(path, replace(metadata, notes={**metadata.notes, **(notes or {})}))
+    _write(path, replace(metadata, notes={**metadata.notes, **notes}))
 
 
 def _write(path: Path, metadata: Metadata) -> None:

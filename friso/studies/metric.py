@@ -1,8 +1,8 @@
 """Define metrics of a map: how a cell's value is computed, coloured and named.
 
-Each metric is a module of `metrics`, named after the metric, which defines `METRIC`. Installed packages name theirs in
-the entry points `friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all follow
-from `METRIC`.
+A metric is an entry in the table of `metrics`, or a module of `metrics` named after it, which defines `METRIC`.
+Installed packages name such modules in the entry points `friso.metrics`. Stores, columns of files, axis labels,
+legends, sentences and `--metric` all follow from the metric.
 """
 
 from __future__ import annotations
@@ -52,16 +52,14 @@ class Word:
     """A word that a cell of a map can have.
 
     The word has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label for legends if that is
-    longer. `inferred` is a paler colour for cells whose word was inferred from neighbours. Words that are verbs stand
-    in the third person ("swings"), for sentences that count cells. With `is_open`, the word says that a cell's result
-    is not certain: findings are stated of the other cells.
+    longer. Words that are verbs stand in the third person ("swings"), for sentences that count cells. With `is_open`,
+    the word says that a cell's result is not certain: findings are stated of the other cells.
     """
 
     text: str
     colour: str
     meaning: str = ""
     label: str = ""
-    inferred: str = ""
     is_open: bool = False
 
 

@@ -84,22 +84,6 @@ class StudySettings(Settings):
     curve_error: float = setting(0.02, "")
     """Largest difference of virgin curves that a measurement cannot resolve."""
 
-    finer_factor: int = setting(4, "")
-    """Refinement of a boundary per axis. Eight would take most of the runs."""
-
-    refined_share: float = setting(0.2, "")
-    """Fraction of the fine grid of a map that is run. Fewer runs may step over small islands."""
-
-    lattice_step: int = setting(8, "")
-    """Spacing of the first runs in the fine grid [cells]. A smaller one leaves fewer runs for the boundary."""
-
-    refine_batches: int = setting(100, "")
-    """Batches of runs of a refined map, each chosen after the results of the one before. More wait for their slowest
-    cell."""
-
-    late_settling: float = setting(10.0, "s")
-    """Time after which the thesis counts peaks. A run that settles so late counts as swinging."""
-
     least_blocks: int = setting(8, "")
     """Fewest blocks of a store, so that an interruption loses an eighth of a study at most."""
 
@@ -123,18 +107,6 @@ class StudySettings(Settings):
 
     traces_together: int = setting(256, "")
     """Traces computed together, some tens of megabytes."""
-
-    tighter_factor: float = setting(100.0, "")
-    """Factor by which verification tightens the tolerance. A smaller one leaves similar errors in both runs."""
-
-    least_verified: int = setting(50, "")
-    """Fewest verified cells for a meaningful fraction."""
-
-    wanted_survival: float = setting(0.99, "")
-    """Required fraction of outcomes that survive at an automatic tolerance."""
-
-    candidate_rtols: tuple[float, ...] = setting((1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), "")
-    """Tolerances for the automatic choice, the loosest first."""
 
     points_of_a_loop: int = setting(1000, "")
     """Samples of a period of a hysteresis loop. Fewer cut its corners."""

@@ -2,8 +2,7 @@
 
 The store is made complete, without results, elsewhere and then moved into place. A block is done once its digests are
 recorded (`Ledger`), after its chunks were written, each moved into place by Zarr. A block whose chunks differ from the
-record is run again. Results of a refined study are kept until it is done, so that no cell is run twice. Other programs
-get studies as NetCDF and CSV.
+record is run again. Other programs get studies as NetCDF and CSV.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,19 +25,14 @@ import numpy as np
 from friso.engine.cache import machine
 from friso.errors import StoreError
 from friso.escapes import one_line, table_cell
-from friso.platform.system import cause_of, once_free, path_of, remove_folder
+from friso.platform.system import cause_of, once_free, path_of
 from friso.stage.arguments import check_arguments
-from friso.studies.cells import Columns
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
-from friso.studies.refine import Ask, asked_for
 from friso.studies.settings import settings
 from friso.studies.store_files import (
-    ANSWERS,
     Ledger,
     exchange,
-    keep_arrays,
-    kept_arrays,
     lock_store,
     make,
     refuse_foreign,
@@ -49,7 +42,6 @@ from friso.studies.store_files import (
     where_links_lead,
 )
 from friso.studies.study import CellBlock, Study, study_of
-from friso.studies.verify import check_verified
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,49 +90,6 @@ def _write_csv(runs: xr.Dataset, path: Path) -> None:
 def _with_unit(runs: xr.Dataset, name: str) -> str:
     unit = runs[name].attrs.get("units", "")
     return f"{name} [{unit}]" if unit not in ("", "1") else name
-
-
-class KeptCells:
-    """Stored results of cells, in a folder, with the digest of their study.
-
-    Damaged results, and those of another study, are computed again.
-    """
-
-    def __init__(self, folder: Path, study: Study, digest: str) -> None:
-        self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest
-
-    def keeping(self, ask: Ask) -> Ask:
-        """Return the function `ask`, changed to store its answers or to take stored ones.
-
-        `ask` computes the metrics of cells from the cells' indices.
-        """
-        self.folder.mkdir(exist_ok=True)
-        number = count()
-
-        def kept_or_asked(cells: np.ndarray) -> Columns:
-            file = self.folder / f"{next(number)}.npz"
-            if (kept := self._kept(file, cells)) is not None:
-                return kept
-            columns = ask(cells)
-            arrays = {name: columns[name].astype(form_of(name)) for name in self.metrics}
-            keep_arrays(file, {"cells": cells, **arrays}, self.digest)
-            return columns
-
-        return kept_or_asked
-
-    def forget(self) -> None:
-        """Remove the stored results once the blocks of the study contain them."""
-        remove_folder(self.folder)
-
-    def _kept(self, file: Path, cells: np.ndarray) -> Columns | None:
-        """Return the results stored for exactly these cells, or None."""
-        forms = {name: np.dtype(form_of(name)) for name in self.metrics}
-        most = cells.nbytes + cells.size * sum(form.itemsize for form in forms.values()) + 1024 * (2 + len(forms))
-        columns = kept_arrays(file, self.digest, most)
-        if columns is None or not np.array_equal(columns.pop("cells", ()), cells):
-            return None
-        same = {name: column.dtype for name, column in columns.items()} == forms
-        return columns if same and all(column.shape == cells.shape for column in columns.values()) else None
 
 
 logger = logging.getLogger("friso")
@@ -321,22 +270,13 @@ class Store:
         self.ledger.enter(self._number(block))
 
     @property
-    def answers(self) -> KeptCells:
-        """Return the results of cells that were stored for a refined study before it was finished."""
-        return KeptCells(self.path / ANSWERS, self.study, checked_metadata(self.path).study)
-
-    def annotate(self, attributes: Mapping[str, Any]) -> None:
-        """Add attributes to the stored study."""
-        annotate_metadata(self.path, attributes)
-
-    @property
     def notes(self) -> Mapping[str, Any]:
         """Return friso's own notes on the store, such as the metric that colours its map."""
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:
         """Add friso's own notes to the store, by name, which are no part of the study."""
-        annotate_metadata(self.path, notes=notes)
+        annotate_metadata(self.path, notes)
 
     def read(self) -> xr.Dataset:
         """Return the study in the store as a dataset whose values are read on access."""
@@ -372,7 +312,6 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
         blocks = Store(Path(path), study).blocks
         if any(runs[name].encoding["chunks"] != blocks for name in study.metrics):
             raise ValueError("other chunks than friso writes")
-        check_verified(runs.attrs, study.cells)
         return runs
     except Exception:  # any error of a codec, or of a damaged study
         expected = "a copy of the store, or the study run again under a new name, or with --overwrite"

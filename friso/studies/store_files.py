@@ -80,19 +80,19 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
         return None
 
 
-def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
+def kept_arrays(file: Path) -> dict[str, np.ndarray] | None:
     """Return the arrays that `keep_arrays` wrote into a file, or None.
 
-    The result is None if the arrays are missing, damaged, or have another text `about`. It is also None if they take
-    more than `most` bytes; no array is expanded then.
+    The result is None if the arrays are missing or damaged. It is also None if they take more than MOST_EXPANDED bytes;
+    no array is expanded then.
     """
     try:
         content = stored(file)
         digest, archive = content[:_DIGEST], io.BytesIO(content[_DIGEST:])
-        if digest != _digest(file, about, archive.getvalue()):
+        if digest != _digest(file, archive.getvalue()):
             return None
         with zipfile.ZipFile(archive) as members:
-            if sum(member.file_size for member in members.infolist()) > most:
+            if sum(member.file_size for member in members.infolist()) > MOST_EXPANDED:
                 return None
         archive.seek(0)
         with np.load(archive, allow_pickle=False) as arrays:
@@ -101,24 +101,23 @@ def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[
         return None
 
 
-def keep_arrays(file: Path, arrays: Mapping[str, Any], about: str = "") -> None:
+def keep_arrays(file: Path, arrays: Mapping[str, Any]) -> None:
     """Store arrays in an archive, behind a digest that detects damage and exchanged files.
 
-    The digest covers the arrays, the name of the file, and the text `about`. Raises OSError if the file cannot be
-    written.
+    The digest covers the arrays and the name of the file. Raises OSError if the file cannot be written.
     """
     archive = io.BytesIO()
     np.savez_compressed(archive, **arrays)
     content = archive.getvalue()
     file.parent.mkdir(parents=True, exist_ok=True)
-    put(file, _digest(file, about, content) + content)
+    put(file, _digest(file, content) + content)
 
 
 _DIGEST = hashlib.sha256().digest_size
 
 
-def _digest(file: Path, about: str, content: bytes) -> bytes:
-    return hashlib.sha256(f"{about}\n{file.name}\n".encode() + content).digest()
+def _digest(file: Path, content: bytes) -> bytes:
+    return hashlib.sha256(f"{file.name}\n".encode() + content).digest()
 
 
 def put(file: Path, content: bytes) -> None:
@@ -130,8 +129,8 @@ def put(file: Path, content: bytes) -> None:
         stream.write(content)
 
 
-BLOCKS, ANSWERS = ".blocks", ".answers"
-"""Folders of a store besides those of its arrays: records of blocks, and stored results of a refined study."""
+BLOCKS = ".blocks"
+"""Folder of a store besides those of its arrays: records of blocks."""
 
 _OF_ARRAY = re.compile(rf"\.z[a-z]+(\.copy)?|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
 """Pattern of names that Zarr gives, of copies of metadata, and of partial files."""
@@ -139,8 +138,7 @@ _OF_ARRAY = re.compile(rf"\.z[a-z]+(\.copy)?|[0-9]+(\.[0-9]+)*|.*{re.escape(PART
 
 def is_of_store(name: str) -> bool:
     """Tell whether a name within a store is one that friso or Zarr writes."""
-    folder, _, own = name.rpartition("/")
-    return _OF_ARRAY(own.removesuffix(".npz") if folder == ANSWERS else own) is not None
+    return _OF_ARRAY(name.rpartition("/")[2]) is not None
 
 
 def refuse_foreign(path: Path, files: Collection[str]) -> None:
@@ -149,7 +147,7 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
     `files` are its metadata files. Refused are links, devices, pipes, huge files, and files in place of folders or the
     reverse. Raises StoreError for the first such entry.
     """
-    folders = {BLOCKS, ANSWERS, *(name.partition("/")[0] for name in files if "/" in name)}
+    folders = {BLOCKS, *(name.partition("/")[0] for name in files if "/" in name)}
     for entry in _entries(path):
         status = entry.stat(follow_symlinks=False)
         name = Path(entry.path).relative_to(path).as_posix()

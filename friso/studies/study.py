@@ -68,7 +68,6 @@ class Study:
     links: Mapping[str, str]
     metrics: tuple[str, ...]
     rtol: float
-    refined: bool = False
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -160,7 +159,7 @@ class Study:
         axes = tuple(
             SweptAxis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes
         )
-        return replace(self, dimensions=(Dimension(SAMPLE, axes),), refined=False)
+        return replace(self, dimensions=(Dimension(SAMPLE, axes),))
 
     def coordinates(self) -> dict[str, Any]:
         """Return the axes as coordinates for xarray, by name: SI values with units and scale."""
@@ -183,7 +182,6 @@ class Study:
             "rtol": self.rtol,
             "axes": json.dumps([axis.name for axis in self.axes]),
             "links": json.dumps(dict(self.links)),
-            "refined": int(self.refined),
         }
 
     def _named(self) -> str:
@@ -214,8 +212,6 @@ class Study:
             differences.append(f"measures: {', '.join(more)} only there")
         if self.rtol != other.rtol:
             differences.append(f"rtol: {other.rtol:g} there, {self.rtol:g} here")
-        if self.refined != other.refined:
-            differences.append("refined there, not here" if other.refined else "refined here, not there")
         return differences
 
 
@@ -224,12 +220,12 @@ def cells_of(block: CellBlock) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
-_STUDIES = ("axes", "cells", "metric", "refine", "settings", "study")
+_STUDIES = ("axes", "cells", "metric", "settings", "study")
 _DECISIVE = (
     *("quantities.py", "stage", "equations", "engine", "hunting", "studies/metrics"),
     *(f"studies/{name}.py" for name in _STUDIES),
 )
-"""Parts of the package that determine the numbers of a cell, or the cells that a refined study runs."""
+"""Parts of the package that determine the numbers of a cell."""
 
 
 def equations_version() -> str:
@@ -246,7 +242,7 @@ def study_of(runs: xr.Dataset) -> Study:
     stage = loads(runs.attrs["stage"])
     names = tuple(name for name in every_variable() if name in runs)
     links, rtol = dict(json.loads(runs.attrs["links"])), checked_rtol(float(runs.attrs["rtol"]))
-    return Study(stage, tuple(dimensions), links, names, rtol, bool(runs.attrs["refined"]))
+    return Study(stage, tuple(dimensions), links, names, rtol)
 
 
 def _stored_axis(coordinate: xr.DataArray) -> SweptAxis:

@@ -36,15 +36,14 @@ class Traces:
     duration: float
 
 
-def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress = silent) -> Traces:
+def traces(study: Study, progress: Progress = silent) -> Traces:
     """Run all cells of a study once more, at its tolerance, and reduce them for drawing.
 
-    Invalid cells, and those `skipped`, shape (cells,), are NaN throughout.
+    Invalid cells are NaN throughout.
     """
     columns = study.columns(np.arange(study.cells))
     parts = list(by_words(study.stage, study.links, columns))
     allowed = allowed_cells(study.stage, study.links, columns)
-    allowed = allowed if skipped is None else allowed & ~skipped
     tally = Tally(progress, int(np.count_nonzero(allowed)))
     tally.add(0, DRAWING)
     duration = max(float(np.max(flat["motion.duration"])) for flat, _ in parts)

@@ -14,6 +14,10 @@ class ReturnMapSettings(Settings):
     A landing is where a stage sticks after a swing.
     """
 
+    maps_decide: bool = setting(True, "")
+    """Whether maps decide what attracts a stage. Without them every stage is searched from many starts: a comparison
+    shows whether maps are right."""
+
     near_starts: tuple[tuple[float, float, int], ...] = setting(
         ((0.001, 0.007, 4), (0.01, 3.0, 24)), "deflections at break-away"
     )

@@ -18,7 +18,6 @@ from friso.questions.map.words import quantity, variable
 from friso.shown.drawing.colours import ramp
 from friso.shown.drawing.figure import Array, Axis, Category
 from friso.shown.drawing.prefixes import choose
-from friso.studies.cells import INFERRED
 from friso.studies.metric import metrics, worded
 
 SAMPLE = "sample"  # dimension of sampled maps, which have no grid
@@ -270,8 +269,6 @@ def _state(outcome: str | None, status: str | None) -> Category | None:
     `outcome` and `status` are the texts of the cell, None if the runs have no such variable.
     """
     reason = status or ""
-    if reason.startswith(INFERRED):
-        return map_words.categories_of("outcome", True).get(outcome or "") or Category("inferred", "#eeeeee")
     if outcome == "" or reason.startswith("not run"):
         return map_words.NOT_RUN
     if outcome == "invalid" or reason.startswith("invalid"):

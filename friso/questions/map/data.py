@@ -6,7 +6,6 @@ The page's script reads it as JSON.
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,18 +13,16 @@ import numpy as np
 import xarray as xr
 
 from friso.axis import unit_shown
-from friso.errors import InputError
 from friso.hunting.measures import BANDS
 from friso.questions.check.figures import common_range
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, coloured, look, pick, plane_first
 from friso.questions.map.figures import edge_of_hunting
-from friso.questions.map.places import SHOWN
+from friso.questions.map.places import SHOWN, machine_of
 from friso.questions.map.words import variable, words_of
 from friso.shown.drawing.colours import scale
 from friso.shown.drawing.drawable import colour_prefix, prefixed
 from friso.shown.drawing.figure import Array, Cloud
 from friso.shown.drawing.prefixes import choose
-from friso.stage import Stage, loads
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import worded
 from friso.studies.traces import Traces
@@ -61,19 +58,6 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
         "lines": None if drawn is None else _lines(drawn, runs, cells),
         "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
     }
-
-
-def machine_of(runs: xr.Dataset) -> Stage | None:
-    """Return the machine around which keys were swept.
-
-    Returns None if links tie keys to others, or if the runs are no study of friso.
-    """
-    if json.loads(runs.attrs.get("links", "{}")):
-        return None
-    try:
-        return loads(runs.attrs.get("stage", ""))
-    except InputError:  # for runs that are no study of friso
-        return None
 
 
 def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:

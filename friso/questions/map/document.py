@@ -14,10 +14,8 @@ from friso.studies.study import Study
 
 
 def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str) -> dict[str, Any]:
-    """Return the axes, the results, and how many of them survive a tighter tolerance."""
+    """Return the axes and the results."""
     criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
-    names = ("cells", "surviving", "rtol")
-    verified = {name: runs.attrs[f"verified_{name}"] for name in names if "verified_cells" in runs.attrs}
     document = {
         "stage": study.stage.name,
         "store": str(store) if store else None,
@@ -38,6 +36,5 @@ def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str
         "sketched_verdicts": word_counts(runs, "sketch") or None,
         "attractors": text_counts(runs, "attractor") or None,
         "criteria": criteria,
-        "verified": verified or None,
     }
     return plain_json(document)

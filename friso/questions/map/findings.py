@@ -1,4 +1,4 @@
-"""Say in which part of a map the stage swings or hunts, and how far the map can be trusted."""
+"""Say in which part of a map the stage swings or hunts."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import xarray as xr
 
 from friso.axis import axis_shown
 from friso.hunting.criteria import ATTRACTED, CREEPS, RESTS, SWINGS
-from friso.quantities import percent
 from friso.questions.map import words as map_words
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
+from friso.questions.map.places import machine_of
 from friso.questions.map.words import failures, grouped
-from friso.shares import share_interval
-from friso.shown.drawing.prefixes import listed, percentage
+from friso.shown.drawing.prefixes import listed
 from friso.shown.loop_words import unstable_loop
 from friso.stage import Stage
 from friso.studies.axes import SCALINGS
@@ -130,31 +129,10 @@ def _percent(part: int, total: int) -> str:
     return f"{share:.2g} %" if share < 1 else f"{np.floor(share * 10) / 10:g} %"
 
 
-def verification(runs: xr.Dataset) -> str:
-    """Say how many cells of a map, run again at a tighter tolerance, end as in the map, with the 95 % interval.
-
-    The interval is by Clopper and Pearson.
-    """
-    checked = int(runs.attrs.get("verified_cells", 0))
-    if not checked:
-        return "Not verified: no cell was run again at a tighter tolerance."
-    surviving = int(runs.attrs["verified_surviving"])
-    low, high = share_interval(surviving, checked)
-    rtol = float(runs.attrs["verified_rtol"])
-    text = (
-        f"Of {grouped(checked)} cells run again at the tighter rtol {rtol:g}, {percent(surviving / checked, 3)} end as "
-        f"before (95 % confidence: {percentage(low)} to {percentage(high)} %)."
-    )
-    if inferred := int(runs.attrs.get("inferred_checked", 0)):
-        confirmed = int(runs.attrs["inferred_confirmed"])
-        text += f" Of {grouped(inferred)} inferred outcomes {percent(confirmed / inferred, 3)} are confirmed by a run."
-    return text
-
-
 def statement(runs: xr.Dataset, metric: str) -> str:
-    """Return the note on every figure of a map: its headline, verification, and number of runs."""
+    """Return the note on every figure of a map: its headline, and its number of runs."""
     caveat = " ".join(caveats(runs, metric))
-    return "\n".join(text for text in (headline(runs, metric), verification(runs), _extent(runs), caveat) if text)
+    return "\n".join(text for text in (headline(runs, metric), _extent(runs), caveat) if text)
 
 
 def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
@@ -192,13 +170,9 @@ def caveats(runs: xr.Dataset, name: str) -> list[str]:
 def _extent(runs: xr.Dataset) -> str:
     """Say how many runs were made at which tolerance, and with which results."""
     cells = int(np.prod(list(runs.sizes.values())))
-    status = map_words.text_counts(runs, "status")
-    inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
     words = map_words.word_counts(runs, "outcome")
     idle = sum(words.get(category.label, 0) for category in (map_words.INVALID, map_words.NOT_RUN))
-    text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
-    if inferred:
-        text += f", {grouped(inferred)} cells inferred from their neighbours"
+    text = f"{grouped(cells - idle)} runs at rtol {float(runs.attrs['rtol']):g}"
     listing = "; ".join(filter(None, (map_words.tally(runs, name) for name in map_words.tallied())))
     return f"{text}: {listing}." if listing else f"{text}."
 
@@ -213,7 +187,7 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
     answer = [*loop_first(study.stage), headline(runs, metric)]
-    return [*answer, *own_place(runs, metric), extent, verification(runs), *caveats(runs, metric), *reasons]
+    return [*answer, *own_place(runs, metric), extent, *caveats(runs, metric), *reasons]
 
 
 def own_place(runs: xr.Dataset, metric: str) -> list[str]:
@@ -221,8 +195,6 @@ def own_place(runs: xr.Dataset, metric: str) -> list[str]:
 
     Nothing is said for a stage that is not on the map, or a map without verdicts.
     """
-    from friso.questions.map.data import machine_of
-
     machine = machine_of(runs)
     if (
         metric == "outcome"

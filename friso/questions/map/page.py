@@ -14,10 +14,10 @@ import xarray as xr
 
 from friso.hunting.criteria import PEAK_RULE
 from friso.questions.map.cells import SAMPLE, axes_of
-from friso.questions.map.data import machine_of, page_data, picked
+from friso.questions.map.data import page_data, picked
 from friso.questions.map.figures import map_figure
-from friso.questions.map.findings import caveats, failures, headline, meanings, own_place, verification
-from friso.questions.map.places import SHOWN, with_places
+from friso.questions.map.findings import caveats, failures, headline, meanings, own_place
+from friso.questions.map.places import SHOWN, machine_of, with_places
 from friso.questions.map.words import grouped, tallied, tally, variable
 from friso.shown.drawing.figure import IMAGE_FORMATS, Figure
 from friso.shown.drawing.images import ON_PAGE, Image, draw_beforehand, save
@@ -70,7 +70,6 @@ def map_html(
         values={
             "condition": _condition(runs),
             "headline": headline(runs, metric),
-            "verification": verification(runs),
             "own_place": own_place(runs, metric),
             "peak_rule": PEAK_RULE,
             "facts": _facts(runs, metric),
@@ -103,7 +102,6 @@ def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
     facts = [("Stage", name)] if (name := str(runs.attrs.get("name", ""))) else []
     facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
     facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
-    facts.append(("Verification", verification(runs)))
     for name in tallied():
         facts += [(variable(name), words)] if (words := tally(runs, name)) else []
     facts += meanings(runs)

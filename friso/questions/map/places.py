@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
+from friso.errors import InputError
 from friso.shown.drawing.figure import Axis, Figure, Markers, Panel
 from friso.shown.drawing.palette import GREY, INK
-from friso.stage import Stage
+from friso.stage import Stage, loads
 from friso.studies.axes import SCALINGS
 
 SHOWN = "this machine"
@@ -39,3 +42,16 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
 def _is_on(axis: Axis, value: float) -> bool:
     """Tell whether a value lies within the limits of an axis."""
     return axis.limits is None or axis.limits[0] <= value <= axis.limits[1]
+
+
+def machine_of(runs: xr.Dataset) -> Stage | None:
+    """Return the machine around which keys were swept.
+
+    Returns None if links tie keys to others, or if the runs are no study of friso.
+    """
+    if json.loads(runs.attrs.get("links", "{}")):
+        return None
+    try:
+        return loads(runs.attrs.get("stage", ""))
+    except InputError:  # for runs that are no study of friso
+        return None

@@ -24,7 +24,6 @@ from friso.interface.output_folder import check_file, refuse_place, write
 from friso.platform.extras import need
 from friso.platform.system import MOST_PROCESSES, cause_of, path_of, shell_word, usable_cores
 from friso.progress import Progress, silent
-from friso.quantities import percent
 from friso.questions.map.study import (
     Varied,
     as_stored,
@@ -43,12 +42,10 @@ from friso.stage.rig import AS_BUILT
 from friso.studies.axes import AxisValues, Samples
 from friso.studies.cells import of_runs_alone, runs_as_built
 from friso.studies.execute import Crew, local_crew
-from friso.studies.settings import settings
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
 from friso.studies.store_files import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
-from friso.studies.verify import checked_share, loosest_rtol, verify_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -120,7 +117,7 @@ class SweepAnswer(Answer):
         return [replace(figure, note=self.condition + figure.note) for figure in figures]
 
     def document(self) -> dict[str, Any]:
-        """Return the axes, the results, and how many of them survive a tighter tolerance."""
+        """Return the axes and the results."""
         from friso.questions.map.document import map_document
 
         return map_document(self.result, self.study, self.store, self.metric)
@@ -148,7 +145,7 @@ class SweepAnswer(Answer):
         again = 'friso.simulate(runs.cell("{indices}"))'
         if self.store is not None:
             again = f"friso simulate --cell {shell_word(str(self.store))} {{indices}}"
-        return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, self.result, progress))
+        return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, progress))
 
 
 class StoreAnswer(Answer):
@@ -197,8 +194,6 @@ def sweep(
     metric: MetricName | None = None,
     confirm: bool = False,
     rtol: Tolerance | None = None,
-    verify: float = 0.0,
-    refine: bool = False,
     workers: int | None = None,
     scheduler: Address | None = None,
     export: Iterable[str | os.PathLike[str]] = (),
@@ -236,14 +231,8 @@ def sweep(
         maps.
     confirm : bool
         Search every cell, instead of a sketch, which takes up to five times as long.
-    rtol : float or "auto", optional
-        Relative tolerance, default 1e-6; "auto": the loosest safe one.
-    verify : float
-        Share of the cells to run again at rtol/100.
-
-        `verified_surviving` among the attributes counts the outcomes that survive.
-    refine : bool
-        Make the grid 4 times finer, and run it only along its boundaries.
+    rtol : float, optional
+        Relative tolerance, default 1e-6.
     workers : int, optional
         Number of processes to run in; default: the threads of this one.
     scheduler : str, optional
@@ -282,10 +271,10 @@ def sweep(
     3
     """
     if check:
-        if any((axes, samples, x, y, axis, link, set, metric, confirm, rtol, refine, export, out)):
+        if any((axes, samples, x, y, axis, link, set, metric, confirm, rtol, export, out)):
             raise InputError("check", "--check beside other options", "a store alone", "friso map rig_map.zarr --check")
         return _whole(stage)
-    exports, share = _checked_exports(export), checked_share(verify)
+    exports = _checked_exports(export)
     if confirm and metric not in (None, "sketch", "verdict"):
         raise InputError("confirm", f"--confirm and --metric {metric}", "one of the two: it searches for verdicts", "")
     varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
@@ -295,7 +284,7 @@ def sweep(
     with _crew(workers, scheduler) as crew:
         resumed = Path(stage) if isinstance(stage, str | os.PathLike) and Path(stage).is_dir() else None
         if resumed is not None:
-            if varied != Varied() or set or rtol or refine or out or confirm:
+            if varied != Varied() or set or rtol or out or confirm:
                 raise _another_study(resumed)
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else CONFIRMED_FROM)
@@ -304,20 +293,20 @@ def sweep(
             chosen = inputs.read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
             if runs_as_built(chosen, [metric]):
                 inputs.mention_sampling(chosen)
-            study = study_for(chosen, varied, metric, refine, None if yes else CONFIRMED_FROM, crew)
-            study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
+            study = study_for(chosen, varied, metric, None if yes else CONFIRMED_FROM, crew)
+            study = replace(study, rtol=inputs.tolerance_of(1e-6 if rtol is None else rtol))
             study = study if store is None else as_stored(study, store, metric, overwrite)
         speak_of(study.stage.axis_kind)
         if store is None:
             for path in exports:
                 check_file("export", path, overwrite)
             inputs.mention_unstable_loop(study.stage)
-            runs, can_note = run_in_memory([study], crew, share, progress)[0], False
+            runs, can_note = run_in_memory([study], crew, progress)[0], False
         else:
             example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
             inputs.mention_unstable_loop(study.stage)
-            runs, can_note = _filled(study, store, crew, share, overwrite, metric, beside, progress)
+            runs, can_note = _filled(study, store, crew, overwrite, metric, beside, progress)
     held = in_memory(runs) if store is not None and study.cells <= CONFIRMED_FROM else runs
     if store is None:
         write(export_files(held, exports), exports if overwrite else ())
@@ -351,26 +340,6 @@ def _another_study(store: Path) -> InputError:
     return InputError(str(store), problem, "the store alone: it contains its study", resumed)
 
 
-def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
-    """Return the relative tolerance of the solver: the user's, or one that is safe for "auto".
-
-    A safe one is the loosest at which enough outcomes of a sample of cells survive. If there is none, the best one
-    tried is taken. The choice is logged.
-    """
-    if entry != "auto":
-        return inputs.tolerance_of(entry)
-    rtol, shares, cells = loosest_rtol(study, crew)
-    surviving = f"of {cells} cells, " + ", ".join(
-        f"{percent(share, 3)} at {rtol_:g}" for rtol_, share in shares.items()
-    )
-    wanted = percent(settings.wanted_survival)
-    if shares.get(rtol, 0.0) >= settings.wanted_survival:
-        LOGGER.warning(f"rtol {rtol:g} is the loosest at which {wanted} of the outcomes survive ({surviving})")
-    else:
-        LOGGER.warning(f"at no tolerance do {wanted} of the outcomes survive ({surviving}); rtol {rtol:g} is used")
-    return rtol
-
-
 @contextmanager
 def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
     """Provide the workers that run the cells.
@@ -400,13 +369,13 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
 
 
 def _filled(
-    study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, beside: bool, progress: Progress
+    study: Study, store: Path, crew: Crew, overwrite: bool, metric: str, beside: bool, progress: Progress
 ) -> tuple[xr.Dataset, bool]:
     """Run the cells that a store lacks; return the runs, and whether the store can be written.
 
-    If the work ends early, a message says how much is stored and how to resume. `share` is the fraction of cells to
-    verify. A complete store that cannot be written is only read, unless figures are to be written `beside` it. Raises
-    StoreError for a store that must be written and cannot be.
+    If the work ends early, a message says how much is stored and how to resume. A complete store that cannot be written
+    is only read, unless figures are to be written `beside` it. Raises StoreError for a store that must be written and
+    cannot be.
     """
     stored = 0
 
@@ -419,7 +388,7 @@ def _filled(
     try:
         with Store.opened(store, study, overwrite) as opened:
             opened.note(metric=opened.notes.get("metric", metric))
-            return fill(opened, crew, share, counted), True
+            return fill(opened, crew, counted), True
     except ReadOnlyStoreError as error:
         if not holds_all(store, study):
             raise
@@ -428,9 +397,7 @@ def _filled(
             raise StoreError(
                 "", error.actual, f"{error.expected}, or figures elsewhere", elsewhere, str(store)
             ) from None
-        runs = read_store(store)
-        runs.attrs |= verify_cells(study, runs, crew, share)
-        return runs, False
+        return read_store(store), False
     except (KeyboardInterrupt, OSError, RuntimeError) as error:
         far, resumed = f"{stored} of {study.cells} cells are stored", f"friso map {shell_word(str(store))}"
         if isinstance(error, OSError):

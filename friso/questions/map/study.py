@@ -24,11 +24,8 @@ from friso.progress import Progress, silent
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues, Samples
-from friso.studies.cells import INFERRED
 from friso.studies.execute import Crew
 from friso.studies.metric import METRICS, metrics, with_usual
-from friso.studies.refine import finer
-from friso.studies.settings import settings
 from friso.studies.study import Request, Study, study_of
 
 if TYPE_CHECKING:
@@ -79,8 +76,8 @@ class Varied:
         )
 
 
-def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
-    """Build the study that the options describe; `refine` makes its grid finer.
+def study_for(stage: Stage, varied: Varied, metric: str, most: int | None, crew: Crew) -> Study:
+    """Build the study that the options describe.
 
     Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its cost.
     """
@@ -95,11 +92,9 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
         raise InputError("latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
     METRICS.checked(metric, "metric", "metric={}")
     request = Request(stage, axes, samples, links, varied.log)
-    runs = int(request.size() * (settings.refined_share * settings.finer_factor ** len(axes) if refine else 1))
-    if most is not None and runs > most:
+    if most is not None and (runs := request.size()) > most:
         raise _too_large(runs, request.trial(), crew)
-    study = request.study(with_usual(metric))
-    return finer(study) if refine else study
+    return request.study(with_usual(metric))
 
 
 def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Study, str]:
@@ -175,17 +170,14 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     return InputError("yes", size, "--yes, or fewer points; nothing was run", "yes=True")
 
 
-def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
+def drawn_runs(study: Study, progress: Progress = silent) -> Traces | None:
     """Simulate the runs of all cells, for the page to draw.
 
-    Cells whose result was inferred from neighbours have none. Returns None for more than MOST_DRAWN_CELLS cells.
+    Returns None for more than MOST_DRAWN_CELLS cells.
     """
     from friso.studies.traces import traces
 
-    if study.cells > MOST_DRAWN_CELLS:
-        return None
-    inferred = np.array([str(status).startswith(INFERRED) for status in runs["status"].values.ravel()])
-    return traces(study, inferred, progress)
+    return None if study.cells > MOST_DRAWN_CELLS else traces(study, progress)
 
 
 def place_of_store(folder: str | os.PathLike[str]) -> Path:
@@ -251,7 +243,7 @@ def write_beside(
                 for draft, path in drafts.drafts
                 if draft is not None
             }
-            annotate_metadata(store, notes={"views": {**_noted_digests(store), **digests}})
+            annotate_metadata(store, {"views": {**_noted_digests(store), **digests}})
         drafts.put_in_place([*files] if overwrite else own)
     return written(files)
 

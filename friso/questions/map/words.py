@@ -66,14 +66,9 @@ def variable(name: Hashable) -> str:
     return axis_shown().text(metric.title if metric else quantity(name))
 
 
-def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
-    """Return label and colour of each word of a metric, the worst first.
-
-    With `inferred`, return labels and colours for cells whose word was inferred from neighbours.
-    """
+def categories_of(name: str) -> dict[str, Category]:
+    """Return label and colour of each word of a metric, the worst first."""
     words = (metrics()[name] if name in metrics() else metrics()["outcome"]).words
-    if inferred:
-        return {word.text: Category(f"{word.text} (inferred)", word.inferred) for word in words if word.inferred}
     labels = {word.text: axis_shown().text(word.label or word.text) for word in words}
     return {word.text: Category(labels[word.text], PALETTE.get(word.colour, word.colour)) for word in words}
 
@@ -109,7 +104,7 @@ def in_order(categories: Iterable[Category]) -> tuple[Category, ...]:
     Words come first, the worst at the beginning, then cells without a word.
     """
     words = [category for name in worded() for category in categories_of(name).values()]
-    order = [*words, *_NO_RESULT.values(), *(one for name in worded() for one in categories_of(name, True).values())]
+    order = [*words, *_NO_RESULT.values()]
     places = {category: place for place, category in reversed([*enumerate(order)])}
     return tuple(sorted(dict.fromkeys(categories), key=lambda category: places.get(category, len(order))))
 
@@ -150,11 +145,7 @@ def text_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
 
 def failures(runs: xr.Dataset) -> dict[str, int]:
     """Count the cells without a result by the reason in their status."""
-    return {
-        reason: number
-        for reason, number in text_counts(runs, "status").items()
-        if reason != "done" and not reason.startswith("inferred")
-    }
+    return {reason: number for reason, number in text_counts(runs, "status").items() if reason != "done"}
 
 
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:

@@ -22,9 +22,14 @@ def attractors(stage: StageEvidence) -> np.ndarray:
     return np.where(attracted.certain, kind, "unknown").astype(object)
 
 
-def of_attractor(title: str, quantity: str, unit: str, place: int, limits: tuple[float, float] | None = None) -> Metric:
-    """Return the metric that shows one quantity of the attractor, where it is certain what attracts."""
-    return Metric(
+def of_attractor(
+    about: str, title: str, quantity: str, unit: str, place: int, limits: tuple[float, float] | None = None
+) -> tuple[Metric, str]:
+    """Return the entry of a metric that shows one quantity of the attractor, where it is certain what attracts.
+
+    `about` says what it is.
+    """
+    metric = Metric(
         title,
         lambda stage: np.where(stage.attracted.certain, getattr(stage.attracted, quantity), np.nan),
         source="survey",
@@ -36,6 +41,7 @@ def of_attractor(title: str, quantity: str, unit: str, place: int, limits: tuple
         limits=limits,
         answered_by="attractor",
     )
+    return metric, about
 
 
 METRIC = Metric(

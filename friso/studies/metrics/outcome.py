@@ -13,18 +13,14 @@ METRIC = Metric(
             "vermillion",
             f"the run still swings at its end: periodically, more than {2e6 * REST_BAND:g} µm peak to peak in the last "
             f"quarter, by at least {percent(LASTING_RATIO)} of what it swings in the last half",
-            inferred="#f3c39e",
         ),
         Word(
             CREEPS,
             "orange",
             f"the run ends more than {1e6 * REST_BAND:g} µm off its reference without swinging: "
             "it drifts, sticks or decays",
-            inferred="#f7dfa8",
         ),
-        Word(
-            RESTS, "quiet", f"the run comes to rest within {1e6 * REST_BAND:g} µm of its reference", inferred="#e4efe0"
-        ),
+        Word(RESTS, "quiet", f"the run comes to rest within {1e6 * REST_BAND:g} µm of its reference"),
     ),
     usual=True,
     place=70,

@@ -39,31 +39,29 @@ def maps_of(
     studies: Iterable[ThesisStudy],
     points: int,
     rtol: float,
-    verify: float = 0.0,
     changes: Mapping[str, object] = NOTHING,
 ) -> dict[str, xr.Dataset]:
     """Compute the maps of some studies by name, with `points` values per axis.
 
-    `changes` are made to the rig first. A fraction `verify` of the cells is run again more accurately.
+    `changes` are made to the rig first.
     """
-    return {study.name: map_of(study, points, rtol, verify, changes) for study in studies}
+    return {study.name: map_of(study, points, rtol, changes) for study in studies}
 
 
 def map_of(
     study: ThesisStudy,
     points: int,
     rtol: float,
-    verify: float = 0.0,
     changes: Mapping[str, object] = NOTHING,
     kept: Kept = NOT_KEPT,
 ) -> xr.Dataset:
     """Return the map of one study with `points` values per axis, as saved or computed now.
 
-    `changes` are made to the rig first. A fraction `verify` of the cells is run again more accurately.
+    `changes` are made to the rig first.
     """
     stage, axes, links = study.stage(changes), study.axes(points), dict(study.links)
     request = Request(stage, axes, None, links).study(None, rtol)
-    return kept.runs(request, verify, lambda: sweep(stage, axes, links=links, rtol=rtol, verify=verify))
+    return kept.runs(request, lambda: sweep(stage, axes, links=links, rtol=rtol))
 
 
 def run_response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
@@ -80,7 +78,6 @@ def evidence(
     needs: Iterable[str],
     points: int,
     rtol: float,
-    verify: float = 0.0,
     changes: Mapping[str, object] = NOTHING,
     kept: Kept = NOT_KEPT,
 ) -> Evidence:
@@ -90,7 +87,7 @@ def evidence(
     """
     wanted, rig = set(needs), thesis_rig().replace(dict(changes))
     return Evidence(
-        {name: map_of(study, points, rtol, verify, changes, kept) for name, study in STUDIES.items() if name in wanted},
+        {name: map_of(study, points, rtol, changes, kept) for name, study in STUDIES.items() if name in wanted},
         {name: run_response(own, changes, rtol) for name, own in RESPONSES.items() if name in wanted},
         analysed(rig) if wanted & NEEDS.keys() else None,
         Experiments(rig, kept),

@@ -114,24 +114,16 @@ class Kept(KeptWork):
 
     sources = SOURCES
 
-    def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-        """Return the runs of a study from the folder; otherwise `make` and save them.
-
-        `verify` is the fraction of the cells that has to be run again more accurately.
-        """
+    def runs(self, study: Study, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+        """Return the runs of a study from the folder; otherwise `make` and save them."""
         axes = [(axis.name, axis.values.tolist()) for axis in study.axes]
-        file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics, verify)
+        file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics)
         columns = None if file is None else kept_arrays(file)
-        notes = None if columns is None else columns.pop("notes", None)
-        if columns is not None and notes is not None and columns.keys() == set(study.metrics):
-            runs = dataset(study, {name: values.reshape(study.shape) for name, values in columns.items()})
-            runs.attrs |= json.loads(str(notes))
-            return runs
+        if columns is not None and columns.keys() == set(study.metrics):
+            return dataset(study, {name: values.reshape(study.shape) for name, values in columns.items()})
         runs = make()
         if file is not None:
-            arrays: dict[str, Any] = {name: runs[name].values.astype(form_of(name)) for name in study.metrics}
-            verified = {name: value for name, value in runs.attrs.items() if name.startswith("verified")}
-            keep_arrays(file, {"notes": np.array(json.dumps(verified)), **arrays})
+            keep_arrays(file, {name: runs[name].values.astype(form_of(name)) for name in study.metrics})
         return runs
 
     def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:

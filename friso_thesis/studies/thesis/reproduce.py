@@ -51,9 +51,6 @@ MOST_DRAWS = 10_000
 THESIS_RTOL = 1e-4
 """The thesis's relative tolerance (Sec. 3.2.3)."""
 
-VERIFIED_SHARE = 0.05
-"""Fraction of the cells of a shown map that are run again at a tighter tolerance."""
-
 TIGHT_RTOL = 1e-8
 """Second relative tolerance for Fig. 14B, besides the thesis's own."""
 
@@ -137,7 +134,7 @@ def reproduce(
     maps: dict[str, xr.Dataset] = {}
     loose: dict[str, xr.Dataset] = {}
     for name, study in studies.items():
-        maps[name] = map_of(study, judged_points, rtol, VERIFIED_SHARE, kept=kept)
+        maps[name] = map_of(study, judged_points, rtol, kept=kept)
         tally.add(judged_points**2, f"map {study.panel}")
         loose[name] = map_of(study, half, THESIS_RTOL, kept=kept)
         tally.add(half**2, f"map {study.panel} at the thesis's tolerance")
@@ -186,7 +183,7 @@ def reproduce(
     judged = by_way(base, by_peak_count)
     shown = judged.maps
     if points < judged_points:
-        shown = {name: by_peak_count(map_of(study, points, rtol, VERIFIED_SHARE)) for name, study in studies.items()}
+        shown = {name: by_peak_count(map_of(study, points, rtol)) for name, study in studies.items()}
     return Reproduction(
         shown, judged.maps, judged.responses, base.linear, curves, base.identified if parts else None,
         frozenset(parts) & EXPERIMENTS.keys(), tolerances,
