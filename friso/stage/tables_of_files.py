@@ -174,6 +174,7 @@ def _utf_8_or_latin(content: bytes) -> str:
 
 
 def reason_of(error: OSError | ValueError) -> str:
+    """Return why a file cannot be read or written, in words."""
     cause = cause_of(error) if isinstance(error, OSError) else str(error)
     return cause[:1].lower() + cause[1:]
 
