@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -204,7 +205,7 @@ def hunting_limiter() -> Values:
 def hunting_supercritical() -> Values:
     """Return the finding that a test asserts, or raise an exception if it does not hold."""
     entry = evidence.findings_on_file()["hunting.supercritical"]
-    subprocess.run([sys.executable, "-m", *entry.command.split(), "-p", "no:cacheprovider"], cwd=ROOT, check=True)
+    subprocess.run([sys.executable, "-m", *shlex.split(entry.command), "-p", "no:cacheprovider"], cwd=ROOT, check=True)
     return dict(entry.values)
 
 

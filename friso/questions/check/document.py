@@ -168,8 +168,10 @@ def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:
 
     def end(one: hunting.AttractionEnd | None) -> dict[str, Any] | None:
         """Return one end of a margin; None if hunting does not change on that side."""
-        factors = one and {"same_at_factor": margin.same(one), "other_at_factor": margin.other(one)}
-        return one and {**factors, **entries(one, "certain", "kind")}
+        if one is None:
+            return None
+        factors = {"same_at_factor": margin.same(one), "other_at_factor": margin.other(one)}
+        return {**factors, **entries(one, "certain", "kind")}
 
     return {
         "hunts": margin.attracts,
