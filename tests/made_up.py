@@ -268,5 +268,5 @@ def same(left: list[list[np.ndarray]], right: list[list[np.ndarray]]) -> bool:
 
 def digests() -> list[str]:
     """Return digests of a figure in all formats, and of a page with several."""
-    images = [matplotlib_renderer.image(small_figure(), form) for form in matplotlib_renderer.FORMATS]
+    images = [matplotlib_renderer.image(small_figure(), form) for form in matplotlib_renderer.IMAGE_FORMATS]
     return [hashlib.sha256(content).hexdigest() for content in (*images, check_html(both_joints()).encode())]

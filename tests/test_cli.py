@@ -138,6 +138,7 @@ def test_check_json(checked: dict[str, Any]) -> None:
     assert cycle["residual"] < 1e-6
     assert cycle["time_constant_s"] == pytest.approx(11.42, rel=0.01)
     assert locked["margin"].pop("certain") is True
+    assert locked["margin"].pop("kind") == "flip"
     assert locked["margin"].pop("reserve") == pytest.approx(0.0095)
     assert locked["margin"].pop("settles_at_factor") == pytest.approx(1.0095 * 1.2187, rel=1e-3)
     assert locked["margin"] == pytest.approx({"factor": 1.2187, "crossover_hz": 9.75}, rel=2e-3)

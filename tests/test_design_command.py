@@ -119,7 +119,7 @@ def written(spec: Path, finished: list[str], tmp_path_factory: pytest.TempPathFa
     """The folder of all files, written once with figures as SVG only, and the summary."""
     out = tmp_path_factory.mktemp("written") / "design"
     with redirect_stdout(StringIO()) as said, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(files, "FORMATS", ("svg",))
+        patch.setattr(files, "IMAGE_FORMATS", ("svg",))
         command(RIG, spec, out=out, details=True)
     return out, said.getvalue()
 

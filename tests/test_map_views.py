@@ -378,7 +378,7 @@ def test_both_renderers_draw_the_same(figure):
     assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(colours, drawn, strict=True))
     in_key = [text.get_text() for legend in canvas.legends for text in legend.get_texts()]
     assert in_key == [trace.name for trace in page.data if trace.x is not None and list(trace.x) == [None]]
-    for form in matplotlib_renderer.FORMATS:
+    for form in matplotlib_renderer.IMAGE_FORMATS:
         assert len(matplotlib_renderer.image(figure, form)) > 1000
 
 
@@ -479,7 +479,7 @@ def test_a_map_is_laid_out_once_for_its_page_and_its_files(
     render = matplotlib_renderer.render
     monkeypatch.setattr(matplotlib_renderer, "render", lambda figure: drawn.append(figure) or render(figure))
     files = map_files(plain(), "peaks", RERUN, lambda: None)
-    for form in matplotlib_renderer.FORMATS:
+    for form in matplotlib_renderer.IMAGE_FORMATS:
         files[form](tmp_path / f"map.{form}")
     assert len(drawn) == 1
     shown, bare = (render(figure) for figure in (drawn[0], replace(drawn[0], title="", subject="", note="")))

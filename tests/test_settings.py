@@ -31,7 +31,7 @@ LITERALS = {
     "friso/remedies": 8,
     "friso/shown": 36,
     "friso/stage": 15,
-    "friso/studies": 91,
+    "friso/studies": 90,
     "friso/virtual_rig": 1,
     "friso": 11,
     "friso_thesis/questions": 19,

@@ -61,7 +61,8 @@ def margin_sentence(
     low, high = (_kept_to(margin, side) for side in (-1, 1))
     distance = SEARCH_LIMITS.edge_distance
     thin = any(max(end.outside, 1 / end.outside) < distance for end in (margin.below, margin.above) if end)
-    does = "Hunts" if margin.attracts else "No hunting" if thin else "Robust: no hunting"
+    quiet = "No hunting was found" if doubts else "No hunting" if thin else "Robust: no hunting"
+    does = "Hunts" if margin.attracts else quiet
     if len(open_ones) == 2:
         return f"Whether another {name} {'ends' if margin.attracts else 'starts'} hunting was not determined."
     least, most = 1.0 if -1 in open_ones else low, 1.0 if 1 in open_ones else high
