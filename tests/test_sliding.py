@@ -54,8 +54,10 @@ def test_check_says_from_which_speed_on_the_stage_slides_smoothly(pulled: Stage,
     answer = friso.check(pulled)
     assert answer.sentences()[0].startswith("As given: sticks and slips at 100 mm/s")
     assert "smooth from" in answer.sentences()[0]
-    (text,) = stick_slip_sentences(StickSlipSpeeds(False, False, 0.0, None, (), (1e-4, 1.0), 0), 0.2)
+    (text,) = stick_slip_sentences(StickSlipSpeeds(False, False, 0.0, None, (), (), (1e-4, 1.0), 0), 0.2)
     assert text == "slides smoothly at 200 mm/s; no stick-slip from 100 µm/s to 1.00 m/s."
-    undecided = stick_slip_sentences(StickSlipSpeeds(None, False, 0.0, None, speeds.ranges, (1e-4, 1.0), 3), 0.2)
+    undecided = stick_slip_sentences(
+        StickSlipSpeeds(None, False, 0.0, None, speeds.ranges, speeds.seen, (1e-4, 1.0), 3), 0.2
+    )
     assert "not decided" in undecided[0]
     assert "3 of the speeds" in undecided[1]

@@ -74,14 +74,15 @@ def _beyond(
     for steps in range(1, check_settings.advised_steps + 1):
         factor = edge.outside * SEARCH_LIMITS.edge_distance ** (ahead * steps)
         within = SEARCH_LIMITS.lowest_bandwidth <= factor <= SEARCH_LIMITS.highest_bandwidth
-        reach = factor if ahead > 0 else factor / SEARCH_LIMITS.edge_distance
+        reach = factor * SEARCH_LIMITS.edge_distance**ahead
         if not within or _within(windows, *sorted((edge.outside, reach))):
             break
         kept = keeps_friction_margin(stage, factor, work) if work else None
         first = first or BandwidthAdvice(factor, edge, False, kept)
         if kept is not False:
             return BandwidthAdvice(factor, edge, False, kept)
-    return first or BandwidthAdvice(edge.outside, edge, True, None)
+    settles = edge.inside == edge.outside  # at its own bandwidth already
+    return first or (None if settles else BandwidthAdvice(edge.outside, edge, True, None))
 
 
 def _within(windows: Iterable[BandwidthWindow], low: float, high: float) -> bool:

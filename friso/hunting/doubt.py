@@ -9,8 +9,8 @@ class HuntingDoubt(StrEnum):
     """Reason why it is not certain what attracts a stage, or how its motion ends: a code, and its sentence."""
 
     WORK = f"deciding takes {MORE_WORK}"
-    RUNS = "simulations that had to decide were stopped, or end otherwise at another tolerance or mass"
-    MOTION = "this motion was still swinging when it was given up, otherwise than what was found to attract"
+    RUNS = "runs that had to decide were stopped, or contradict each other or orbits followed from other bandwidths"
+    MOTION = "this motion was not seen to end at rest or in a swing that was found to attract"
     BEYOND = "swings smaller or larger than those searched may last"
     GROWTH = "without anti-windup swings may grow or die out beyond the force limit: a size is where a run was stopped"
     LOOP = "its loop is unstable, or its controller pushes ever harder at standstill as an integral does"

@@ -136,19 +136,20 @@ class PathSearch:
     def _beginning(self, numbers: np.ndarray, side: int) -> AttractionEnd | None:
         """Find where hunting begins on a side; `numbers` are those of its factors, outward.
 
-        Where a rough survey finds nothing, some factors are searched thoroughly. Raises Undecided if rough surveys are
-        wrong again and again.
+        Nearer factors, at which a rough survey found nothing, are searched thoroughly in part. Raises Undecided if
+        rough surveys are wrong again and again.
         """
         for _ in range(edge_settings.most_proofs):
             hunts = numbers[self.attracts[numbers]]
-            if hunts.size:
-                if end := self.end(int(hunts[0]), -side):
-                    return end
-                continue
-            left = np.setdiff1d(numbers[[*edge_settings.thorough_margin_steps]], [*self.inspected])
-            if not left.size:
+            nearer = numbers if not hunts.size else numbers[np.abs(numbers - numbers[0]) < abs(hunts[0] - numbers[0])]
+            searched = numbers[[*edge_settings.thorough_margin_steps]]
+            left = np.setdiff1d(np.append(searched[np.isin(searched, nearer)], nearer[-1:]), [*self.inspected])
+            if left.size:
+                self._inspect(left)
+            elif not hunts.size:
                 return None
-            self._inspect(left)
+            elif end := self.end(int(hunts[0]), -side):
+                return end
         raise Undecided
 
     def _proved_at_the_top(self) -> bool:
@@ -186,8 +187,8 @@ class PathSearch:
         if not self.proved(at, ahead):
             return None
         outward = EdgeSearch(self.path, float(self.factors[-1 if ahead > 0 else 0]), self.settled)
-        beyond = self.factors[at + ahead :: ahead] if at + ahead >= 0 else np.empty(0)
-        quiet = beyond[~self.attracts[at + ahead :: ahead]]
+        ahead_of = slice(at + ahead, None, ahead)
+        beyond, quiet = self.factors[ahead_of], self.factors[ahead_of][~self.attracts[ahead_of]]
         try:
             end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float([*quiet, beyond[-1]][0]))
         except Beyond:

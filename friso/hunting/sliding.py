@@ -39,6 +39,7 @@ class StickSlipSpeeds:
     swing: float
     period: float | None
     ranges: tuple[tuple[tuple[float, float] | None, tuple[float, float] | None], ...]
+    seen: tuple[tuple[float, float], ...]
     tried: tuple[float, float]
     open_speeds: int
 
@@ -83,20 +84,35 @@ def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
         sticks,
         float(swing[0]),
         period,
-        _ranges(speeds[decided], lasts[decided]),
+        _ranges(speeds, lasts, decided),
+        _lasting_speeds(speeds, lasts & decided),
         (float(speeds[0]), float(speeds[-1])),
         int(np.count_nonzero(~decided)),
     )
 
 
-def _ranges(
-    speeds: np.ndarray, lasts: np.ndarray
-) -> tuple[tuple[tuple[float, float] | None, tuple[float, float] | None], ...]:
-    """Return the ranges of ascending speeds in which a swing lasts, each with the brackets of its ends."""
-    ends = np.flatnonzero(np.diff(lasts.astype(int), prepend=0, append=0))
+def _lasting_speeds(speeds: np.ndarray, swings: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Return the lowest and highest speed of each range in which a swing was seen to last."""
+    ends = np.flatnonzero(np.diff(swings.astype(int), prepend=0, append=0))
+    return tuple(
+        (float(speeds[first]), float(speeds[after - 1]))
+        for first, after in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
+    )
 
-    def bracket(first: int, second: int) -> tuple[float, float]:
-        return float(speeds[first]), float(speeds[second])
+
+def _ranges(
+    speeds: np.ndarray, lasts: np.ndarray, decided: np.ndarray
+) -> tuple[tuple[tuple[float, float] | None, tuple[float, float] | None], ...]:
+    """Return the ranges of ascending speeds in which a swing lasts, each with the brackets of its ends.
+
+    A range ends where it is not decided whether a swing lasts; such an end is None.
+    """
+    swings = lasts & decided
+    ends = np.flatnonzero(np.diff(swings.astype(int), prepend=0, append=0))
+
+    def bracket(first: int, second: int) -> tuple[float, float] | None:
+        quiet = first if swings[second] else second
+        return (float(speeds[first]), float(speeds[second])) if decided[quiet] else None
 
     return tuple(
         (

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.axis import axis_shown
 from friso.equations.motion import initial_displacement, reference, rests
-from friso.hunting import Dwell, StickSlipSpeeds, Tracking
+from friso.hunting import MORE_WORK, Dwell, StickSlipSpeeds, Tracking
 from friso.hunting.criteria import REST_BAND
 from friso.hunting.measures import BANDS
 from friso.shown.drawing.prefixes import listed, with_unit
@@ -34,26 +34,23 @@ def stick_slip_sentences(speeds: StickSlipSpeeds, speed: float) -> list[str]:
     """Say whether a stage slides smoothly at the constant `speed` [m/s] of its reference, and at which others."""
     at = f"at {with_unit(speed, 'm/s')}"
     if speeds.lasts is None:
-        first = (
-            f"{at}, whether it slides smoothly was not decided: its error still changes at the end of the longest run"
-        )
+        stopped = "the run was stopped" if np.isnan(speeds.swing) else "its error still changes after the longest run"
+        first = f"{at}, whether it slides smoothly was not decided: {stopped}"
     elif not speeds.lasts:
         first = f"slides smoothly {at}"
     else:
         often = f" every {with_unit(speeds.period, 's')}" if speeds.period else ""
         does = "sticks and slips" if speeds.sticks else "swings about its reference"
         first = f"{does} {at}, by {with_unit(speeds.swing, 'm')} peak to peak{often}"
-    low, high = (with_unit(value, "m/s") for value in speeds.tried)
-    if not speeds.ranges:
-        return [f"{first}; no stick-slip from {low} to {high}."]
-    texts = []
-    for below, above in speeds.ranges:
-        begins = with_unit(below[1], "m/s") if below else f"{low} (the lowest tried)"
-        ends = with_unit(above[0], "m/s") if above else f"{high} (the highest tried)"
-        texts.append(f"from {begins} to {ends}")
-    last = speeds.ranges[-1][1]
-    smooth = f"; smooth from {with_unit(last[1], 'm/s')} on" if last else ""
     left = [f"It was not decided at {speeds.open_speeds} of the speeds tried."] if speeds.open_speeds else []
+    low, high = (with_unit(value, "m/s") for value in speeds.tried)
+    if speeds.tried[0] == speeds.tried[1]:
+        return [f"{first}; other speeds take {MORE_WORK}."]
+    if not speeds.ranges:
+        return [f"{first}{'' if left else f'; no stick-slip from {low} to {high}'}.", *left]
+    texts = [f"from {with_unit(least, 'm/s')} to {with_unit(most, 'm/s')}" for least, most in speeds.seen]
+    last = speeds.ranges[-1][1]
+    smooth = f"; smooth from {with_unit(last[1], 'm/s')} on" if last and not left else ""
     return [f"{first}. Started from rest, its error keeps swinging {listed(texts, 'and')}{smooth}.", *left]
 
 

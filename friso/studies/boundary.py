@@ -400,8 +400,9 @@ def plane_edge(result: Plane) -> PlaneEdge | None:
 
 
 def last_ends(result: Plane) -> list[np.ndarray]:
-    """Return where hunting ends beyond the curves: both ends of each bracket in key values [SI], (2, 2)."""
-    return [_values(result.space, np.array([end.inside, end.outside])) for end in result.last_ends]
+    """Return where hunting certainly ends beyond the curves: both ends of each bracket in key values [SI], (2, 2)."""
+    certain = [end for end in result.last_ends if end.certain]
+    return [_values(result.space, np.array([end.inside, end.outside])) for end in certain]
 
 
 def _lies_between(end: np.ndarray, along: int, low: float, high: float, value: float) -> bool:

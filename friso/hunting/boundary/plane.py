@@ -322,7 +322,7 @@ def _crossings(curve: Curve, start: np.ndarray, end: np.ndarray) -> list[float]:
     with np.errstate(all="ignore"):
         weights = np.nan_to_num(aside[passes] / (aside[passes] - aside[passes + 1]), nan=0.5)
     shares = along[passes] + weights * (along[passes + 1] - along[passes])
-    return shares[(shares >= 0) & (shares <= 1)].tolist()
+    return shares[(shares >= 0) & (shares < 1)].tolist()
 
 
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:

@@ -151,6 +151,7 @@ def _stick_slip(speeds: hunting.StickSlipSpeeds) -> dict[str, Any]:
         **entries(speeds, "lasts", "sticks", "period_s", "open_speeds"),
         "swing_m": speeds.swing,
         "speeds_m_per_s": [{"begins": below, "ends": above} for below, above in speeds.ranges],
+        "seen_m_per_s": speeds.seen,
         "tried_m_per_s": speeds.tried,
     }
 

@@ -29,7 +29,8 @@ def friction_sentences(case: Case) -> list[str]:
         return []
     pairs = static_frictions(case.stage.flat())
     static = case.stage.flat()[next(iter(pairs))] if len(pairs) == 1 else None
-    says = margin_sentence("static friction", margin, static, "N", ", with Coulomb friction held")
+    thin = case.verdict != "settles" or bool(thin_margins(case))
+    says = margin_sentence("static friction", margin, static, "N", ", with Coulomb friction held", thin)
     return [says, *_too_strong(case, margin)]
 
 
@@ -49,19 +50,20 @@ def _too_strong(case: Case, margin: ParameterMargin) -> list[str]:
 
 
 def margin_sentence(
-    name: str, margin: ParameterMargin, own: float | None = None, unit: str = "", remark: str = ""
+    name: str, margin: ParameterMargin, own: float | None = None, unit: str = "", remark: str = "", thin: bool = False
 ) -> str:
     """Say over which range of a parameter a stage hunts, or does not.
 
     `name` is the parameter in words, `own` its value [SI `unit`] (None: multiples are told), and `remark` is added.
+    A margin that is `thin`, or close to its end, is not called robust.
     """
     open_ones = {side: f"{_side(side)} yours it was not determined" for side in margin.open_sides}
     doubts = [] if margin.sure and all(end.certain for end in (margin.below, margin.above) if end) else ["not certain"]
     doubt = f" ({'; '.join([*doubts, *open_ones.values()])})" if doubts or open_ones else ""
     low, high = (_kept_to(margin, side) for side in (-1, 1))
     distance = SEARCH_LIMITS.edge_distance
-    thin = any(max(end.outside, 1 / end.outside) < distance for end in (margin.below, margin.above) if end)
-    quiet = "No hunting was found" if doubts else "No hunting" if thin else "Robust: no hunting"
+    thin = thin or any(max(end.outside, 1 / end.outside) < distance for end in (margin.below, margin.above) if end)
+    quiet = "No hunting was found" if doubts or open_ones else "No hunting" if thin else "Robust: no hunting"
     does = "Hunts" if margin.attracts else quiet
     if len(open_ones) == 2:
         return f"Whether another {name} {'ends' if margin.attracts else 'starts'} hunting was not determined."

@@ -106,7 +106,7 @@ def _verdict(case: Case) -> list[str]:
     """Say what the stage does in one case; sentences after the first are details."""
     if case.runs_away:
         return ["runs away from its reference for good."]
-    if case.stick_slip:
+    if case.stick_slip and case.solver.done:
         return stick_slip_sentences(case.stick_slip, abs(case.stage.flat()["motion.velocity"]))
     if case.verdict in _SAYS:
         return _SAYS[case.verdict](case)
@@ -552,6 +552,8 @@ def _to(case: Case, advice: BandwidthAdvice) -> str:
     if advice.keeps_friction is not None:
         friction = other_static_friction(case.stage.flat())
         remarks.append(f"also {friction}" if advice.keeps_friction else f"but hunting returns there {friction}")
+    elif case.static_friction and not advice.just_beyond:
+        remarks.append("not examined with other static friction")
     remark = f" ({'; '.join(remarks)})" if remarks else ""
     if crossover is not None:
         name = _elsewhere(case) or case.stage.controller.bandwidth_name
