@@ -20,7 +20,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, described, kept
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.cycle.shooting import close
-from friso.hunting.path import AttractionEnd, LossKind, Path
+from friso.hunting.path import AttractionEnd, LossKind, ParameterPath
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
@@ -49,7 +49,7 @@ class EdgeSearch:
     At the factor `settled`, if given, the stage does not hunt: an attractor beyond belongs to another window.
     """
 
-    path: Path
+    path: ParameterPath
     farthest: float
     settled: float | None = None
 

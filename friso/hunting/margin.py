@@ -11,8 +11,9 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.loop import unstable_among
-from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind, Path, bandwidth_path
+from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind, ParameterPath, bandwidth_path
 from friso.hunting.path_search import PathSearch
+from friso.hunting.rows import spans
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import check_settings
 from friso.stage import Stage
@@ -130,16 +131,15 @@ def unstable_bandwidths(stage: Stage) -> tuple[BandwidthWindow, ...]:
 
     factors = np.geomspace(LOWEST, HIGHEST, count)
     places = factors.tolist()
-    changes = np.flatnonzero(np.diff(_unstable(path, factors).astype(int), prepend=0, append=0))
     return tuple(
         BandwidthWindow(
             end(places[first], places[first - 1]) if first else None,
-            end(places[after - 1], places[after]) if after < count else None,
+            end(places[last], places[last + 1]) if last + 1 < count else None,
         )
-        for first, after in zip(changes[::2], changes[1::2], strict=True)
+        for first, last in spans(_unstable(path, factors))
     )
 
 
-def _unstable(path: Path, factors: np.ndarray) -> np.ndarray:
+def _unstable(path: ParameterPath, factors: np.ndarray) -> np.ndarray:
     """Return at which factors of a path the loop is unstable, whatever the friction, (count,)."""
     return np.any([*unstable_among(path.stages(factors)).values()], axis=0)

@@ -79,7 +79,7 @@ class BandwidthWindow:
 
 
 @dataclass(frozen=True)
-class Path:
+class ParameterPath:
     """Stages along which one parameter moves.
 
     `stages` makes them, with the parameter times factors (count,). `factors`, ascending, are those surveyed at first;
@@ -99,7 +99,7 @@ class Path:
         below: np.ndarray,
         above: np.ndarray,
         beyond: tuple[float, ...],
-    ) -> Path:
+    ) -> ParameterPath:
         """Make a path from ascending factors below and above 1, either of which may be empty.
 
         `scaled` gives the stages' keys in SI, with the parameter times factors (count,).
@@ -115,7 +115,7 @@ class Path:
         return np.arange(self.own + 1, len(self.factors)) if side > 0 else np.arange(self.own - 1, -1, -1)
 
 
-def bandwidth_path(flat: Mapping[str, Any], attracting: bool) -> Path:
+def bandwidth_path(flat: Mapping[str, Any], attracting: bool) -> ParameterPath:
     """Return the path along which the whole controller of a stage becomes faster.
 
     `flat` has the stage's keys in SI. Factors lie closer on the side where an edge is expected: above for an
@@ -126,10 +126,10 @@ def bandwidth_path(flat: Mapping[str, Any], attracting: bool) -> Path:
     lowest, highest = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
     below = np.geomspace(lowest, 1.0, round(-to_lower * np.log10(lowest)), endpoint=False)
     above = np.geomspace(1.0, highest, round(to_higher * np.log10(highest)) + 1)[1:]
-    return Path.of(lambda factors: faster(flat, factors), below, above, edge_settings.beyond_bandwidths)
+    return ParameterPath.of(lambda factors: faster(flat, factors), below, above, edge_settings.beyond_bandwidths)
 
 
-def static_friction_path(flat: Mapping[str, Any]) -> Path:
+def static_friction_path(flat: Mapping[str, Any]) -> ParameterPath:
     """Return the path along which static friction changes and Coulomb friction is held.
 
     It begins where both are equal, or at a fraction given by `SEARCH_LIMITS`. `flat` has the stage's keys in SI.
@@ -138,16 +138,16 @@ def static_friction_path(flat: Mapping[str, Any]) -> Path:
     return _path_of_factors(lambda factors: with_static_friction(flat, factors), lowest)
 
 
-def key_path(flat: Mapping[str, Any], key: str) -> Path:
+def key_path(flat: Mapping[str, Any], key: str) -> ParameterPath:
     """Return the path along which one key of a stage changes; `flat` has the stage's keys in SI."""
     return _path_of_factors(lambda factors: {**flat, key: flat[key] * factors}, 1 / SEARCH_LIMITS.most_friction)
 
 
-def _path_of_factors(scaled: Callable[[np.ndarray], Mapping[str, Any]], lowest: float) -> Path:
+def _path_of_factors(scaled: Callable[[np.ndarray], Mapping[str, Any]], lowest: float) -> ParameterPath:
     """Return a path from the factor `lowest` to the highest one, whose steps grow outward.
 
     A side narrower than a step is left out.
     """
     steps = np.array(edge_settings.margin_steps)
     below = lowest ** steps[::-1] if np.log(lowest) < -edge_settings.least_side_log else np.empty(0)
-    return Path.of(scaled, below, SEARCH_LIMITS.most_friction**steps, edge_settings.beyond_factors)
+    return ParameterPath.of(scaled, below, SEARCH_LIMITS.most_friction**steps, edge_settings.beyond_factors)

@@ -12,7 +12,8 @@ from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.edge_search import Beyond, EdgeSearch
-from friso.hunting.path import AttractionEnd, BandwidthWindow, Path
+from friso.hunting.path import AttractionEnd, BandwidthWindow, ParameterPath
+from friso.hunting.rows import spans
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import sketched, what_attracts
 
@@ -27,7 +28,7 @@ class PathSearch:
     The factors numbered `lowest` and higher were searched.
     """
 
-    def __init__(self, path: Path, first: int = 0) -> None:
+    def __init__(self, path: ParameterPath, first: int = 0) -> None:
         """Survey the stage at the factors numbered `first` and higher.
 
         Raises Exhausted if an allowance of work is used up.
@@ -267,7 +268,7 @@ class PathSearch:
         """
         while True:
             before = self.attracts.copy()
-            windows = tuple(self._window(a, b) for a, b in self._spans() if not a <= besides <= b)
+            windows = tuple(self._window(a, b) for a, b in spans(self.attracts) if not a <= besides <= b)
             if np.array_equal(before, self.attracts):
                 return windows
 
@@ -277,11 +278,3 @@ class PathSearch:
             self.end(first, -1) if first > self.lowest else None,
             self.end(last, 1) if last + 1 < len(self.factors) else None,
         )
-
-    def _spans(self) -> list[tuple[int, int]]:
-        """Return the first and last numbers of each group of factors with an attractor.
-
-        The factors of a group are neighbours.
-        """
-        ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
-        return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]

@@ -21,6 +21,12 @@ class ArrayRows:
         return replace(self, **parts)  # type: ignore[type-var]
 
 
+def spans(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first and last numbers of each group of neighbouring flags, shape (count,), that are true."""
+    ends = np.flatnonzero(np.diff(flags.astype(int), prepend=0, append=0))
+    return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]
+
+
 def _rows_of(part: Any, numbers: Any) -> Any:
     """Select rows by number from an array, or all arrays in a `part`; return others unchanged."""
     if isinstance(part, np.ndarray):

@@ -17,9 +17,23 @@ from friso.equations.structure import structure
 from friso.hunting.attractors.rounds import SURVEY_RTOL
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.measures import LAST_QUARTER
+from friso.hunting.rows import spans
 from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
 from friso.stage.motion import DURATION
+
+
+@dataclass(frozen=True)
+class SpeedRange:
+    """Range of speeds [m/s] in which a swing lasts, from the `slowest` to the `fastest` tried.
+
+    At `quiet_below` and `quiet_above`, the next speeds tried, it slides smoothly (None: not tried, or undecided).
+    """
+
+    slowest: float
+    fastest: float
+    quiet_below: float | None
+    quiet_above: float | None
 
 
 @dataclass(frozen=True)
@@ -28,9 +42,7 @@ class StickSlipSpeeds:
 
     - `lasts`: its error keeps swinging (None: not decided); `sticks`: it stands still in each swing.
     - `swing` [m] of the error, peak to peak, and `period` [s]: of the last quarter of a long run.
-    - `ranges`: speeds [m/s] at which the error keeps swinging, each from (none, swings) to (swings, none): the last
-      speed tried without and the first with a swing, and the reverse; None where the range reaches the end of the
-      search.
+    - `ranges`: speeds at which the error keeps swinging.
     - `tried`: lowest and highest speed tried [m/s]; `open_speeds`: at how many of them it was not decided.
     """
 
@@ -38,8 +50,7 @@ class StickSlipSpeeds:
     sticks: bool
     swing: float
     period: float | None
-    ranges: tuple[tuple[tuple[float, float] | None, tuple[float, float] | None], ...]
-    seen: tuple[tuple[float, float], ...]
+    ranges: tuple[SpeedRange, ...]
     tried: tuple[float, float]
     open_speeds: int
 
@@ -85,41 +96,20 @@ def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
         float(swing[0]),
         period,
         _ranges(speeds, lasts, decided),
-        _lasting_speeds(speeds, lasts & decided),
         (float(speeds[0]), float(speeds[-1])),
         int(np.count_nonzero(~decided)),
     )
 
 
-def _lasting_speeds(speeds: np.ndarray, swings: np.ndarray) -> tuple[tuple[float, float], ...]:
-    """Return the lowest and highest speed of each range in which a swing was seen to last."""
-    ends = np.flatnonzero(np.diff(swings.astype(int), prepend=0, append=0))
-    return tuple(
-        (float(speeds[first]), float(speeds[after - 1]))
-        for first, after in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
-    )
+def _ranges(speeds: np.ndarray, lasts: np.ndarray, decided: np.ndarray) -> tuple[SpeedRange, ...]:
+    """Return the ranges of ascending speeds, shape (count,), in which a swing certainly lasts."""
 
-
-def _ranges(
-    speeds: np.ndarray, lasts: np.ndarray, decided: np.ndarray
-) -> tuple[tuple[tuple[float, float] | None, tuple[float, float] | None], ...]:
-    """Return the ranges of ascending speeds in which a swing lasts, each with the brackets of its ends.
-
-    A range ends where it is not decided whether a swing lasts; such an end is None.
-    """
-    swings = lasts & decided
-    ends = np.flatnonzero(np.diff(swings.astype(int), prepend=0, append=0))
-
-    def bracket(first: int, second: int) -> tuple[float, float] | None:
-        quiet = first if swings[second] else second
-        return (float(speeds[first]), float(speeds[second])) if decided[quiet] else None
+    def quiet(number: int) -> float | None:
+        return float(speeds[number]) if 0 <= number < len(speeds) and decided[number] else None
 
     return tuple(
-        (
-            bracket(first - 1, first) if first else None,
-            bracket(after - 1, after) if after < len(speeds) else None,
-        )
-        for first, after in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
+        SpeedRange(float(speeds[first]), float(speeds[last]), quiet(first - 1), quiet(last + 1))
+        for first, last in spans(lasts & decided)
     )
 
 

@@ -11,7 +11,7 @@ from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
-from friso.hunting.path import AttractionEnd, Path, key_path, static_friction_path
+from friso.hunting.path import AttractionEnd, ParameterPath, key_path, static_friction_path
 from friso.hunting.path_search import PathSearch, Undecided
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import edge_settings
@@ -99,7 +99,7 @@ def _is_known(judgement: Judgement) -> bool:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _margin(path: Path, judgement: Judgement) -> ParameterMargin:
+def _margin(path: ParameterPath, judgement: Judgement) -> ParameterMargin:
     """Find the nearest ends of attraction on a path through a stage whose attractors are known.
 
     A side is open if an allowance of work is used up, or the search does not decide.

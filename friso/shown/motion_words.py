@@ -48,9 +48,9 @@ def stick_slip_sentences(speeds: StickSlipSpeeds, speed: float) -> list[str]:
         return [f"{first}; other speeds take {MORE_WORK}."]
     if not speeds.ranges:
         return [f"{first}{'' if left else f'; no stick-slip from {low} to {high}'}.", *left]
-    texts = [f"from {with_unit(least, 'm/s')} to {with_unit(most, 'm/s')}" for least, most in speeds.seen]
-    last = speeds.ranges[-1][1]
-    smooth = f"; smooth from {with_unit(last[1], 'm/s')} on" if last and not left else ""
+    texts = [f"from {with_unit(one.slowest, 'm/s')} to {with_unit(one.fastest, 'm/s')}" for one in speeds.ranges]
+    quiet = speeds.ranges[-1].quiet_above
+    smooth = f"; smooth from {with_unit(quiet, 'm/s')} on" if quiet and not left else ""
     return [f"{first}. Started from rest, its error keeps swinging {listed(texts, 'and')}{smooth}.", *left]
 
 

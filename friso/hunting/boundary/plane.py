@@ -22,7 +22,7 @@ from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families, symmetric_cyc
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.edge_search import Beyond, EdgeSearch
 from friso.hunting.loop import unstable_among
-from friso.hunting.path import Path
+from friso.hunting.path import ParameterPath
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import attractors_beside, what_attracts
 from friso.progress import Progress, Tally, silent
@@ -298,7 +298,7 @@ class _Line:
     def end_of(self, factor: float, motions: tuple[Swinging, ...]) -> LastEnd:
         """Follow `motions`, which attract at a factor, to the end of hunting on the line."""
         farthest = self.farthest
-        path = Path(
+        path = ParameterPath(
             lambda factors: self.space.stages(self.at(factors)),
             np.array([1.0, farthest]),
             0,

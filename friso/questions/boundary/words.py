@@ -161,7 +161,7 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
 
 def _beyond_curves(traced: Plane) -> list[str]:
     """Say that hunting goes on beyond the curves, by another cycle or swing; empty if it does not."""
-    count = len(traced.last_ends)
+    count = len(boundary.last_ends(traced))
     places = f"{count} place{'s' if count > 1 else ''} where the grid was searched"
     return [f"Beyond the curves another cycle or swing goes on hunting, at {places}."] if count else []
 

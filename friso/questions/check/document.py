@@ -150,8 +150,10 @@ def _stick_slip(speeds: hunting.StickSlipSpeeds) -> dict[str, Any]:
     return {
         **entries(speeds, "lasts", "sticks", "period_s", "open_speeds"),
         "swing_m": speeds.swing,
-        "speeds_m_per_s": [{"begins": below, "ends": above} for below, above in speeds.ranges],
-        "seen_m_per_s": speeds.seen,
+        "ranges": [
+            entries(one, "slowest_m_per_s", "fastest_m_per_s", "quiet_below_m_per_s", "quiet_above_m_per_s")
+            for one in speeds.ranges
+        ],
         "tried_m_per_s": speeds.tried,
     }
 

@@ -14,7 +14,7 @@ from friso.questions.check.figures import check_figures
 from friso.questions.check.isolator_words import isolator_sentence
 from friso.questions.check.laws import laws_sentences
 from friso.questions.check.table import rows, rows_behind
-from friso.questions.check.words import conclusion, verdict_sentence
+from friso.questions.check.words import conclusion, details_of, verdict_sentence
 from friso.shown.cases import shown_cases
 from friso.shown.files import Content
 from friso.shown.motion_words import motion_sentences
@@ -67,6 +67,7 @@ def check_html(
         verdicts=[(item.colour, f"{item.label}{if_so(stage)}: {verdict_sentence(item, cases)}") for item in in_order],
         sentences=[
             *filter(None, [conclusion(cases)]),
+            *details_of(cases),
             *(f"{omitted}." for omitted in [left_out(stage)] if omitted),
             *motion_sentences(stage),
             *filter(None, [stage.controller.note(stage.flat()), stage.note]),
