@@ -387,10 +387,17 @@ def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[s
     """Return the withheld estimates by key, each with its reason in place of the value.
 
     `reasons` are by key; an estimate without a reason is left out. The range left to Coulomb friction reaches down to
-    its lower end divided by the highest ratio of static to Coulomb friction.
+    its lower end divided by the highest ratio of static to Coulomb friction, that of imitated bristles as far as known
+    effects have moved them.
     """
-    ratio = settings.highest_friction_ratio
-    ranges = {one.name: (one.low / ratio, one.high) for one in estimates if one.name == "friction.coulomb"}
+    softer, stiffer = doubt_settings.bristles_fitted_too_stiff, doubt_settings.bristles_fitted_too_soft
+    by_key = {"friction.coulomb": (1 / settings.highest_friction_ratio, 1.0)}
+    by_key |= {key: (1 / softer, stiffer) for key in BRISTLES if reasons.get(key) == IMITATED}
+    ranges = {
+        one.name: (one.low * by_key[one.name][0], one.high * by_key[one.name][1])
+        for one in estimates
+        if one.name in by_key and one.low > 0
+    }
     return {
         one.name: one.withheld(reasons[one.name], *ranges.get(one.name, ()))
         for one in estimates

@@ -23,7 +23,7 @@ from friso.identification.stage_file import identified_stage, origins, with_unkn
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, silent, together
 from friso.stage import Stage
-from friso.stage.correlations import Correlations
+from friso.stage.correlations import Correlations, guessed_together
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,24 @@ def identify(
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
     doubts += words_of("stage", (fitted, estimates))
     sources = origins(fitted, fits.estimates, fits.follows, None if base is None else made_up)
-    fitted = with_unknown(fitted, sources, fits.left)
-    unknown = [f"the stage file lists as unknown: {', '.join(fitted.unknown_keys)}"] if fitted.unknown_keys else []
+    fitted = with_unknown(fitted, sources, fits.left, estimates)
+    unknown = _unknown(fitted)
     shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes, *unknown))
     correlated = _correlations(experiments, estimates, fits, fitted)
     return Identification(fitted, correlated, *shown, doubts, failed, sources)
+
+
+def _unknown(stage: Stage) -> list[str]:
+    """Say which values of the identified stage nobody knows: those with the range of similar machines, and others."""
+    ranges, assumed = stage.uncertain(), stage.assumed_keys
+    usual = [f"{key} {ranges[key].text}" for key in stage.unknown_keys if key in ranges]
+    similar = "; state your own, or the contact ([friction] guess)"
+    says = (
+        [f"not shown, so the stage file has the range of similar machines: {', '.join(usual)}{similar}"]
+        if usual
+        else []
+    )
+    return [*says, f"the stage file lists as unknown: {', '.join(assumed)}"] if assumed else says
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
@@ -271,4 +284,4 @@ def _correlations(
     part = matrix[np.ix_(places, places)]
     alone = np.abs(part - np.eye(len(leading))).max(axis=1, initial=0.0) == 0
     together = [key for key, single in zip(leading, alone, strict=True) if not single]
-    return Correlations(tuple(leading), part).among(together)
+    return Correlations(tuple(leading), part).among(together).with_others(guessed_together(stage))

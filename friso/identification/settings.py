@@ -68,6 +68,13 @@ class DoubtSettings(Settings):
     """Ratio of residual to noise above which missing effects may look like bristles. With play, a fit that left 8 times
     the noise gave 31 to 96 kN/m instead of 262 kN/m."""
 
+    bristles_fitted_too_soft: float = setting(10.0, "")
+    """Largest ratio of the true stiffness or damping of bristles to one that missing effects imitate. With play it was
+    8.5."""
+
+    bristles_fitted_too_stiff: float = setting(3.0, "")
+    """Largest ratio of imitated stiffness or damping of bristles to the true one. None above 1 was seen."""
+
     error_of_a_poor_model: float = setting(0.3, "")
     """Relative error of the force above which a model does not describe the record."""
 

@@ -17,7 +17,7 @@ from friso.stage.tables import passive_where
 if TYPE_CHECKING:
     from friso.remedies.catalogue import Suggestion
     from friso.stage import Stage
-    from friso.studies.draws import Draws
+    from friso.studies.draws import DrawnBandwidths, Draws
     from friso.studies.laws.verdicts import VerdictsByLaw
 
 
@@ -213,7 +213,22 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "separation": fates.separations(draws.sample.keys),
         "amplitude_m": _ends(fates.amplitudes),
         "period_s": _ends(fates.periods),
-        "edge_hz": _ends(np.r_[draws.edges.low, draws.edges.high]) if draws.edges and case == "given" else None,
+        "split": draws.split(case),
+        **_bandwidths(draws.bandwidths.get(case)),
+    }
+
+
+def _bandwidths(tried: DrawnBandwidths | None) -> dict[str, Any]:
+    """Return where hunting of the machines drawn ends, and at which faster bandwidths none of them hunts."""
+    edges = _ends(np.r_[tried.edges]) if tried else None
+    cure = list(tried.cure) if tried and tried.cure else None
+    own = tried.own if tried else None
+    return {
+        "tried_at_bandwidths": len(tried.hunts) if tried else 0,
+        "edge_factor": edges,
+        "edge_hz": [own * end for end in edges] if own and edges else None,
+        "cure_factor": cure,
+        "cure_hz": [own * end for end in cure] if own and cure else None,
     }
 
 

@@ -34,6 +34,10 @@ UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with whi
 """Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
 
 
+MACHINES_DIFFER = "machines drawn from the uncertain keys differ"
+"""Reason for an uncertain verdict at the centre of ranges over which the verdict changes."""
+
+
 class CheckAnswer(Answer):
     """The verdict on a stage.
 
@@ -94,7 +98,8 @@ class CheckAnswer(Answer):
             drawn = ["Interrupted: no stages were drawn yet."]
         notes = filter(None, [self.stage.controller.note(self.stage.flat()), self.stage.note])
         short = [*motion_sentences(self.stage), *notes]
-        return [*drawn, *answer(self.result), *short, *suggested, *(laws_sentences(self.laws) if self.laws else [])]
+        said = drawn if self.draws else [*drawn, *answer(self.result)]
+        return [*said, *short, *suggested, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:
         """Return the numbers of each case, of the machines drawn, and across friction laws.
@@ -107,7 +112,8 @@ class CheckAnswer(Answer):
         from friso.shown.cases import case_labels, shown_cases
 
         cases = shown_cases(self.result)
-        tables = [AnswerTable(self.stage.name, [item.label for item in cases], rows(cases))]
+        title = f"{self.stage.name}, at the centre of its ranges".removeprefix(", ") if self.draws else self.stage.name
+        tables = [AnswerTable(title, [item.label for item in cases], rows(cases))]
         if self.draws:
             title = f"{self.draws.sample.count} stages drawn from the uncertain keys, seed {self.draws.seed}"
             tables.append(AnswerTable(title, [*case_labels(self.draws.stage).values()], draws_rows(self.draws)))
@@ -121,12 +127,16 @@ class CheckAnswer(Answer):
 
         The doubt is that a friction law may give energy back, which no friction does.
         """
+        from friso.questions.check.draws import draws_details
         from friso.questions.check.margin_words import joint_sentences
-        from friso.questions.check.words import activity_sentences, between_surveyed, details_of
+        from friso.questions.check.words import activity_sentences, answer, between_surveyed, details_of
         from friso.stage.tables import passive_where
 
         activity = activity_sentences(passive_where(self.stage.flat()))
+        centre = [f"At the centre of the ranges: {text}" for text in answer(self.result)] if self.draws else []
         return [
+            *centre,
+            *(draws_details(self.draws) if self.draws else []),
             *details_of(self.result),
             *between_surveyed(self.result),
             *joint_sentences(self.joint_margins),
@@ -260,7 +270,8 @@ def checked_stage(
 
         answers_interrupts()  # from here on, an interruption still leaves an answer
         try:
-            drawn = Draws.of(chosen, sample, seed, loose, cases["given"].judgement.margin, progress)
+            drawn = Draws.of(chosen, sample, seed, loose, progress)
+            cases = {name: _as_drawn(case, drawn, name) for name, case in cases.items()}
             cut = drawn.asked > drawn.sample.count
         except KeyboardInterrupt:
             cut = True
@@ -287,6 +298,14 @@ def _as_built(case: Case) -> Case:
         return case
     hunting = replace(case.judgement.hunting, certain=False, reason=UNSTABLE_AS_BUILT)
     return replace(case, unstable_as_built=where, judgement=replace(case.judgement, hunting=hunting))
+
+
+def _as_drawn(case: Case, draws: Draws, name: str) -> Case:
+    """Return a case of the check whose verdict is not certain if the machines drawn differ in it."""
+    if not draws.split(name):
+        return case
+    hunting = replace(case.judgement.hunting, certain=False, reason=MACHINES_DIFFER)
+    return replace(case, judgement=replace(case.judgement, hunting=hunting))
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:

@@ -52,7 +52,7 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
         "keys_changed": tuning.size(outcome).keys,
         "factor": tuning.size(outcome).factor,
         "verdict": confirmation.verdict if confirmation else None,
-        "certain": bool(confirmation and confirmation.certain and not outcome.stage.unknown_keys),
+        "certain": bool(confirmation and confirmation.certain and not outcome.stage.assumed_keys),
         **_performance(outcome.measured, tuning),
     }
 
