@@ -467,6 +467,49 @@ class ExperimentSettings(Settings):
     """Largest stiffness of a joint, relative to its limiter's stiffness."""
 
 
+@dataclass(frozen=True)
+class WitnessSettings(Settings):
+    """Settings of the replay of the given controller on a log."""
+
+    force_left_by_the_controller: float = setting(0.25, "")
+    """Largest share of the logged force that a controller leaves which explains it. Sound records leave 0.02 to 0.09,
+    a clock that is off by two 0.6 and more."""
+
+    error_of_an_agreeing_slope: float = setting(0.15, "")
+    """Largest error of the force by the given controller. Sound records have slopes of 0.94 to 1.00."""
+
+    share_of_a_limit: float = setting(0.999, "")
+    """Share of the largest force from which a sample counts as at the limit."""
+
+    share_at_a_limit: float = setting(0.005, "")
+    """Share of samples at the largest force above which it counts as a limit."""
+
+    reach_of_a_clock: float = setting(20.0, "")
+    """Largest ratio of clocks searched. Larger ones are units, which the logged names tell."""
+
+    clocks_tried: int = setting(41, "")
+    """Clocks tried over that range, a sixth apart. The best one is refined."""
+
+    refinements_of_a_clock: int = setting(6, "")
+    """Halvings of the step between clocks. Six find a clock to 0.3 %."""
+
+    share_left_by_a_cause: float = setting(0.4, "")
+    """Largest share left with another clock or feedforward, relative to that without, for the cause to be believed."""
+
+    shares_of_a_record: tuple[float, float] = setting((0.2, 0.8), "")
+    """First and last share of a record at which gains may be switched."""
+
+    instants_tried: int = setting(13, "")
+    """Instants tried over that range."""
+
+    samples_of_a_start: int = setting(10, "")
+    """Samples at the start that do not count, in which filters of the controller forget that they began at rest."""
+
+    samples_of_delay: int = setting(4, "")
+    """Longest delay searched from position to force [samples]."""
+
+
 doubt_settings = DoubtSettings.live()
+witness_settings = WitnessSettings.live()
 identification_settings = IdentificationSettings.live()
 experiment_settings = ExperimentSettings.live()
