@@ -24,14 +24,15 @@ LENGTH, FORCE, MASS = "m", "N", "kg"
 class AxisKind:
     """A kind of axis: its name, and its units in place of metre, newton and kilogram.
 
-    `per_ampere` is the force or torque of the motor per ampere [N, or N m], if it is known. Forces may then be written
-    in amperes.
+    `effort` is what its actuator exerts, in words. `per_ampere` is the force or torque of the motor per ampere [N, or
+    N m], if it is known. Forces may then be written in amperes.
     """
 
     name: str
     length: str = LENGTH
     force: str = FORCE
     mass: str = MASS
+    effort: str = "force"
     per_ampere: float | None = field(default=None, compare=False)
 
     @property
@@ -98,7 +99,7 @@ def _in_key(unit: str) -> str:
 
 
 LINEAR = AxisKind("linear")
-ROTARY = AxisKind("rotary", "rad", "N*m", "kg*m^2")
+ROTARY = AxisKind("rotary", "rad", "N*m", "kg*m^2", "torque")
 KINDS: Mapping[str, AxisKind] = {kind.name: kind for kind in (LINEAR, ROTARY)}
 
 

@@ -400,7 +400,7 @@ def test_windows_of_kicks(kick: Kick, words: str) -> None:
 @pytest.mark.parametrize(
     ("judgement", "peaks", "words"),
     [
-        (hunts(), 0, "0 (counted from 10 s on, if higher than 100 µm)"),
+        (hunts(), 0, "0 (the thesis counts peaks from 10 s on, if higher than 100 µm)"),
         (hunts(verdict="bistable"), 0, "0 (another motion hunts)"),
         (settles(verdict="transient"), 8, "8 (a long transient)"),
         (settles(), 0, "0"),

@@ -22,6 +22,11 @@ def say(subject: Subject, table: Sequence[Alternatives[Subject]], words: Words[S
     return [f"{sentence[:1].upper()}{sentence[1:]}" for sentence in sentences]
 
 
+def say_all(subject: Subject, rows: Alternatives[Subject], words: Words[Subject]) -> list[str]:
+    """Return every sentence of a list whose condition holds for a subject."""
+    return say(subject, [[row] for row in rows], words)
+
+
 def always(subject: object) -> bool:
     """Hold for every subject, as the last alternative of a row."""
     return True

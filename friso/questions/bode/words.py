@@ -16,7 +16,7 @@ from friso.interface.answer import AnswerTable
 from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, shown_states
 from friso.questions.bode.table import growth, rows
 from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
-from friso.shown.says import Alternatives, Words, always, say
+from friso.shown.says import Alternatives, Words, always, say, say_all
 
 
 def sentences(bode: Bode) -> list[str]:
@@ -31,7 +31,7 @@ def details(bode: Bode) -> list[str]:
         for name in bode.limits
         if name != "given"
     ]
-    return [*say(bode, _MORE, _WORDS), *others]
+    return [*say_all(bode, _MORE, _WORDS), *others]
 
 
 def _alone(bode: Bode) -> bool:
@@ -205,23 +205,19 @@ _SAYS: Sequence[Alternatives[Bode]] = (
 )
 """Sentences on the stability of the loop, why it is unstable, and how fast the controller may be."""
 
-_MORE: Sequence[Alternatives[Bode]] = (
-    ((lambda bode: not (bode.stable or _alone(bode)), "Unstable states: {where}."),),
-    ((lambda bode: not _alone(bode), "Worst settled state: {worst_settled}."),),
-    ((lambda bode: not _alone(bode), "States checked: {states}."),),
+_MORE: Alternatives[Bode] = (
+    (lambda bode: not (_alone(bode) or bode.stable), "Unstable states: {where}."),
+    (lambda bode: not _alone(bode), "Worst settled state: {worst_settled}."),
+    (lambda bode: not _alone(bode), "States checked: {states}."),
     (
-        (
-            lambda bode: _by_crossover(bode) and bode.stage.controller.bandwidth_name == "crossover",
-            "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself "
-            "crosses 0 dB where the table says, since friction, joint, sampling and delay are in it.",
-        ),
+        lambda bode: _by_crossover(bode) and bode.stage.controller.bandwidth_name == "crossover",
+        "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself "
+        "crosses 0 dB where the table says, since friction, joint, sampling and delay are in it.",
     ),
     (
-        (
-            lambda bode: structure(bode.stage.flat()).plays,
-            "All this is for a load that stays on one flank of the backlash; friso check says whether the loop, "
-            "however stable there, swings across it.",
-        ),
+        lambda bode: structure(bode.stage.flat()).plays,
+        "All this is for a load that stays on one flank of the backlash; friso check says whether the loop, however "
+        "stable there, swings across it.",
     ),
 )
 """Details: the worst settled state, what was checked, and what the crossover and a backlash mean for the analysis."""
