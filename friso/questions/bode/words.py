@@ -167,33 +167,33 @@ def _ends_open(bode: Bode) -> bool:
 
 
 _WORDS: Words[Bode] = {
-    "at": lambda bode: (
-        "as given," if bandwidth(bode.stage.flat()) is None else f"at {with_unit(bandwidth(bode.stage.flat()), 'Hz')}"
+    "at": lambda of: (
+        "as given," if bandwidth(of.stage.flat()) is None else f"at {with_unit(bandwidth(of.stage.flat()), 'Hz')}"
     ),
-    "margin": lambda bode: _margin(bode.settled[1]),
-    "growth": lambda bode: growth(bode.settled[1]),
-    "settled": lambda bode: "at rest and sliding fast" if has_friction(bode) else "in all limit cases",
+    "margin": lambda of: _margin(of.settled[1]),
+    "growth": lambda of: growth(of.settled[1]),
+    "settled": lambda of: "at rest and sliding fast" if has_friction(of) else "in all limit cases",
     "where": _where,
-    "worst": lambda bode: _worst(bode, *bode.worst),
-    "worst_settled": lambda bode: _worst(bode, *bode.settled),
-    "fast": lambda bode: _fast(bode, _own(bode)),
-    "left_out": lambda bode: listed(_left_out(bode), "and"),
+    "worst": lambda of: _worst(of, *of.worst),
+    "worst_settled": lambda of: _worst(of, *of.settled),
+    "fast": lambda of: _fast(of, _own(of)),
+    "left_out": lambda of: listed(_left_out(of), "and"),
     "states": _states_checked,
 }
 
 _SAYS: Sequence[Alternatives[Bode]] = (
     (
-        (lambda bode: _alone(bode) and _settled_stable(bode), "{at} the loop is stable, {margin}."),
+        (lambda of: _alone(of) and _settled_stable(of), "{at} the loop is stable, {margin}."),
         (_alone, "{at} the loop is unstable: a deviation {growth}."),
-        (lambda bode: bode.stable, "{at} the loop is stable in every state; the worst is {worst}."),
+        (lambda of: of.stable, "{at} the loop is stable in every state; the worst is {worst}."),
         (_settled_stable, "{at} the loop is stable {settled}, but not {where}."),
         (always, "{at} the loop is unstable; the worst state is {worst_settled}."),
     ),
     (
-        (lambda bode: bode.stable or _alone(bode), ""),
+        (lambda of: of.stable or _alone(of), ""),
         (_of_tuning, "This is a matter of tuning, not of friction."),
         (
-            lambda bode: all(speeds.falling for speeds in bode.unstable),
+            lambda of: all(speeds.falling for speeds in of.unstable),
             "Friction falls with speed there (Stribeck effect), so the stage sticks and slips; friso check says "
             "whether it hunts.",
         ),
@@ -206,16 +206,16 @@ _SAYS: Sequence[Alternatives[Bode]] = (
 """Sentences on the stability of the loop, why it is unstable, and how fast the controller may be."""
 
 _MORE: Alternatives[Bode] = (
-    (lambda bode: not (_alone(bode) or bode.stable), "Unstable states: {where}."),
-    (lambda bode: not _alone(bode), "Worst settled state: {worst_settled}."),
-    (lambda bode: not _alone(bode), "States checked: {states}."),
+    (lambda of: not (_alone(of) or of.stable), "Unstable states: {where}."),
+    (lambda of: not _alone(of), "Worst settled state: {worst_settled}."),
+    (lambda of: not _alone(of), "States checked: {states}."),
     (
-        lambda bode: _by_crossover(bode) and bode.stage.controller.bandwidth_name == "crossover",
+        lambda of: _by_crossover(of) and of.stage.controller.bandwidth_name == "crossover",
         "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself "
         "crosses 0 dB where the table says, since friction, joint, sampling and delay are in it.",
     ),
     (
-        lambda bode: structure(bode.stage.flat()).plays,
+        lambda of: structure(of.stage.flat()).plays,
         "All this is for a load that stays on one flank of the backlash; friso check says whether the loop, however "
         "stable there, swings across it.",
     ),

@@ -171,56 +171,56 @@ def _measured(tuning: Advice) -> Performance:
 
 
 _WORDS: Words[Advice] = {
-    "unstable": lambda tuning: unstable_where(tuning.case.unstable),
-    "changes": lambda tuning: listed(changes(tuning.stage, _stage_of(_first(tuning))), "and"),
-    "name": lambda tuning: _first(tuning).remedy.name,
-    "from": lambda tuning: length_from(_first(tuning)),
-    "why": lambda tuning: unsure_why(_first(tuning)),
-    "for_all": lambda tuning: " for all moves" if _some_moves_alone(tuning) else "",
-    "so_far": lambda tuning: " so far" if tuning.interrupted else "",
-    "goal": lambda tuning: goal_words(tuning.goal),
-    "brings": lambda tuning: _brings(tuning.present if not tuning.needed else _measured(tuning), tuning),
-    "settled": lambda tuning: _settled(_measured(tuning), tuning.goal),
-    "force": lambda tuning: _against(_measured(tuning).force(tuning.goal), tuning.present.force(tuning.goal), FORCE),
-    "margin": lambda tuning: f"{_measured(tuning).least_margin(tuning.goal):.2f}",
-    "fastest": lambda tuning: tuning.fastest.remedy.name if tuning.fastest else "",
-    "soonest": lambda tuning: _settled(tuning.fastest.measured, tuning.goal),  # type: ignore[union-attr]
-    "as_it_is": lambda tuning: as_it_is(tuning),
-    "bandwidth": lambda tuning: _bandwidth_of(_first(tuning)),
-    "limit": lambda tuning: Quantity("N", positive, "200 N").on(tuning.stage.axis_kind).example,
+    "unstable": lambda of: unstable_where(of.case.unstable),
+    "changes": lambda of: listed(changes(of.stage, _stage_of(_first(of))), "and"),
+    "name": lambda of: _first(of).remedy.name,
+    "from": lambda of: length_from(_first(of)),
+    "why": lambda of: unsure_why(_first(of)),
+    "for_all": lambda of: " for all moves" if _some_moves_alone(of) else "",
+    "so_far": lambda of: " so far" if of.interrupted else "",
+    "goal": lambda of: goal_words(of.goal),
+    "brings": lambda of: _brings(of.present if not of.needed else _measured(of), of),
+    "settled": lambda of: _settled(_measured(of), of.goal),
+    "force": lambda of: _against(_measured(of).force(of.goal), of.present.force(of.goal), FORCE),
+    "margin": lambda of: f"{_measured(of).least_margin(of.goal):.2f}",
+    "fastest": lambda of: of.fastest.remedy.name if of.fastest else "",
+    "soonest": lambda of: _settled(of.fastest.measured, of.goal),  # type: ignore[union-attr]
+    "as_it_is": lambda of: as_it_is(of),
+    "bandwidth": lambda of: _bandwidth_of(_first(of)),
+    "limit": lambda of: Quantity("N", positive, "200 N").on(of.stage.axis_kind).example,
     "rest": _rest,
-    "part": lambda tuning: "joint" if tuning.goal.controller else "controller",
+    "part": lambda of: "joint" if of.goal.controller else "controller",
 }
 
 _SAYS: Sequence[Alternatives[Advice]] = (
     (
-        (lambda tuning: tuning.interrupted, "Interrupted: this is the best so far; other options were not tried."),
-        (lambda tuning: tuning.case.unstable, "The loop of the stage as its file gives it is {unstable}."),
+        (lambda of: of.interrupted, "Interrupted: this is the best so far; other options were not tried."),
+        (lambda of: of.case.unstable, "The loop of the stage as its file gives it is {unstable}."),
     ),
     (
-        (lambda tuning: not tuning.needed, "The stage meets the goal as it is: {brings}."),
-        (lambda tuning: tuning.working, "Set {changes}: the least change that works{for_all}{so_far} ({name})."),
+        (lambda of: not of.needed, "The stage meets the goal as it is: {brings}."),
+        (lambda of: of.working, "Set {changes}: the least change that works{for_all}{so_far} ({name})."),
         (
-            lambda tuning: tuning.for_large_moves,
+            lambda of: of.for_large_moves,
             "For moves of {from} and more alone: set {changes} ({name}); no change works for all moves.",
         ),
         (_unsure, "No change was found that surely works; {name} might ({changes}), but {why}."),
         (always, "No change was found that surely meets the goal."),
     ),
     (
-        (lambda tuning: not tuning.needed, ""),
-        (lambda tuning: tuning.working, "Then {settled}, with {force} and a modulus margin of {margin}."),
+        (lambda of: not of.needed, ""),
+        (lambda of: of.working, "Then {settled}, with {force} and a modulus margin of {margin}."),
         (always, "{as_it_is}"),
     ),
     (
-        (lambda tuning: not tuning.needed or not tuning.working, ""),
+        (lambda of: not of.needed or not of.working, ""),
         (
-            lambda tuning: _modes_unknown(tuning) and not _first(tuning).remedy.buys_joint,
+            lambda of: _modes_unknown(of) and not _first(of).remedy.buys_joint,
             "No modes of the machine are in the file: first find out whether they allow {bandwidth} "
             "(--bandwidth-limit).",
         ),
         (
-            lambda tuning: tuning.fastest is not tuning.least and tuning.fastest and tuning.fastest.measured,
+            lambda of: of.fastest is not of.least and of.fastest and of.fastest.measured,
             "Soonest in position is {fastest}: {soonest}.",
         ),
         (always, "{as_it_is}"),
@@ -229,8 +229,8 @@ _SAYS: Sequence[Alternatives[Advice]] = (
 """Sentences on what to change, what that brings and costs, and what remains open; the first three are said."""
 
 _EXPLAINED: Alternatives[Advice] = (
-    (lambda tuning: not tuning.working, "{rest}"),
-    (lambda tuning: tuning.needed, "{as_it_is}"),
+    (lambda of: not of.working, "{rest}"),
+    (lambda of: of.needed, "{as_it_is}"),
     (always, "The goal: {goal}."),
     (_drive_timed, "The [drive] of the file counts for the margin alone, not for moves and hunting."),
     (
@@ -239,11 +239,11 @@ _EXPLAINED: Alternatives[Advice] = (
         'or the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz").',
     ),
     (
-        lambda tuning: tuning.goal.force_limit is None and FORCE_LIMIT not in tuning.stage.flat(),
+        lambda of: of.goal.force_limit is None and FORCE_LIMIT not in of.stage.flat(),
         'Not known: the force of the actuator. No limit is assumed; state one (--force-limit "{limit}").',
     ),
     (
-        lambda tuning: tuning.needed and not (tuning.working or (tuning.goal.controller and tuning.goal.joint)),
+        lambda of: of.needed and not (of.working or (of.goal.controller and of.goal.joint)),
         "Changes of the {part} were not tried, as told.",
     ),
 )
@@ -564,20 +564,20 @@ def _drive_keys(tuning: Advice) -> list[str]:
 
 
 _ABOUT: Words[Advice] = {
-    "count": lambda tuning: str(tuning.machines.count),
-    "seed": lambda tuning: str(tuning.seed),
-    "moves": lambda tuning: moves_words(tuning.machines.moves),
-    "keys": lambda tuning: listed(_drive_keys(tuning), "and"),
-    "left_out": lambda tuning: str(tuning.machines.left_out),
+    "count": lambda of: str(of.machines.count),
+    "seed": lambda of: str(of.seed),
+    "moves": lambda of: moves_words(of.machines.moves),
+    "keys": lambda of: listed(_drive_keys(of), "and"),
+    "left_out": lambda of: str(of.machines.left_out),
 }
 
 _ASSUMED: Alternatives[Advice] = (
     (
-        lambda tuning: _has_friction(tuning) and breakaway(tuning.stage.flat()) <= 0,
+        lambda of: _has_friction(of) and breakaway(of.stage.flat()) <= 0,
         "No settings against friction were tried: the friction law declares no break-away force to size them by.",
     ),
     (
-        lambda tuning: _has_friction(tuning) and tuning.goal.joint and least_breakaway(tuning.stage.flat()) <= 0,
+        lambda of: _has_friction(of) and of.goal.joint and least_breakaway(of.stage.flat()) <= 0,
         "No isolator was tried: the friction of the guide does not hold the cart against the force of a joint and the "
         "bias force.",
     ),
@@ -588,7 +588,7 @@ _ASSUMED: Alternatives[Advice] = (
         "of its own, spread evenly over the logarithm: {moves}.",
     ),
     (_drive_keys, "In the middle of its range on all machines: {keys}."),
-    (lambda tuning: tuning.machines.left_out, "{left_out} draws that no stage may have were replaced by others."),
+    (lambda of: of.machines.left_out, "{left_out} draws that no stage may have were replaced by others."),
 )
 """Sentences on what was not tried, what the model holds, and which machines were drawn."""
 
