@@ -361,8 +361,8 @@ _SAYS: Sequence[Alternatives[Comparison]] = (
     (
         (
             _turns,
-            "A faster controller alone brings them to rest {from}, where the loop last crosses 0 dB (at {fewer}: {fewer_share}); a "
-            "drive limited to less needs {others}.",
+            "A faster controller alone brings them to rest {from}, where the loop last crosses 0 dB (at {fewer}: "
+            "{fewer_share}); a drive limited to less needs {others}.",
         ),
         (
             lambda of: of.needed is not None and not of.results[0].rests and of.turning is None,

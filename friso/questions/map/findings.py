@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Hashable
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +21,6 @@ from friso.stage import Stage
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import MapFinding, metrics, worded
 from friso.studies.study import Study
-
-STATIC = "friction.static"
 
 _NO_RESULT = {"failed": "the run was not completed", "invalid": "these values are not a valid stage"}
 
@@ -279,18 +276,13 @@ def in_its_unit(axis: CellAxis, runs: xr.Dataset) -> CellAxis:
         name = machine.controller.bandwidth_name
         return replace(axis, quantity=name, unit="Hz", positions=own * axis.positions)
     if axis.key == "friction" and machine:
-        if STATIC not in flat:
+        if map_words.STATIC not in flat:
             return replace(axis, quantity="all friction", unit="times yours")
         name = "static friction (all friction scaled)"
-        return replace(axis, quantity=name, unit="N", positions=flat[STATIC] * axis.positions)
-    return replace(axis, quantity=f"{map_words.in_sentence(axis.key)}{friction_held(axis.key, {*links, *runs.coords})}")
-
-
-def friction_held(key: str, varied: Collection[Hashable]) -> str:
-    """Say in brackets which friction stays as it is when one key of friction varies; empty for other keys."""
-    held = {STATIC: ("friction.coulomb", "Coulomb"), "friction.coulomb": (STATIC, "static")}
-    other, name = held.get(key, ("", ""))
-    return f" ({name} friction {'varies, too' if other in varied else 'held'})" if other else ""
+        return replace(axis, quantity=name, unit="N", positions=flat[map_words.STATIC] * axis.positions)
+    return replace(
+        axis, quantity=f"{map_words.in_sentence(axis.key)}{map_words.friction_held(axis.key, {*links, *runs.coords})}"
+    )
 
 
 def loop_first(stage: Stage) -> list[str]:
