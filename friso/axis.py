@@ -8,7 +8,7 @@ moments of inertia for masses, in unchanged equations. Every text of a unit come
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
@@ -44,6 +44,10 @@ class AxisKind:
     def plain(self) -> bool:
         """Tell whether its units are those of a linear axis, in which everything is declared."""
         return (self.length, self.force) == (LENGTH, FORCE)
+
+    def named(self, texts: Iterable[str]) -> list[str]:
+        """Return names of quantities with what the actuator of this axis exerts in place of {effort}."""
+        return [text.format(effort=self.effort) for text in texts]
 
     def per(self, unit: str) -> AxisKind:
         """Return this axis with forces in the unit in which they were logged, such as amperes.

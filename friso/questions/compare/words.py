@@ -44,7 +44,7 @@ COLUMNS = (
     "In position in the longer run",
     "Settling time",
     "In-position RMS",
-    "Force RMS",
+    "RMS of the {effort}",
     "Modulus margin",
 )
 
@@ -54,7 +54,7 @@ PAIRED = (
     "In position later",
     "No difference",
     "In-position RMS, ratio",
-    "Force RMS, ratio",
+    "RMS of the {effort}, ratio",
 )
 
 UNSHAKEN = "no [floor]"
@@ -239,7 +239,7 @@ def _cost(result: OptionResult, comparison: Comparison) -> str:
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
     if result.unstable:
         loops = f"the linear loop is unstable on {result.unstable} of {comparison.machines.count}"
-    return f" ({plain_factor(comparison.paired(result).force.value)} times the force RMS of a; {loops})"
+    return f" ({plain_factor(comparison.paired(result).force.value)} times the {axis_shown().effort} RMS of a; {loops})"
 
 
 def _resting(comparison: Comparison) -> list[OptionResult]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from friso.axis import axis_shown
 from friso.questions.tune.figures import tune_figures
 from friso.questions.tune.gain_words import gain_facts
 from friso.questions.tune.sensitivity_words import sensitivity_sentences
@@ -53,7 +54,7 @@ def tune_files(tuning: Advice) -> dict[str, Content]:
         tune_figures(tuning),
         sentences=answer(tuning),
         details=[more for more in behind if more.sentences or more.facts],
-        columns=COLUMNS,
+        columns=axis_shown().named(COLUMNS),
         rows=rows(tuning),
         computed=f", seed {tuning.seed}",
     )

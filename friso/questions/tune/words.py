@@ -49,7 +49,7 @@ COLUMNS = (
     "For moves of",
     "95 % settle within",
     "Median",
-    "Largest force",
+    "Largest {effort}",
     "Modulus margin",
     "Stiffness under load",
 )
@@ -221,7 +221,7 @@ _SAYS: Sequence[Alternatives[Advice]] = (
         ),
         (
             lambda of: of.fastest is not of.least and of.fastest and of.fastest.measured,
-            "Soonest in position is {fastest}: {soonest}.",
+            "Soonest: with {fastest}, {soonest}.",
         ),
         (always, "{as_it_is}"),
     ),
@@ -600,7 +600,7 @@ def sentences(tuning: Advice) -> list[str]:
 
 def tables(tuning: Advice) -> list[AnswerTable]:
     """Return the table in which remedies and the stage as it is stand side by side."""
-    return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]
+    return [AnswerTable(tuning.stage.name, axis_shown().named(COLUMNS), rows(tuning))]
 
 
 def details(tuning: Advice) -> list[str]:
