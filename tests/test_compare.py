@@ -611,15 +611,13 @@ def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
     hunting = replace(comparison, results=(base,))
     line = answer(replace(hunting, needed=needed))[-1]
     assert "from a bandwidth of 16.0 Hz on" in line
-    assert "at 14.0 Hz: 90 %" in line
     (faster,) = (result for result in comparison.results if result.letter == "b")
     assert faster.rests
     quick = replace(faster, option=replace(faster.option, factor=2.0))
     line = answer(replace(hunting, results=(base, quick), needed=needed))[-1]
-    assert "at a bandwidth of 12.0 Hz, " in line  # as built, it brings the machines to rest there
-    assert "at 10.0 Hz: 50 %" in line
+    assert "from a bandwidth of 12.0 Hz on" in line  # as built, it brings the machines to rest there
     none = answer(replace(hunting, needed=replace(needed, shares=needed.shares * 0.5)))[-1]
-    assert "does not bring 99 % of the machines to rest at any bandwidth up to 16.0 Hz (50 %)" in none
+    assert "does not bring 99 % of the machines to rest at any bandwidth up to 16.0 Hz" in none
     assert comparison.needed is not None
     assert np.diff(comparison.needed.bandwidths).min() > 0
     assert comparison.needed.shares[-1] > comparison.needed.shares[0]

@@ -341,7 +341,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Describe each curve in the plane of two keys, their meetings, and the corners."""
     curves = boundary.lines(traced)
     text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
-    text += meeting_sentences(traced, keys) or ["No two of the curves meet."] * (len(curves) > 1)
+    text += meeting_sentences(traced, keys) or (["No two of the curves meet."] if len(curves) > 1 else [])
     text += [
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]

@@ -33,7 +33,6 @@ from friso.studies.compare.study import (
     FOLLOWED_MACHINES,
     LONGER_FACTOR,
     Comparison,
-    NeededBandwidth,
     OptionResult,
 )
 
@@ -196,11 +195,6 @@ def answer(comparison: Comparison) -> list[str]:
     return say(comparison, _SAYS, _WORDS)[:3]
 
 
-def _share_at(needed: NeededBandwidth, number: int) -> str:
-    """Write the fraction of machines that come to rest at bandwidth `number` of those tried."""
-    return percent(float(needed.shares[number]), 3)
-
-
 def details(comparison: Comparison) -> list[str]:
     """Say which options bring the machines to rest and at what cost, how the others do, and what is not compared."""
     further = [*brought(comparison), *_performance(comparison), *_failing(comparison), *_standstill(comparison)]
@@ -264,32 +258,6 @@ def _first(comparison: Comparison) -> OptionResult:
     return preferred[0]
 
 
-def _needed(comparison: Comparison) -> NeededBandwidth:
-    """Return how many machines come to rest at which bandwidth, if that was computed."""
-    assert comparison.needed is not None
-    return comparison.needed
-
-
-def _fewer(comparison: Comparison) -> np.ndarray:
-    """Return the numbers of the bandwidths below the turning one at which too few machines come to rest."""
-    needed = _needed(comparison)
-    return np.flatnonzero((needed.bandwidths < comparison.turning) & (needed.shares < ENOUGH_SHARE))
-
-
-def _turns(comparison: Comparison) -> bool:
-    """Tell whether it is known from which bandwidth on a faster controller brings the machines to rest."""
-    asked = comparison.needed is not None and not comparison.results[0].rests
-    return asked and comparison.turning is not None and bool(_fewer(comparison).size)
-
-
-def _from(comparison: Comparison) -> str:
-    """Say from which bandwidth on a faster controller alone is enough, or at which single one."""
-    needed, least = _needed(comparison), comparison.turning or math.nan
-    at, turn = needed.turning(ENOUGH_SHARE), with_unit(least, "Hz")
-    alone = at is None or needed.bandwidths[at] > least
-    return f"at a bandwidth of {turn}" if alone else f"from a bandwidth of {turn} on"
-
-
 def _others(comparison: Comparison) -> list[OptionResult]:
     """Return the options that bring the machines to rest at their present bandwidth."""
     return [result for result in _resting(comparison) if result.option.factor == 1.0]
@@ -311,11 +279,8 @@ _WORDS: Words[Comparison] = {
     "margin": lambda of: f"{_first(of).margin.value:.2f}",
     "swinging": lambda of: str(int(np.count_nonzero(of.results[0].measures.swings))),
     "in_the_end": lambda of: "" if np.isfinite(of.results[0].settling.value) else " to come to rest in the end",
-    "from": _from,
-    "fewer": lambda of: with_unit(float(_needed(of).bandwidths[_fewer(of)[-1]]), "Hz"),
-    "fewer_share": lambda of: _share_at(_needed(of), int(_fewer(of)[-1])),
-    "highest": lambda of: with_unit(float(_needed(of).bandwidths[-1]), "Hz"),
-    "highest_share": lambda of: _share_at(_needed(of), -1),
+    "turning": lambda of: with_unit(of.turning, "Hz"),
+    "highest": lambda of: with_unit(float(of.needed.bandwidths[-1]), "Hz") if of.needed else "",
     "others": lambda of: _names(_others(of)) or "something else",
 }
 
@@ -359,15 +324,15 @@ _SAYS: Sequence[Alternatives[Comparison]] = (
         ),
     ),
     (
+        (lambda of: of.needed is None or of.results[0].rests, ""),
         (
-            _turns,
-            "A faster controller alone brings them to rest {from}, where the loop last crosses 0 dB (at {fewer}: "
-            "{fewer_share}); a drive limited to less needs {others}.",
+            lambda of: of.turning is not None,
+            "A faster controller alone brings them to rest from a bandwidth of {turning} on, where the loop last "
+            "crosses 0 dB; a drive limited to less needs {others}.",
         ),
         (
-            lambda of: of.needed is not None and not of.results[0].rests and of.turning is None,
-            "The controller alone does not bring {share} of the machines to rest at any bandwidth up to {highest} "
-            "({highest_share}).",
+            always,
+            "The controller alone does not bring {share} of the machines to rest at any bandwidth up to {highest}.",
         ),
     ),
 )
@@ -402,20 +367,10 @@ def _failing(comparison: Comparison) -> list[str]:
     """Say what the machines finally do with the options that fail."""
     return [
         f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
-        f"{share_with_interval(result.settled)} are in position{_in_the_longer_run(result)}."
+        f"{share_with_interval(result.settled)} are in position."
         for result in comparison.results
         if not result.rests
     ]
-
-
-def _in_the_longer_run(result: OptionResult) -> str:
-    """Say how many machines stay in position in a longer run; empty if there was no such run."""
-    if not result.later.done.size:
-        return ""
-    return (
-        f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER_FACTOR} times as "
-        "long"
-    )
 
 
 def _standstill(comparison: Comparison) -> list[str]:

@@ -33,15 +33,10 @@ def isolator_step(design: Design) -> DesignStep:
     sentences = [f"Without an isolator the machine {words.edge(corners)}.", *_worst(corners, design)]
     if not design.needed:
         sentences.append(words.brings(design))
-    facts = [
-        ("Corners of friction and masses", str(corners.population.count)),
-        ("Edge of hunting without isolator", _edge(corners)),
-        ("The same with the safety factor", _edge(corners, design.spec.safety.hunting)),
-        ("Machine's limit", hertz(design.spec.limit)),
-        ("Crossovers searched", " to ".join(map(hertz, corners.searched))),
-    ]
     losses = words.gaps(corners, flat)
-    facts += [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
+    lost = [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
+    searched = ("Crossovers searched", " to ".join(map(hertz, corners.searched)))
+    facts = [("Corners of friction and masses", str(corners.population.count)), searched, *lost]
     answer = "yes" if design.needed else "no"
     return DesignStep(f"Is an isolator needed: {answer}", tuple(sentences), tuple(facts), ())
 
@@ -64,31 +59,14 @@ def joint_step(design: Design) -> DesignStep:
     ]
     joint = design.stage.flat()
     facts = (
-        ("Drive stiffness", stiffness),
-        ("Stroke to each side", f"{size(task.stroke)} mm"),
         ("Deviation from linear over the stroke", f"{percent(beams.nonlinearity)}"),
-        ("Force at full stroke", force),
-        ("Least static friction", trimmed(task.friction, "N")),
         (
             "Limiter, beside the joint when touched",
             f"{trimmed(joint['joint.limiter_stiffness'], 'N/m')}, "
             f"{trimmed(joint['joint.limiter_damping'], 'N*s/m')} (as given)",
         ),
-        ("Edge of hunting with isolator", _edge(design.edges)),
     )
     return DesignStep(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(sentences), facts, ("design_map",))
-
-
-def _edge(corners: Corners, factor: float = 1.0) -> str:
-    """Write the highest edge of hunting among the corners, times a factor, as a frequency [Hz].
-
-    If some corner hunts at all crossovers searched, the text gives the end of the search. If none hunts, it is "none
-    found".
-    """
-    if not corners.hunts:
-        return "none found"
-    beyond = f"beyond {hertz(corners.searched[1])}"
-    return hertz(factor * corners.highest) if math.isfinite(corners.highest) else beyond
 
 
 def _stroke(design: Design) -> str:
@@ -130,7 +108,7 @@ def leaves_step(design: Design) -> DesignStep:
     """Return the step that chooses the leaf springs, with reasons."""
     sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
     figures = ("design_front", "design_modes")
-    return DesignStep(f"Leaf springs: {words.leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
+    return DesignStep(f"Leaf springs: {words.leaves(design)}", sentences, _numbers(design), figures)
 
 
 def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
@@ -155,33 +133,13 @@ def _keys(requirement: Requirement, text: Callable[[RelaxableKey], str]) -> str:
     return ", ".join(map(text, requirement.keys))
 
 
-def _sizes(design: Design) -> tuple[tuple[str, str], ...]:
-    """Return the dimensions of the leaf springs by name."""
-    geometry = design.fitted.choice.geometry
-    return (
-        ("Leaves", f"{geometry.sheet.leaves:g} of {geometry.sheet.material}"),
-        (
-            "Length, width, thickness",
-            f"{size(geometry.length)}, {size(geometry.width)}, {size(geometry.sheet.thickness)} mm",
-        ),
-        ("Spacing", f"{size(geometry.spacing)} mm"),
-    )
-
-
 def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
-    """Return stiffness, frequency, stress and margins of the leaf springs by name."""
-    choice, beams = design.fitted.choice, design.fitted.choice.beams
+    """Return load, support stiffness and shortening of the leaf springs by name."""
+    beams = design.fitted.choice.beams
+    support = f"{newtons_per(beams.support_x[-1], 'µm')}, {newtons_per(beams.support_y[-1], 'µm')}"
     return (
-        ("Drive stiffness, by beams", newtons_per(beams.drive[0], "mm")),
-        ("First interfering frequency, by beams", hertz(choice.frequency)),
-        ("Stress at the clamps at full stroke", megapascals(beams.clamp_stress)),
-        ("Margin to yield, to fatigue", f"{plain_factor(beams.yield_margin)} times, {_factor(beams.fatigue_margin)}"),
-        ("Buckling load", trimmed(beams.buckling, "N")),
         ("Load along the leaves, weight included", f"{design.fitted.task.load:.3g} N"),
-        (
-            "Support stiffness at full stroke, x and y",
-            f"{newtons_per(beams.support_x[-1], 'µm')}, {newtons_per(beams.support_y[-1], 'µm')}",
-        ),
+        ("Support stiffness at full stroke, x and y", support),
         ("Shortening at full stroke", trimmed(beams.shortening, "m")),
     )
 
@@ -279,11 +237,9 @@ def _gains(design: Design) -> tuple[tuple[str, str], ...]:
     controller, gains, flat = design.controller, design.controller.gains, design.stage.flat()
     window = " to ".join(map(hertz, comfortable(design)))
     return (
-        ("Crossover", hertz(controller.crossover)),
         ("Tuned for", f"{trimmed(flat[TUNED_MASS], 'kg')}, α = {flat[ALPHA]:g}, β = {flat[BETA]:g}"),
         ("k_p", trimmed(gains.k_p, "N/m")),
         ("τ_z, τ_i, τ_p", ", ".join(trimmed(time, "s") for time in (gains.tau_z, gains.tau_i, gains.tau_p))),
-        ("As gains of a PID: kp, ki, kd", _parallel(design)),
         ("Least modulus margin, as designed", f"{controller.margin:.3g}"),
         ("The same over the corners", f"{controller.corners.min():.3g}"),
         (f"Modulus margin above {COMFORTABLE_MARGIN:g}", window),

@@ -465,7 +465,6 @@ def _reason(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> str:
         "best": f"{best:.{digits_that_differ((best, goal.margin))}g}",
         "share": percent(goal.share),
         "distance": f"{1 / goal.distance:.2f}",
-        "lowest": _lowest(points, goal),
         "surveyed": str(outcome.attracted),
     }
     for name, text in _UNMET.items():
@@ -483,7 +482,7 @@ _UNMET = {
     "distance": "No setting{kept} (of {tried} tried) still settles in time at {distance} of its bandwidth.",
     "force": "All settings{kept} that settle take more force than there is.",
     "settle": "All settings{kept} that settle do so too late.",
-    "bandwidth": "Only settings above your bandwidth limit meet the rest of the goal{lowest}.",
+    "bandwidth": "Only settings above your bandwidth limit meet the rest of the goal.",
 }
 """Sentence for each part of the goal, in the order in which they are checked, if no setting is left that meets it."""
 
@@ -492,18 +491,6 @@ _SURVEYED = {
     False: "none of these was surveyed, so that they may still hunt.",
 }
 """What is known of settings that meet every part of the goal on the machines of the search: was any surveyed?"""
-
-
-def _lowest(points: TriedPoints, goal: Goal) -> str:
-    """Write the lowest bandwidth of the settings that miss the goal by their bandwidth alone.
-
-    The text is empty if there is no such setting.
-    """
-    others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
-    lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
-    return (
-        f", the slowest of which last crosses 0 dB at {with_unit(float(lowest), 'Hz')}" if np.isfinite(lowest) else ""
-    )
 
 
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
