@@ -268,21 +268,18 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
 def in_its_unit(axis: CellAxis, runs: xr.Dataset) -> CellAxis:
     """Return an axis as sentences name it: factors as values in Hz and N, and which friction an axis of friction is."""
     machine, links = machine_of(runs), json.loads(runs.attrs.get("links", "{}"))
-    flat = machine.flat() if machine else {}
-    own = bandwidth(flat) if flat else None
-    if axis.key == "speed" and machine:
-        if own is None:
-            return replace(axis, quantity="controller speed", unit="times yours")
-        name = machine.controller.bandwidth_name
-        return replace(axis, quantity=name, unit="Hz", positions=own * axis.positions)
-    if axis.key == "friction" and machine:
-        if map_words.STATIC not in flat:
-            return replace(axis, quantity="all friction", unit="times yours")
-        name = "static friction (all friction scaled)"
-        return replace(axis, quantity=name, unit="N", positions=flat[map_words.STATIC] * axis.positions)
-    return replace(
-        axis, quantity=f"{map_words.in_sentence(axis.key)}{map_words.friction_held(axis.key, {*links, *runs.coords})}"
-    )
+    held = map_words.friction_held(axis.key, {*map(str, runs.coords), *links})
+    if machine is None or axis.key not in SCALINGS:
+        return replace(axis, quantity=f"{map_words.in_sentence(axis.key)}{held}")
+    flat, name = machine.flat(), machine.controller.bandwidth_name
+    fields = {
+        "speed": ("controller speed", name, bandwidth(flat), "Hz"),
+        "friction": ("all friction", "static friction (all friction scaled)", flat.get(map_words.STATIC), "N"),
+    }
+    factor, value, own, unit = fields[axis.key]
+    if own is None:
+        return replace(axis, quantity=factor, unit="times yours")
+    return replace(axis, quantity=value, unit=unit, positions=own * axis.positions)
 
 
 def loop_first(stage: Stage) -> list[str]:

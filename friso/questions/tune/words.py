@@ -281,16 +281,10 @@ def _stage_of(outcome: RemedyOutcome) -> Stage:
 
 
 UNMADE = {
-    "rotary": "leaf springs of friso guide along a line, and this axis turns",
-    "mode": (
-        "the stage file states a parasitic mode of the machine, and a stage has no second one for the leaves; friso "
-        "design designs without it"
-    ),
+    "rotary": "leaf springs guide along a line, and this axis turns",
+    "mode": "the stage file states a parasitic mode, and a stage has no second one for the leaves (friso design)",
     "extra": f"that takes {install('design')}",
-    "none": (
-        "none of the sizes that friso init --spec begins with has this stiffness and bears this stroke; friso design "
-        "takes other sizes"
-    ),
+    "none": "no size of friso init --spec has this stiffness and bears this stroke (friso design takes others)",
 }
 """Why no leaf springs make the joint of a remedy."""
 
@@ -329,13 +323,11 @@ def _replaced(stage: Stage) -> str:
 
 def _verified(made: RemedyOutcome, tuning: Advice) -> str:
     """Say whether the stage still meets the goal with leaf springs and their parasitic mode."""
-    if made.certainty == "works":
-        assert made.measured is not None
+    if made.certainty == "works" and made.measured is not None:
         return f"With them, {share_with_interval(made.measured.share(tuning.goal))} of the machines meet the goal."
     if made.certainty == "unsure":
         return f"With them, it is not sure to work: {unsure_why(made)}."
-    result = "the search was given up" if made.certainty == "given up" else "it does not work"
-    return f"With them, {result}. {why_unmet(made, tuning)}"
+    return f"With them, it does not surely work. {why_unmet(made, tuning)}"
 
 
 def _brings(measured: Performance, tuning: Advice) -> str:
