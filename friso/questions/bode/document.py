@@ -9,7 +9,7 @@ from friso.frequency.crossover import Limits
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.questions.bode.states import has_limiter, side
-from friso.questions.bode.words import stability
+from friso.questions.bode.words import sentences
 from friso.shown.documents import entries, plain_json
 
 
@@ -22,7 +22,7 @@ def bode_document(bode: Bode) -> dict[str, Any]:
     state = "given" if joint is None else ("locked" if joint.locked else "free")
     crossover = bode.stage.controller.bandwidth_key is not None
     document = {
-        "conclusion": stability(bode)[0],
+        "conclusion": sentences(bode)[0],
         "stage": bode.stage.name,
         "cases": {name: _margins(case.margins) for name, case in bode.cases.items()},
         "cascade_loops": {

@@ -9,8 +9,7 @@ from friso.frequency.bode import Bode
 from friso.questions.bode.figures import bode_figures
 from friso.questions.bode.states import shown_states
 from friso.questions.bode.table import rows
-from friso.questions.bode.words import caveats, crossover_heading, crossover_meaning, crossovers, stability
-from friso.shown.cases import COLOURS
+from friso.questions.bode.words import details, sentences
 from friso.shown.drawing.palette import GREEN, VERMILLION
 from friso.shown.files import Content
 from friso.shown.pages import Report
@@ -24,16 +23,13 @@ DEFINITIONS = (
 def bode_files(bode: Bode) -> dict[str, Content]:
     """Return the page, and every figure in all formats, by file name."""
     states = shown_states(bode)
-    verdict, *further = stability(bode)
+    verdict, *further = sentences(bode)
     return Report.of_stage(
         "bode",
         bode.stage,
         bode_figures(bode),
         verdicts=[(GREEN if bode.settled[1].stable else VERMILLION, verdict)],
-        sentences=further,
-        heading=crossover_heading(bode),
-        crossovers=[(COLOURS[name], sentence) for name, sentence in crossovers(bode).items()],
-        caveats=[*crossover_meaning(bode), *caveats(bode)],
+        sentences=[*further, *details(bode)],
         columns=states,
         rows=rows(states),
         computed=f" from the equations of the simulation, linearised in {len(bode.scan.members)} states. {DEFINITIONS}",

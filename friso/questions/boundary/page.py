@@ -9,7 +9,7 @@ from pathlib import Path
 
 from friso.hunting import Diagram, Plane
 from friso.questions.boundary.figures import boundary_figure
-from friso.questions.boundary.words import ShownKey, sentences
+from friso.questions.boundary.words import ShownKey, answer, details
 from friso.questions.map.places import SHOWN, with_places
 from friso.shown.drawing.figure import Figure
 from friso.shown.files import Content, image_files
@@ -34,8 +34,12 @@ def boundary_html(
     traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, figure: Figure, condition: str = ""
 ) -> str:
     """Return the page of a boundary with its figure; it holds under a `condition`."""
-    answer, *details = sentences(traced, keys)
-    values = {"condition": condition, "sentences": [answer], "details": details, "note": figure.note}
+    values = {
+        "condition": condition,
+        "sentences": answer(traced, keys),
+        "details": details(traced, keys),
+        "note": figure.note,
+    }
     return Report.of_stage("boundary", stage, [replace(figure, note="")], **values).html()
 
 

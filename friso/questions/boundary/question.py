@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -26,11 +27,13 @@ if TYPE_CHECKING:
 class BoundaryAnswer(Answer):
     """The values at which hunting ends, over one key or two.
 
-    `result` is a `Diagram` over one key or a `Plane` of two. `texts` holds the ranges as the user gave them.
+    `result` is a `Diagram` over one key or a `Plane` of two. `texts` holds the ranges
+    as the user gave them, and `links` the keys that are tied to others.
     """
 
     stage: Stage
     texts: Sequence[str]
+    links: Mapping[str, str]
     name: str
 
     @property
@@ -42,19 +45,20 @@ class BoundaryAnswer(Answer):
     def keys(self) -> tuple[ShownKey, ...]:
         """Return the keys in the units in which their ranges were given."""
         ranges = zip(self.result.space.ranges, self.texts, strict=True)
-        return tuple(_in_its_unit(swept, text, self.axis_kind) for swept, text in ranges)
+        varied = frozenset([*self.varied, *self.links])
+        return tuple(replace(_in_its_unit(swept, text, self.axis_kind), varied=varied) for swept, text in ranges)
 
     def sentences(self) -> Sequence[str]:
-        """Return where hunting is possible and where it ends, as one text."""
-        from friso.questions.boundary.words import conclusion
+        """Return where hunting is possible and where it ends."""
+        from friso.questions.boundary.words import answer
 
-        return [conclusion(self.result, self.keys)]
+        return answer(self.result, self.keys)
 
     def details(self) -> Sequence[str]:
         """Return a sentence on every branch or curve, and on flips, folds and other special points."""
-        from friso.questions.boundary.words import sentences
+        from friso.questions.boundary.words import details
 
-        return sentences(self.result, self.keys)[1:]
+        return details(self.result, self.keys)
 
     def figures(self) -> Sequence[Figure]:
         """Return the figure of the branches of cycles, or of the curves on which hunting ends."""
@@ -130,7 +134,7 @@ def boundary(
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 
     traced = traced_boundary(chosen, ranges, links, tolerance, log, begins, progress)
-    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], name=inputs.stem_of(stage))
+    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], links=links, name=inputs.stem_of(stage))
 
 
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:

@@ -5,6 +5,7 @@ Every run of the command gives the same bytes.
 
 from __future__ import annotations
 
+from friso.axis import axis_shown
 from friso.quantities import percent
 from friso.questions.compare import words
 from friso.questions.compare.figures import compare_figures
@@ -25,9 +26,9 @@ def compare_files(comparison: Comparison) -> dict[str, Content]:
         population=words.population(comparison),
         remarks=comparison.notes,
         options=words.options_rows(comparison),
-        columns=words.COLUMNS,
+        columns=axis_shown().named(words.COLUMNS),
         rows=words.table_rows(comparison),
-        paired_columns=words.PAIRED,
+        paired_columns=axis_shown().named(words.PAIRED),
         paired=words.paired_rows(comparison),
         computed=(
             f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND_SHARE:g} tolerances, model error "

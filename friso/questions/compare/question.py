@@ -37,8 +37,8 @@ class CompareAnswer(Answer):
         from friso.questions.compare.words import COLUMNS, PAIRED, paired_rows, table_rows
 
         return [
-            AnswerTable(self.result.stage.name, COLUMNS, table_rows(self.result)),
-            AnswerTable("Compared with a, machine by machine", PAIRED, paired_rows(self.result)),
+            AnswerTable(self.result.stage.name, self.axis_kind.named(COLUMNS), table_rows(self.result)),
+            AnswerTable("Compared with a, machine by machine", self.axis_kind.named(PAIRED), paired_rows(self.result)),
         ]
 
     def details(self) -> Sequence[str]:

@@ -49,12 +49,13 @@ class DesignAnswer(Answer):
     def details(self) -> Sequence[str]:
         """Return the steps of the method with their reasons; none of a design that was not verified."""
         from friso.questions.design.steps import steps
+        from friso.questions.design.words import headline
 
         if self.unfinished:
             return ()
-        return [
-            f"{number}. {step.title}: {' '.join(step.sentences)}" for number, step in enumerate(steps(self.result), 1)
-        ]
+        titled = [f"{step.title}: {' '.join(step.sentences)}" for step in steps(self.result)]
+        laws = [sentence for _, sentence in headline(self.result)[3:]]
+        return [*laws, *(f"{number}. {text}" for number, text in enumerate(titled, 1))]
 
 
 @question

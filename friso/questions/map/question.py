@@ -98,6 +98,12 @@ class SweepAnswer(Answer):
         texts = sentences(self.result, self.study, self.metric)
         return texts if self.store is None else [*texts, f"store: {self.store}"]
 
+    def details(self) -> Sequence[str]:
+        """Return the number of cells with every word, and why cells have no result."""
+        from friso.questions.map.findings import details
+
+        return details(self.result, self.study, self.metric)
+
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that runs the cell with the largest swing at its end.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterable
+from collections.abc import Collection, Hashable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,6 +52,16 @@ def quantity(key: Hashable) -> str:
         name = name.removeprefix(table)
     words = name.replace("_", " ").replace(".", " ")
     return words[:1].upper() + words[1:]
+
+
+STATIC, COULOMB = "friction.static", "friction.coulomb"
+
+
+def friction_held(key: str, varied: Collection[Hashable]) -> str:
+    """Say in brackets which friction stays as it is when one key of friction varies; empty for other keys."""
+    held = {STATIC: (COULOMB, "Coulomb"), COULOMB: (STATIC, "static")}
+    other, name = held.get(key, ("", ""))
+    return f" ({name} friction {'varies, too' if other in varied else 'held'})" if other else ""
 
 
 def in_sentence(key: Hashable) -> str:

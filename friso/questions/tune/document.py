@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from friso.questions.tune.words import answer, changes, failing, unsure_why, why_unmet
+from friso.questions.tune.words import answer, changes, explained, failing, unsure_why, why_unmet
 from friso.remedies.method import Advice
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.shown.documents import entries, plain_json
@@ -22,7 +22,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
     return plain_json(
         {
             "conclusion": first,
-            "details": [*further, *failing(tuning)],
+            "details": [*further, *explained(tuning), *failing(tuning)],
             "stage": tuning.stage.name,
             **entries(tuning, "interrupted", "needed", "seed"),
             "least_change": tuning.least.remedy.name if tuning.least else None,

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from friso.axis import axis_shown
 from friso.questions.tune.figures import tune_figures
 from friso.questions.tune.gain_words import gain_facts
 from friso.questions.tune.sensitivity_words import sensitivity_sentences
-from friso.questions.tune.words import COLUMNS, answer, assumptions, failing, rows
+from friso.questions.tune.words import COLUMNS, answer, assumptions, explained, failing, rows
 from friso.remedies.method import Advice
 from friso.shown.files import Content
 from friso.shown.pages import Report
@@ -41,6 +42,7 @@ def tune_files(tuning: Advice) -> dict[str, Content]:
     `tuned.toml` is the least change that works.
     """
     behind = [
+        Behind("What the changes bring and cost", explained(tuning), open=True),
         Behind("What does not work, and why", failing(tuning), open=True),
         Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),
         Behind("What matters for the edge of hunting", sensitivity_sentences(tuning)),
@@ -52,7 +54,7 @@ def tune_files(tuning: Advice) -> dict[str, Content]:
         tune_figures(tuning),
         sentences=answer(tuning),
         details=[more for more in behind if more.sentences or more.facts],
-        columns=COLUMNS,
+        columns=axis_shown().named(COLUMNS),
         rows=rows(tuning),
         computed=f", seed {tuning.seed}",
     )
