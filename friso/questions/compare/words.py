@@ -263,6 +263,15 @@ def _others(comparison: Comparison) -> list[OptionResult]:
     return [result for result in _resting(comparison) if result.option.factor == 1.0]
 
 
+def _at_one_bandwidth(comparison: Comparison) -> bool:
+    """Tell whether a faster controller brings the machines to rest at a bandwidth, and fails again at a higher one."""
+    needed, least = comparison.needed, comparison.turning
+    if needed is None or least is None:
+        return False
+    at = needed.turning(ENOUGH_SHARE)
+    return at is None or bool(needed.bandwidths[at] > least)
+
+
 _WORDS: Words[Comparison] = {
     "letters": lambda of: listed([option.letter for option in of.not_run], "and"),
     "unstable": lambda of: str(of.results[0].unstable),
@@ -325,6 +334,11 @@ _SAYS: Sequence[Alternatives[Comparison]] = (
     ),
     (
         (lambda of: of.needed is None or of.results[0].rests, ""),
+        (
+            _at_one_bandwidth,
+            "A faster controller alone brings them to rest at a bandwidth of {turning}, where the loop last crosses 0 "
+            "dB, but not at all higher ones; a drive limited to less needs {others}.",
+        ),
         (
             lambda of: of.turning is not None,
             "A faster controller alone brings them to rest from a bandwidth of {turning} on, where the loop last "
