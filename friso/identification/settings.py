@@ -471,7 +471,7 @@ class ExperimentSettings(Settings):
 class WitnessSettings(Settings):
     """Settings of the replay of the given controller on a log."""
 
-    force_left_by_the_controller: float = setting(0.25, "")
+    force_left_by_the_controller: float = setting(0.15, "")
     """Largest share of the logged force that a controller leaves which explains it. Sound records leave 0.02 to 0.09,
     a clock that is off by two 0.6 and more."""
 
