@@ -36,6 +36,7 @@ from friso.identification.doubts import (
 )
 from friso.identification.doubts.changing_friction import changes_beside, inverse_reaching
 from friso.identification.estimate import Estimate
+from friso.identification.estimate_words import interval_text, value_text
 from friso.identification.inverse_model import InverseModel, directions, inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for, of_inverse_model, with_model_error
@@ -60,7 +61,6 @@ from friso.identification.stage_file import (
 )
 from friso.intervals import NORMAL_COVERAGE
 from friso.progress import silent
-from friso.questions.identify.numbers import interval_text, value_text
 
 DT = 1e-3
 MASS, VISCOUS, COULOMB, OFFSET = 6.0, 20.0, 11.0, 0.5

@@ -15,6 +15,7 @@ from friso.identification.doubt import KeyCase, RaisedDoubt
 from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
 from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
+from friso.identification.experiments.moves import FALLING, _inverse_text
 from friso.identification.inverse_model import bandwidth_of, inverse_model
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.output_error.settings import OutputErrorSettings
@@ -23,7 +24,6 @@ from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
 from friso.identification.stage_file import made_up
-from friso.questions.identify.kinds.moves import FALLING, _inverse_text
 
 FLAT = {"friction.stribeck_velocity": 1e-3, "axis.kind": "linear"}
 MASSES = Estimate.normal("masses.cart", "kg", 3.0, 0.1, "drawn")

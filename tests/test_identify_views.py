@@ -17,8 +17,12 @@ from snapshots import Snapshots
 
 from friso.identification.combine import combined
 from friso.identification.estimate import NO_INTERVAL, Estimate
+from friso.identification.estimate_words import interval_text, unit_of, value_text, with_interval
 from friso.identification.experiments.break_away import static_from_ramps
+from friso.identification.experiments.constant_speed import KIND as CONSTANT_SPEED
 from friso.identification.experiments.constant_speed import FrictionAtSpeeds
+from friso.identification.experiments.moves import KIND as MOVES
+from friso.identification.experiments.moves import record_panels
 from friso.identification.experiments.presliding import bristles_from_presliding
 from friso.identification.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
 from friso.identification.experiments.steps import stiffness_from_steps
@@ -44,9 +48,6 @@ from friso.identification.sources import LogFile
 from friso.identification.stage_file import estimate_text, identified_stage, made_up
 from friso.questions.identify.document import identify_document
 from friso.questions.identify.figures import identify_figures
-from friso.questions.identify.kinds.constant_speed import VIEW as CONSTANT_SPEED
-from friso.questions.identify.kinds.moves import moves_figures, record_panels
-from friso.questions.identify.numbers import interval_text, unit_of, value_text, with_interval
 from friso.questions.identify.page import identify_files
 from friso.questions.identify.words import (
     COLUMNS,
@@ -434,7 +435,7 @@ def named(figures: list[Figure], name: str) -> Figure:
 
 
 def figure_of(result: IdentifiedMoves, name: str) -> Figure:
-    return named(moves_figures(result, "identify_m"), f"identify_m_{name}")
+    return named(MOVES.figures(result, (), "identify_m"), f"identify_m_{name}")
 
 
 def line(panel: Panel, label: str) -> Series:
