@@ -29,7 +29,6 @@ from friso.identification.doubt import (
 from friso.identification.doubts import (
     changing_gains,
     differing_halves,
-    gaps,
     little_friction,
     missing_feedforward,
     perhaps_feedforward,
@@ -556,9 +555,9 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
 
 def test_a_record_in_pieces_says_how_little_is_fitted() -> None:
     log, inverse = usual()
-    assert not [*gaps.find(RecordCase(log, inverse))]
+    assert not [*DOUBTS["gaps"].find(RecordCase(log, inverse))]
     pieces = replace(log, segments=tuple(slice(a, a + 400) for a in range(0, 7600, 401)))
-    (finding,) = gaps.find(RecordCase(pieces, inverse))
+    (finding,) = DOUBTS["gaps"].find(RecordCase(pieces, inverse))
     assert "0.4 s of 8 s" in finding.words
 
 
