@@ -20,13 +20,12 @@ from friso.identification.response.closed_loop import crossovers, feedback
 from friso.identification.response.departure import Drag, departure, explained, friction_from_departure, slid
 from friso.identification.response.estimators import local_polynomial, multisine
 from friso.identification.response.mass_line import mass_lines, straight_lines
+from friso.identification.response.masses import fit_one_mass, fit_two_mass, two_masses, widened
 from friso.identification.response.modes import fit_modes
-from friso.identification.response.one_mass import fit_one_mass
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift, from_log, relative_error
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import ResponseSettings
-from friso.identification.response.two_mass import fit_two_mass, two_masses, widened
 
 DT, PERIOD = 2e-3, 1000  # period of 2 s: lines at 0.5, 1, ... Hz
 TRUE = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 1e-3, 0.0, 0.0, 0.0])

@@ -43,7 +43,7 @@ from friso.identification.readings.common import deflections, record
 from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
-from friso.identification.response.two_mass import two_masses
+from friso.identification.response.masses import two_masses
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import estimate_text, identified_stage, made_up
 from friso.questions.identify.document import identify_document

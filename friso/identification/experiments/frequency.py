@@ -26,8 +26,8 @@ from friso.identification.readings.course import Course
 from friso.identification.response.analysis import Bench, analyse, predicted
 from friso.identification.response.departure import Drag
 from friso.identification.response.mass_line import StraightLine
+from friso.identification.response.masses import TwoMass
 from friso.identification.response.response import FrequencyResponse
-from friso.identification.response.two_mass import TwoMass
 from friso.identification.settings import experiment_settings
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent

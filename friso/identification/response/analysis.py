@@ -31,13 +31,12 @@ from friso.identification.response.departure import (
 )
 from friso.identification.response.estimators import local_polynomial, multisine
 from friso.identification.response.mass_line import KINDS, StraightLine, mass_lines, straight_lines
+from friso.identification.response.masses import TwoMass, fit_two_mass, needs_two, widened
 from friso.identification.response.modes import Modes, fit_modes
-from friso.identification.response.one_mass import needs_two
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
 from friso.identification.response.response import Channels, FrequencyResponse
 from friso.identification.response.settings import settings
-from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
 
 FrequencyRange = tuple[float, float]
 
