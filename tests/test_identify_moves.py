@@ -336,7 +336,7 @@ def rigid(log: Log) -> tuple[OutputErrorFit, float]:
     return polished(problem, free, first_values(parameters)), inverse.bandwidth
 
 
-WELL = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+WELL = Quality(noise=0.05, left=0.05, noise_left=0.05, inverse_error=0.1, whole_error=0.1)
 """The quality of a fit that lacks nothing."""
 
 

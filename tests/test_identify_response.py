@@ -66,7 +66,15 @@ def exact(
             1 + relative * (rng.normal(size=len(values)) + 1j * rng.normal(size=len(values))) / np.sqrt(2)
         )
     deviation, many = relative * np.abs(values), np.full(len(frequency), 1e6)
-    return FrequencyResponse(frequency, values, deviation, deviation, unknown, many, "multisine")
+    return FrequencyResponse(
+        frequency=frequency,
+        response=values,
+        deviation=deviation,
+        noise=deviation,
+        distortion=unknown,
+        degrees=many,
+        kind="multisine",
+    )
 
 
 # The period
@@ -510,12 +518,19 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
     frequency = np.geomspace(2.0, 100.0, 300)
     values = exact(rig, frequency, 1e-4, np.random.default_rng(28)).response
     for sign in (1, -1):
-        bench = analyse((), measured=MeasuredResponse(frequency, sign * values, None, "", unit="m/N"))
+        bench = analyse(
+            (),
+            measured=MeasuredResponse(frequency, sign * values, None, "", unit="m/N"),
+        )
         assert bench.two_masses is not None
         assert all(bench.two_masses[name].value == pytest.approx(value, rel=1e-3) for name, value in truth.items())
         assert bool(KINDS["frequency"].doubts(bench)) is (sign < 0)
     above = 1.1 * bench.two_masses["antiresonance frequency"].value
-    cut = analyse((), (above, 100.0), measured=MeasuredResponse(frequency, values, None, "", unit="m/N")).two_masses
+    cut = analyse(
+        (),
+        (above, 100.0),
+        measured=MeasuredResponse(frequency, values, None, "", unit="m/N"),
+    ).two_masses
     assert cut is not None, "the resonance lies in the band that the user gave"
     assert all(cut[name].value == pytest.approx(value, rel=1e-2) for name, value in truth.items())
 

@@ -35,7 +35,12 @@ STRIBECK = Estimate.normal("friction.stribeck_velocity", "m/s", 1e-3, 1e-5, "dra
 def case_of(estimates: tuple[Estimate, ...], **seen: Any) -> KeyCase:
     """Return estimates together with a log of zeros, as the checks of an identification take them."""
     log: Any = record("made up", 1e-3, position=np.zeros(100), force=np.zeros(100))
-    rest: Any = {"log": log, "inverse": None, "fit": None, "quality": Quality(0.1, 0.1, 0.1, 0.1, 0.1)}
+    rest: Any = {
+        "log": log,
+        "inverse": None,
+        "fit": None,
+        "quality": Quality(noise=0.1, left=0.1, noise_left=0.1, inverse_error=0.1, whole_error=0.1),
+    }
     rest |= {"flat": FLAT, "velocity": np.zeros(1), "correlation": np.eye(sum(one.determined for one in estimates))}
     return KeyCase(**rest | {"estimates": estimates} | seen)
 

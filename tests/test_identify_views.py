@@ -108,12 +108,21 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[IdentifiedMoves, Log]:
         Estimate.unknown("friction.stribeck_velocity", "m/s", "output error", WHY, 5e-5, 0.16),
     )
     result = IdentifiedMoves(
-        log, part, inverse, inverse_model(log, 5.0, by_direction=True), fit, profiles, expected, np.eye(2),
-        coverage(log["position"], moved, MASS, COULOMB, DT),
-        Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
-        SimulationErrors(1e-5, 2e-3, 0.05, 0.04) if own_loop else SimulationErrors(np.nan, np.nan, np.nan, 0.04),
-        residual_of(residual, moved, DT), loop, Quality(0.2, 0.2, 0.2, 0.05, 0.04),
-    )  # fmt: skip
+        log=log,
+        part=part,
+        inverse=inverse,
+        by_direction=inverse_model(log, 5.0, by_direction=True),
+        fit=fit,
+        profiles=profiles,
+        estimates=expected,
+        correlation=np.eye(2),
+        covered=coverage(log["position"], moved, MASS, COULOMB, DT),
+        simulated=Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
+        errors=SimulationErrors(1e-5, 2e-3, 0.05, 0.04) if own_loop else SimulationErrors(np.nan, np.nan, np.nan, 0.04),
+        residual=residual_of(residual, moved, DT),
+        loop=loop,
+        quality=Quality(noise=0.2, left=0.2, noise_left=0.2, inverse_error=0.05, whole_error=0.04),
+    )
     return result, log
 
 

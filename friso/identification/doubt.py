@@ -197,7 +197,7 @@ class FitCase(FittedCase):
         """
         refuses: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED)
         wider = self.reaching(effect.explained.moved, further)
-        return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
+        return RaisedDoubt(words=words, size=size, unit=unit, fit=wider, refuses=refuses, explains=True)
 
     def named_along(
         self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] | None = None
@@ -254,7 +254,7 @@ class KeyCase(FitCase):
         return replace(self, estimates=estimates, correlation=self.correlation[np.ix_(kept, kept)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RaisedDoubt:
     """What a doubt found in a log: the cause in `words`, its `size` in `unit`, and what follows.
 

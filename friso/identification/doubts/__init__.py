@@ -32,7 +32,7 @@ def _gaps(case: RecordCase) -> Iterator[RaisedDoubt]:
             f"The record has gaps, and the longest stretch without one, {step * (part.stop - part.start):.3g} s of "
             f"{step * count:.3g} s, is all that is fitted: export it without gaps"
         )
-        yield RaisedDoubt(words, share)
+        yield RaisedDoubt(words=words, size=share)
 
 
 def _force_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -49,7 +49,7 @@ def _force_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
             f"The force is logged in steps of {digit:.2g} {case.unit}, {percent(digit / coulomb)} of Coulomb friction: "
             "what friction does at low speed is hidden in them; log it with more digits"
         )
-        yield RaisedDoubt(words, digit, case.unit, spoils=True)
+        yield RaisedDoubt(words=words, size=digit, unit=case.unit, spoils=True)
 
 
 def _position_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -62,7 +62,7 @@ def _position_digits(case: RecordCase) -> Iterator[RaisedDoubt]:
     digit, travel = float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
     if digit * doubt_settings.digits_of_a_fine_position >= travel:
         words = f"the position has steps of {digit:.2g} m over a travel of {travel:.3g} m: log it with more digits"
-        yield RaisedDoubt(words, digit, "m")
+        yield RaisedDoubt(words=words, size=digit, unit="m")
 
 
 def _clipped_force(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -73,7 +73,7 @@ def _clipped_force(case: RecordCase) -> Iterator[RaisedDoubt]:
     share = clipped_share(case.log["force"])
     if share > settings.share_of_clipped_samples:
         words = f"{percent(share)} of the force samples lie at its extremes: the channel clips"
-        yield RaisedDoubt(words, share, spoils=True)
+        yield RaisedDoubt(words=words, size=share, spoils=True)
 
 
 def _position_jump(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -85,7 +85,7 @@ def _position_jump(case: RecordCase) -> Iterator[RaisedDoubt]:
     if size:
         at = case.log.time[case.log.longest][sample]
         words = f"the position jumps by {size:.3g} m at {at:.4g} s, as after homing or a reset: cut the record there"
-        yield RaisedDoubt(words, size, "m")
+        yield RaisedDoubt(words=words, size=size, unit="m")
 
 
 def _timing(case: RecordCase) -> Iterator[RaisedDoubt]:
@@ -115,7 +115,9 @@ def _timing(case: RecordCase) -> Iterator[RaisedDoubt]:
     choice = filtered if fits[filtered].error < doubt_settings.error_share_of_a_cause * simpler else plain
     if choice != (0, 1):
         size = choice[0] * log.sample_time
-        yield RaisedDoubt(_sentence(*choice, log.sample_time), size, "s", fits[choice], spoils=True)
+        yield RaisedDoubt(
+            words=_sentence(*choice, log.sample_time), size=size, unit="s", without=fits[choice], spoils=True
+        )
 
 
 def _doubling(most: float) -> list[int]:

@@ -32,7 +32,7 @@ class PredictedCycle:
     period: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class HuntingLog:
     """Swings of a stage about its reference.
 

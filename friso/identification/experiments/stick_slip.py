@@ -50,7 +50,7 @@ LOADED = "joint.stiffness", "N/m", "force over deflection while the cart sticks"
 """Key, unit and method of the joint's stiffness from a log of slips."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StickSlip:
     """Static friction from slow motion that sticks and slips.
 
@@ -270,24 +270,24 @@ def _answer(
     low, high = np.percentile(forces, [5, 95]) if len(forces) else (np.nan, np.nan)
     offset = _offset(means["forward"], means["backward"])
     return StickSlip(
-        every,
-        forward,
-        backward,
-        means["forward"],
-        means["backward"],
-        (float(low), float(high)),
-        offset,
-        stiffness,
-        times,
-        places,
-        directions,
-        deflections,
-        forces,
-        rates,
-        speeds,
-        pull,
-        velocity,
-        _notes(len(forces), offset),
+        static=every,
+        forward=forward,
+        backward=backward,
+        break_away_forward=means["forward"],
+        break_away_backward=means["backward"],
+        spread=(float(low), float(high)),
+        offset=offset,
+        stiffness=stiffness,
+        times=times,
+        places=places,
+        directions=directions,
+        deflections=deflections,
+        forces=forces,
+        rates=rates,
+        speeds=speeds,
+        pull=pull,
+        cart_velocity=velocity,
+        warnings=_notes(len(forces), offset),
     )
 
 

@@ -41,7 +41,7 @@ from friso.identification.response.settings import settings
 FrequencyRange = tuple[float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Bench:
     """Results from the frequency responses of one machine.
 
@@ -140,11 +140,20 @@ def analyse(
     modes = _attempt(warnings, "modes", fit_modes, upper)
     warnings += model.warnings if model else ()
     return Bench(
-        tuple(logs), driven, other, used,
-        _attempt(warnings, "mass lines", mass_lines, upper) or (), modes, model,
-        _attempt(warnings, "limit cases", visible, upper, modes), departs, drag, explanation,
-        _left_out(warnings, runs, used), tuple(dict.fromkeys([*driven.warnings, *warnings])),
-    )  # fmt: skip
+        logs=tuple(logs),
+        driven=driven,
+        other=other,
+        band=used,
+        lines=_attempt(warnings, "mass lines", mass_lines, upper) or (),
+        modes=modes,
+        two_masses=model,
+        seen=_attempt(warnings, "limit cases", visible, upper, modes),
+        departs=departs,
+        drag=drag,
+        explanation=explanation,
+        aside=_left_out(warnings, runs, used),
+        warnings=tuple(dict.fromkeys([*driven.warnings, *warnings])),
+    )
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:

@@ -34,7 +34,7 @@ def rig_files(outcome: Outcome) -> dict[str, Content]:
             (log.name, [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"])
             for log in outcome.logs
         ],
-        computed=f" on a drive as built, seed {outcome.seed}; {len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}",
+        computed=f" on a drive as built, seed {outcome.seed}; {len(outcome.logs)} log{'' if len(outcome.logs) == 1 else 's'}",
     ).files({**logs, "truth/stage.toml": stage_text(outcome.stage, outcome.seed)})
 
 

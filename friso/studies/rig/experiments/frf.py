@@ -170,7 +170,7 @@ def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
     """Return the open loop of a log, tuned to a crossover [Hz]; without response if unstable."""
     if log.failure:
         none = np.zeros(0)
-        return MeasuredLoop(tuned, FrequencyResponse(none, none + 0j, none, none, none, none, "multisine"), ())
+        return MeasuredLoop(tuned, FrequencyResponse.undivided(none, none + 0j, none, 0.0, kind="multisine"), ())
     response = loop(log)
     return MeasuredLoop(tuned, response, crossovers(response))
 
@@ -258,7 +258,7 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
     singles = [single.response for single in plant.single]
     angles = [_turned(single, average) for single in singles]
     lines = [
-        Series(run.frequency, np.abs(run.response), "single identifications" * (n == 0), LIGHT, width=0.8)
+        Series(run.frequency, np.abs(run.response), "" if n else "single identifications", LIGHT, width=0.8)
         for n, run in enumerate(plant.single)
     ]
     lines.append(Series(hertz, np.abs(average), f"average of {len(singles)}", BLUE))
