@@ -194,7 +194,8 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     method = METHOD + words
     count = int(chosen.sum())
     if count < 2:
-        reason = f"{count} step{'' if count == 1 else 's'}{words} between settled windows ({plateaus} plateaus): 2 are needed"
+        steps_seen = "1 step" if count == 1 else f"{count} steps"
+        reason = f"{steps_seen}{words} between settled windows ({plateaus} plateaus): 2 are needed"
         return Estimate.unknown(KEY, UNIT, method, reason)
     x, y = np.where(chosen, steps[:, 0], 0.0), np.where(chosen, steps[:, 1], 0.0)
     slope = float(x @ y / (x @ x))
