@@ -1,9 +1,10 @@
 """Define doubts: effects that may be in a log and are not in the model, with the test that detects each.
 
-Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`. It states what it looks at, at which
-moment of an analysis, and which measurement would decide it; its `find` yields findings. A finding is the cause in
-words, with its size and its consequence: wider intervals, or values that are not reported. The analysis applies
-consequences in this module, so that one more effect is one more file.
+Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`, or, if it is about the record itself, an
+entry in the table of that package. It states what it looks at, at which moment of an analysis, and which measurement
+would decide it; its `find` yields findings. A finding is the cause in words, with its size and its consequence: wider
+intervals, or values that are not reported. The analysis applies consequences in this module, so that one more effect is
+one more file.
 """
 
 from __future__ import annotations
@@ -196,7 +197,7 @@ class FitCase(FittedCase):
         """
         refuses: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED)
         wider = self.reaching(effect.explained.moved, further)
-        return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
+        return RaisedDoubt(words=words, size=size, unit=unit, fit=wider, refuses=refuses, explains=True)
 
     def named_along(
         self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] | None = None
@@ -253,7 +254,7 @@ class KeyCase(FitCase):
         return replace(self, estimates=estimates, correlation=self.correlation[np.ix_(kept, kept)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RaisedDoubt:
     """What a doubt found in a log: the cause in `words`, its `size` in `unit`, and what follows.
 
@@ -300,7 +301,7 @@ class Doubt:
 
 
 DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
-"""All doubts; every module of `friso/identification/doubts/` declares one."""
+"""All doubts: every module of `friso/identification/doubts/` declares one, and the table of the package more."""
 
 
 def raised(moment: Moment, case: Any) -> Iterator[RaisedDoubt]:

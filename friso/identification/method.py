@@ -165,12 +165,12 @@ def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log],
     Raises InputError for a log that no given log can predict.
     """
     prior = Prior(base, base is not None)
-    predictors = {kind: predictor for _, kind in logs if (predictor := KINDS[kind].predictor) is not None}
+    predictors = [kind for kind in dict.fromkeys(kind for _, kind in logs) if KINDS[kind].predicts]
     for other in others:
         reasons: list[InputError] = []
-        for kind, predictor in predictors.items():
+        for kind in predictors:
             try:
-                predictor.check([log for log, name in logs if name == kind], other, prior)
+                KINDS[kind].check_prediction([log for log, name in logs if name == kind], other, prior)
             except InputError as error:
                 reasons.append(error)
         if not predictors:
@@ -189,19 +189,18 @@ def predict(
     [setup]. Raises InputError if no experiment can.
     """
     prior = Prior(base, base is not None)
-    predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
-    for kind, predictor in predictors.items():
+    for kind in reversed(in_order()):
         for experiment in identification.experiments:
-            result = predictor.predict(experiment.result, log, prior, settings) if experiment.kind == kind else None
-            if result is not None:
-                return Prediction(log, kind, result)
+            if experiment.kind == kind:
+                result = KINDS[kind].predict(experiment.result, log, prior, settings)
+                if result is not None:
+                    return Prediction(log, kind, result)
     raise _unpredictable(log)
 
 
 def _unpredictable(log: Log) -> InputError:
     """Return the error for a log that no available kind of experiment can predict."""
-    needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
-    expected = ", or ".join(needs)
+    expected = ", or ".join(filter(None, (KINDS[name].predicts for name in reversed(in_order()))))
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
 
 
@@ -244,8 +243,7 @@ def _analysed(kind: str, prior: Prior, settings: AnalysisSettings, group: Sequen
 def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
     """Make a stage with assumed values for the first log that suffices; None without one."""
     for log, kind in logs:
-        make = KINDS[kind].around
-        if make is not None and isinstance(log, Log) and (stage := make(log)) is not None:
+        if isinstance(log, Log) and (stage := KINDS[kind].around(log)) is not None:
             return stage
     return None
 

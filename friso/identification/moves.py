@@ -42,7 +42,7 @@ direction alone are the last step.
 """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class IdentifiedMoves:
     """Result of an analysis of moves.
 
@@ -127,19 +127,37 @@ def identify_moves(
         )
         fit = fit if fit.explains(noise) else late_by_a_sample(fit)
     case = FitCase(
-        log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
-        leading=None if quality.seen else leading, progress=between(progress, REPEATED_SHARE, 1),
-    )  # fmt: skip
+        log,
+        inverse,
+        share,
+        flat=flat,
+        fit=fit,
+        quality=quality,
+        velocity=moved.velocity,
+        leading=None if quality.seen else leading,
+        progress=between(progress, REPEATED_SHARE, 1),
+    )
     doubted = judged_fit(case)
     inverse, quality, answer = doubted.inverse, doubted.quality, replace(answer, fit=doubted.fit)
     case = _with_estimates(doubted, answer, covered, moved.acceleration)
     fit, estimates, correlation = case.fit, case.estimates, case.correlation
     simulated = (loop or fit.problem).record(fit.inner)
     return IdentifiedMoves(
-        log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
-        errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
-        residual_of(fit.residual, moved, log.sample_time), loop, quality,
-    )  # fmt: skip
+        log=log,
+        part=part,
+        inverse=inverse,
+        by_direction=by_direction,
+        fit=fit,
+        profiles=answer.profiles,
+        estimates=estimates,
+        correlation=correlation,
+        covered=covered,
+        simulated=simulated,
+        errors=errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
+        residual=residual_of(fit.residual, moved, log.sample_time),
+        loop=loop,
+        quality=quality,
+    )
 
 
 def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage, acceleration: np.ndarray) -> KeyCase:

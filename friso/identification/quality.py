@@ -25,7 +25,7 @@ WITHOUT_FRICTION = ". The stage file says that there is no friction: with a tabl
 """Advice added to a message if the stage file has no friction."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Quality:
     """Quality of a fit of moves, with reasons against trusting it.
 
@@ -91,7 +91,14 @@ def quality_of(
     case = RecordCase(log, inverse, cart_share)
     flat, left, passed = fit.stage, fit.left, fit.problem.noise_left(noise)
     findings = list(raised("record", case))
-    plain = Quality(noise, left, passed, inverse.error, whole_error(flat, inverse), tuple(findings))
+    plain = Quality(
+        noise=noise,
+        left=left,
+        noise_left=passed,
+        inverse_error=inverse.error,
+        whole_error=whole_error(flat, inverse),
+        findings=tuple(findings),
+    )
     if fit.problem.closed and fit.explains(noise):
         return plain
     force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
@@ -108,7 +115,7 @@ def quality_of(
     seen = any(cause.without is None and DOUBTS[cause.doubt].moment == "cause" for cause in reasons)
     named = [] if led and not (poor or seen) else reasons
     words = _verdict(plain, named, case.unit, poor, rejected, flat["friction.model"] == "none")
-    findings += [RaisedDoubt(words, plain.ratio, doubt="model")] if words else []
+    findings += [RaisedDoubt(words=words, size=plain.ratio, doubt="model")] if words else []
     findings += raised("value", ValueCase(log, inverse, cart_share, plain.lacks_something, poor))
     without = tuple(cause.without for cause in reasons if cause.without)
     best = min([inverse.error, *(model.error for model in without)])

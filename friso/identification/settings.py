@@ -1,4 +1,4 @@
-"""Settings of identification: doubts, the inverse model, and experiments."""
+"""Settings of identification: doubts, the inverse model, experiments, and how results are shown."""
 
 from __future__ import annotations
 
@@ -509,7 +509,43 @@ class WitnessSettings(Settings):
     """Longest delay searched from position to force [samples]."""
 
 
+@dataclass(frozen=True)
+class PresentationSettings(Settings):
+    """Settings of how results are written and drawn."""
+
+    digits_without_an_interval: int = setting(4, "")
+    """Largest number of significant digits of a value without interval, as many as instruments have."""
+
+    zeros_before_an_exponent: int = setting(4, "")
+    """Zeros before the decimal point above which a number gets an exponent, which is then shorter."""
+
+    decimals_before_an_exponent: int = setting(7, "")
+    """Decimals above which a number gets an exponent, which is then shorter."""
+
+    digits_of_an_exact_value: int = setting(15, "")
+    """Largest number of digits after the first one; a floating-point number has no more."""
+
+    plain_forces: tuple[float, float] = setting((1e-2, 1e4), "N")
+    """Range of forces, and of quantities per newton, without an SI prefix; they are compared with each other."""
+
+    misfit_at_the_top: float = setting(5.0, "")
+    """Upper end of the axis of a profile, in units of the misfit at the ends of the 95 % interval."""
+
+    ratio_of_a_logarithmic_axis: float = setting(8.0, "")
+    """Ratio of its ends above which a profile has a logarithmic axis."""
+
+    periods_of_a_force_record: float = setting(40.0, "")
+    """Length of the force record at the head of the page, in periods of the motion's bandwidth."""
+
+    points_of_a_record: int = setting(5000, "")
+    """Number of points drawn of a record of slow sliding; more make a page heavy and show nothing."""
+
+    points_of_a_curve: int = setting(200, "")
+    """Number of points drawn of the friction curve at steady velocities, which then looks smooth."""
+
+
 doubt_settings = DoubtSettings.live()
 witness_settings = WitnessSettings.live()
 identification_settings = IdentificationSettings.live()
 experiment_settings = ExperimentSettings.live()
+presentation_settings = PresentationSettings.live()

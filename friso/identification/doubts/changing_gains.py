@@ -48,7 +48,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         f"setting against friction acts there. One controller with fixed gains leaves {one_law:.2g} {case.unit} of the "
         f"force, two leave {two_laws:.2g} {case.unit}; a record with fixed gains and no such setting would decide it"
     )
-    yield RaisedDoubt(words, ratio)
+    yield RaisedDoubt(words=words, size=ratio)
 
 
 def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:

@@ -35,7 +35,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         f"the force lacks {mass:.2g} {kg} times the acceleration of the reference{also}, which suggests that a "
         "feedforward is not part of it"
     )
-    yield RaisedDoubt(words, mass, kg, model, spoils=True)
+    yield RaisedDoubt(words=words, size=mass, unit=kg, without=model, spoils=True)
 
 
 def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:

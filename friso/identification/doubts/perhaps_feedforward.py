@@ -23,7 +23,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         return
     mass, kg = case.inverse.value("mass") - fed[0].value(missing_feedforward.ACCELERATION), unit_of("kg", case.log)
     words = f"if the force leaves out a feedforward, which this log does not tell, the mass is about {mass:.2g} {kg}"
-    yield RaisedDoubt(words, mass, kg)
+    yield RaisedDoubt(words=words, size=mass, unit=kg)
 
 
 DOUBT = Doubt(

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from friso.axis import axis_shown, unit_shown
+from friso.identification.estimate_documents import key_document
 from friso.identification.kind import Source
+from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import Experiment, Identification, Prediction
 from friso.identification.sources import LogFile
-from friso.questions.identify.estimates import key_document
-from friso.questions.identify.kind_view import view_of
-from friso.questions.identify.words import headline, prediction_view
+from friso.questions.identify.words import headline
 from friso.shown.documents import entries, plain_json
 
 
@@ -33,7 +33,7 @@ def identify_document(
         "estimates": [key_document(estimate) for estimate in identification.estimates],
         "experiments": [_experiment(experiment) for experiment in identification.experiments],
         "predictions": [
-            {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}
+            {"log": prediction.log.name, **KINDS[prediction.kind].prediction_numbers(prediction.result)}
             for prediction in predictions
         ],
         "failed": identification.failed,
@@ -71,6 +71,6 @@ def _experiment(experiment: Experiment) -> dict[str, Any]:
     return {
         "kind": experiment.kind,
         "logs": [log.name for log in experiment.logs],
-        **view_of(experiment.kind).numbers(experiment.result),
+        **KINDS[experiment.kind].numbers(experiment.result),
         "estimates": [key_document(estimate) for estimate in experiment.estimates],
     }

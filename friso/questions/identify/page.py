@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from friso.axis import axis_shown
+from friso.identification.kinds import KINDS
 from friso.identification.method import Identification, Prediction
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import with_origins
 from friso.questions.identify import words
 from friso.questions.identify.figures import identify_figures
-from friso.questions.identify.kind_view import view_of
 from friso.shown.files import Content
 from friso.shown.pages import Report
 from friso.stage.correlations import correlations_file, correlations_text
@@ -46,7 +46,7 @@ def identify_files(
         parts=words.summaries(identification),
         predicted=[words.prediction_line(prediction) for prediction in predictions],
         warnings=[axis_shown().text(warning) for warning in identification.warnings],
-        opening=[f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several],
+        opening=[f"identify_{label}_{KINDS[experiment.kind].opening}" for experiment, label in several],
     )
     return {
         STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),

@@ -23,6 +23,7 @@ def rig_files(outcome: Outcome) -> dict[str, Content]:
     The truth behind the logs goes into a folder of its own.
     """
     logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}
+    counted = "1 log" if len(outcome.logs) == 1 else f"{len(outcome.logs)} logs"
     return Report.of_stage(
         f"rig {outcome.experiment}",
         outcome.stage,
@@ -34,7 +35,7 @@ def rig_files(outcome: Outcome) -> dict[str, Content]:
             (log.name, [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"])
             for log in outcome.logs
         ],
-        computed=f" on a drive as built, seed {outcome.seed}; {len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}",
+        computed=f" on a drive as built, seed {outcome.seed}; {counted}",
     ).files({**logs, "truth/stage.toml": stage_text(outcome.stage, outcome.seed)})
 
 
