@@ -62,7 +62,7 @@ def changed(**signals: np.ndarray) -> Log:
 
 def test_a_sound_record_agrees() -> None:
     """Slope 1 within 5 %, less than 10 % left, no lag of more than a sample."""
-    best = Witness(LOG, STAGE).best()
+    best = Witness(LOG, STAGE.flat()).best()
     assert best.agrees
     assert best.slope == pytest.approx(1, abs=0.05)
     assert best.left < 0.1
@@ -73,14 +73,14 @@ def test_a_sound_record_agrees() -> None:
 @pytest.mark.parametrize("factor", [2.0, 0.5, 10.0])
 def test_a_wrong_clock_is_found_by_its_factor(factor: float) -> None:
     slow = replace(LOG, time=factor * LOG.time, sample_time=factor * STEP)
-    best = Witness(slow, STAGE).best()
+    best = Witness(slow, STAGE.flat()).best()
     assert best.agrees
     assert best.clock == pytest.approx(factor, rel=0.02)
 
 
 @pytest.mark.parametrize("factor", [-1.0, 1e-3, 0.5, 2.0])
 def test_a_wrong_scale_or_sign_of_the_force_is_its_slope(factor: float) -> None:
-    best = Witness(changed(force=factor * LOG["force"]), STAGE).best()
+    best = Witness(changed(force=factor * LOG["force"]), STAGE.flat()).best()
     assert best.explains
     assert not best.agrees
     assert best.slope == pytest.approx(factor, rel=0.05)
@@ -88,14 +88,14 @@ def test_a_wrong_scale_or_sign_of_the_force_is_its_slope(factor: float) -> None:
 
 @pytest.mark.parametrize("mass", [4.0, -4.0])
 def test_feedforward_is_found_whether_the_force_has_it_or_lacks_it(mass: float) -> None:
-    best = Witness(changed(force=LOG["force"] + mass * ACCELERATION), STAGE).best()
+    best = Witness(changed(force=LOG["force"] + mass * ACCELERATION), STAGE.flat()).best()
     assert best.agrees
     assert best.mass == pytest.approx(mass, rel=0.15)
 
 
 def test_gains_that_are_switched_have_two_slopes() -> None:
     switched = np.where(LOG.time < 3.5, 1.0, 0.56) * LOG["force"]
-    witness = Witness(changed(force=switched), STAGE)
+    witness = Witness(changed(force=switched), STAGE.flat())
     assert not witness.best().explains
     slopes = witness.at_both_ends()
     assert slopes is not None
@@ -104,12 +104,12 @@ def test_gains_that_are_switched_have_two_slopes() -> None:
 
 def test_another_controller_is_none_of_these() -> None:
     other = STAGE.replace({"controller.kp": "1e3 N/m", "controller.ki": "2e6 N/(m*s)", "controller.kd": "5 N*s/m"})
-    witness = Witness(LOG, other)
+    witness = Witness(LOG, other.flat())
     assert not witness.best().explains
 
 
 def test_forces_at_a_limit_do_not_count() -> None:
     """An integral that is clamped at the limit restarts elsewhere: each stretch between limits has its own mean."""
     peak = float(np.abs(LOG["force"]).max())
-    best = Witness(recorded(limit=0.6 * peak), STAGE).best()
+    best = Witness(recorded(limit=0.6 * peak), STAGE.flat()).best()
     assert best.agrees

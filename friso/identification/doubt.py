@@ -32,6 +32,7 @@ from friso.identification.output_error.effects import (
 from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.settings import settings
 from friso.identification.settings import doubt_settings
+from friso.identification.witness import Replay
 from friso.progress import Progress, silent
 from friso.registry import Registry
 
@@ -62,12 +63,19 @@ Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve
 class RecordCase:
     """A log of moves with its inverse model, a least-squares fit of mass, friction and offset.
 
-    `cart_share` is the fraction of the mass that moves with a measured cart; 0 if none is measured.
+    `cart_share` is the fraction of the mass that moves with a measured cart; 0 if none is measured. `replay` compares
+    the force with that of the given controller; None without one.
     """
 
     log: Log
     inverse: InverseModel
     cart_share: float = 0.0
+    replay: Replay | None = None
+
+    @property
+    def commanded(self) -> bool:
+        """Tell whether the given controller explains the force, without a feedforward that it lacks."""
+        return self.replay is not None and self.replay.agrees and not self.replay.mass
 
     @property
     def unit(self) -> str:

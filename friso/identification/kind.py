@@ -217,6 +217,10 @@ class ExperimentKind(Generic[Result]):
         """List sentences against trusting a result."""
         return ()
 
+    def contradicted(self, result: Result) -> Sequence[str]:
+        """Return the tables of the stage file that a result contradicts, so that nobody knows them."""
+        return ()
+
     def failed(self, result: Result) -> bool:
         """Tell whether the analysis failed, even if parts of the result hold."""
         return False

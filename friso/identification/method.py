@@ -104,7 +104,8 @@ def identify(
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
     doubts += words_of("stage", (fitted, estimates))
     sources = origins(fitted, fits.estimates, fits.follows, None if base is None else made_up)
-    fitted = with_unknown(fitted, sources, fits.left, estimates)
+    contradicted = {table for one in experiments for table in KINDS[one.kind].contradicted(one.result)}
+    fitted = with_unknown(fitted, sources, (*fits.left, *contradicted), estimates)
     unknown = _unknown(fitted)
     shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes, *unknown))
     correlated = _correlations(experiments, estimates, fits, fitted)

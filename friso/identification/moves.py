@@ -33,6 +33,7 @@ from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
 from friso.identification.settings import identification_settings
 from friso.identification.spread import binned, correlation_length
+from friso.identification.witness import Replay, replayed
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -68,6 +69,7 @@ class IdentifiedMoves:
     residual: Residual
     loop: Problem | None
     quality: Quality
+    replay: Replay | None = None
 
     @property
     def correlated(self) -> tuple[Estimate, ...]:
@@ -98,15 +100,16 @@ def identify_moves(
 ) -> IdentifiedMoves:
     """Identify mass, friction and other keys of a stage from a log of moves.
 
-    `flat` has the stage as flat keys with SI values. With `own_loop` its controller is the machine's, and the closed
-    loop is simulated on the logged reference; otherwise the model follows the logged position. `bandwidth` [Hz] is the
-    motion's, read from the log by default. If the force is not in newtons (not allowed with `own_loop`), estimates are
-    per unit of force. `tell` gets the inverse model's estimates as soon as they are known. Raises InputError for a log
-    without position or force.
+    `flat` has the stage as flat keys with SI values. With `own_loop` its controller is the machine's: it is replayed on
+    the log, and the closed loop is simulated on the logged reference. Otherwise the model follows the logged position.
+    `bandwidth` [Hz] is the motion's, read from the log by default. If the force is not in newtons (not allowed with
+    `own_loop`), estimates are per unit of force. `tell` gets the inverse model's estimates as soon as they are known.
+    Raises InputError for a log without position or force, or one whose clock, unit or sign the controller contradicts.
     """
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
+    replay = replayed(log, flat) if own_loop else None
     inverse = inverse_model(log, bandwidth, False, share)
     by_direction = inverse_model(log, inverse.bandwidth, True, share)
     tell(log.name, inverse.estimates)
@@ -120,7 +123,7 @@ def identify_moves(
     fit = answer.fit
     fitted = FittedCase(log, inverse, share, flat=flat, fit=fit, velocity=moved.velocity)
     leading = leading_effect(fitted) if fit.left > fit.problem.noise_left(noise) else None
-    quality = quality_of(log, inverse, fit, noise, share, leading is not None)
+    quality = quality_of(log, inverse, fit, noise, share, leading is not None, replay)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(
             fit, log, part, inverse.bandwidth, noise, between(progress, FITTED_SHARE, REPEATED_SHARE)
@@ -157,6 +160,7 @@ def identify_moves(
         residual=residual_of(fit.residual, moved, log.sample_time),
         loop=loop,
         quality=quality,
+        replay=replay,
     )
 
 

@@ -13,6 +13,7 @@ from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.settings import doubt_settings
+from friso.identification.witness import Replay, doubt_of
 from friso.quantities import percent, plain_factor
 
 UNKNOWN = (
@@ -78,7 +79,13 @@ class Quality:
 
 
 def quality_of(
-    log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float, led: bool = False
+    log: Log,
+    inverse: InverseModel,
+    fit: OutputErrorFit,
+    noise: float,
+    cart_share: float,
+    led: bool = False,
+    replay: Replay | None = None,
 ) -> Quality:
     """Judge a fit of moves, and name in sentences what is wrong with it.
 
@@ -88,9 +95,11 @@ def quality_of(
     The whole model may describe a record that the inverse model, which has no sticking, does not. A cause then raises
     no doubt if the whole model is clearly better than the inverse model corrected for the cause.
     """
-    case = RecordCase(log, inverse, cart_share)
+    case = RecordCase(log, inverse, cart_share, replay)
     flat, left, passed = fit.stage, fit.left, fit.problem.noise_left(noise)
     findings = list(raised("record", case))
+    if replay is not None and (said := doubt_of(replay, log)):
+        findings.insert(0, RaisedDoubt(said, replay.slope, doubt="controller"))
     plain = Quality(
         noise=noise,
         left=left,

@@ -247,6 +247,10 @@ class DoubtSettings(Settings):
 class IdentificationSettings(Settings):
     """Settings of the inverse model, of the spread of fits, and of the stage file that is written."""
 
+    most_asymmetry_of_friction: float = setting(0.3, "")
+    """Largest difference of friction by direction, relative to its mean, that bearings show. A constant force beyond
+    that is no asymmetry."""
+
     # Estimates of several experiments.
     chance_of_agreement: float = setting(0.01, "")
     """Probability (chi-square) below which the scatter of estimates counts as disagreement."""
@@ -477,6 +481,9 @@ class WitnessSettings(Settings):
 
     error_of_an_agreeing_slope: float = setting(0.15, "")
     """Largest error of the force by the given controller. Sound records have slopes of 0.94 to 1.00."""
+
+    slopes_of_a_scale: tuple[float, float] = setting((0.3, 3.0), "")
+    """Slopes between which gains may be others than stated. Beyond, a unit or a sign is wrong."""
 
     share_of_a_limit: float = setting(0.999, "")
     """Share of the largest force from which a sample counts as at the limit."""

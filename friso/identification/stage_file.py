@@ -116,15 +116,15 @@ def origins(
 
 
 def with_unknown(
-    stage: Stage, origins: Mapping[str, str], left: Collection[str], estimates: Iterable[Estimate]
+    stage: Stage, origins: Mapping[str, str], left: Collection[str], estimates: Iterable[Estimate] = ()
 ) -> Stage:
     """Return the stage with a list of the values that are unknown, and with the range of each that friction has.
 
     Ranges are those of similar machines (`friso.stage.contacts`), cut by the finite ends of `estimates`. They hold the
     value that the stage has.
 
-    They are those that friso chose, apart from the motion, those `left` open by the logs, and those that only moved
-    along with another key. By `origins`, keys have their origins in words. A value with an interval of its own is
+    They are those that friso chose, apart from the motion, keys and tables `left` open by the logs, and keys that only
+    moved along with another one. By `origins`, keys have their origins in words. A value with an interval of its own is
     known, and a controller that friso chose as a whole is listed as such.
     """
     numbers, uncertain = (
@@ -141,6 +141,8 @@ def with_unknown(
     of_controller = {origin for key, origin in origins.items() if key.startswith("controller.")}
     if of_controller == {CHOSEN}:
         unknown = [*(key for key in unknown if not key.startswith("controller.")), "controller"]
+    tables = [name for name in left if "." not in name]
+    unknown = [*(key for key in unknown if key.partition(".")[0] not in tables), *tables]
     listed = dict.fromkeys([*stage.unknown_keys, *unknown])
     bounds = {one.name: (one.low, one.high) for one in estimates if not one.determined}
     wide = {key for key, interval in stage.uncertain().items() if interval.wide and origins.get(key) == NOT_IDENTIFIED}

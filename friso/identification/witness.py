@@ -6,26 +6,31 @@ What turns one into the other names what is wrong with the record or with the co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.signal import bilinear, lfilter, ss2tf
 
+from friso.errors import InputError
 from friso.frequency.parts import FEEDFORWARD, FORCE, REFERENCE, STAGE, VELOCITY, compensator
 from friso.frequency.system import System
-from friso.identification.inverse_model import least_squares
+from friso.identification.inverse_model import least_squares, unit_of
 from friso.identification.logs.log import Log
 from friso.identification.settings import witness_settings as settings
-from friso.stage import Stage
+from friso.quantities import percent, plain_factor
+from friso.stage.tables import TRANSMISSION
 
 
 @dataclass(frozen=True, kw_only=True)
 class Replay:
     """Force of the controller on a log, compared with the logged force.
 
-    The logged force is `slope` times the commanded one, and leaves the share `left` of its own variation. It comes
-    `lag` [s] after the command. Time of the log runs `clock` times as slowly as the controller's. `mass` [kg] times the
-    reference's acceleration, and `direction` [N] in its direction, are in the logged force besides.
+    The logged force, of RMS `force` [N], is `slope` times the commanded one, and leaves the share `left` of its own
+    variation. It comes `lag` [s] after the command. Time of the log runs `clock` times as slowly as the controller's.
+    `mass` [kg] times the reference's acceleration, and `direction` [N] in its direction, are in it besides. `slopes`
+    are those before and after an instant at which gains were switched.
     """
 
     slope: float
@@ -34,6 +39,8 @@ class Replay:
     clock: float = 1.0
     mass: float = 0.0
     direction: float = 0.0
+    force: float = 1.0
+    slopes: tuple[float, float] | None = None
 
     @property
     def explains(self) -> bool:
@@ -47,13 +54,13 @@ class Replay:
 
 
 class Witness:
-    """A log with reference, position and force, and the controller of a stage."""
+    """A log with reference, position and force, and the controller of a stage whose keys in SI are `flat`."""
 
-    def __init__(self, log: Log, stage: Stage) -> None:
+    def __init__(self, log: Log, flat: Mapping[str, Any]) -> None:
         part = log.longest
         self.log, self.step = log, log.sample_time
         self.reference, self.position, self.force = (log[name][part] for name in CHANNELS)
-        self.system = compensator(stage.flat(), 1)
+        self.system = compensator(flat, 1)
         size = np.abs(self.force)
         inside = size < settings.share_of_a_limit * size.max()
         if np.mean(~inside) < settings.share_at_a_limit:
@@ -104,6 +111,7 @@ class Witness:
             clock=clock,
             mass=float(mass),
             direction=float(direction),
+            force=spread,
         )
 
     def command(self, clock: float = 1.0) -> np.ndarray:
@@ -146,6 +154,62 @@ class Witness:
         _, number, count = np.unique(self.stretch, return_inverse=True, return_counts=True)
         means = np.stack([np.bincount(number, signal) / count for signal in signals.T], axis=1)
         return signals - means[number]
+
+
+def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
+    """Replay the controller of a stage on a log; None where what it saw and commanded is not what was logged.
+
+    That is so with a disturbance in the force, or if the controller may see the motor and the log the load. Raises
+    InputError if the log contradicts its own clock, unit or sign: no value of such a log holds.
+    """
+    if "disturbance" in log or any(key.startswith(f"{TRANSMISSION}.") for key in flat):
+        return None
+    witness = Witness(log, flat)
+    replay = witness.best()
+    left = f"the controller leaves {percent(witness.replay().left)} of the force, so {percent(replay.left)}"
+    if replay.clock != 1.0:
+        slow = f"time that runs {plain_factor(replay.clock)} times as slowly as the controller's"
+        actual = f"{slow} (with time as logged {left})"
+        expected = "the clock with which the drive sampled, or another controller"
+        example = f'--dt "{log.sample_time / replay.clock * 1e3:.4g} ms"'
+        raise InputError("time", actual, expected, example, log.name)
+    low, high = settings.slopes_of_a_scale
+    if replay.explains and not low < replay.slope < high:
+        actual = f"a force that is {replay.slope:.3g} times what the controller of the stage file commands"
+        expected = "force and controller with agreeing units and signs (of position, too)"
+        example = f'--scale force="{1 / replay.slope:.3g} {log.unit("force")}/{log.unit("force")}"'
+        raise InputError("force", actual, expected, example, log.name)
+    return replay if replay.agrees or replay.explains else replace(replay, slopes=witness.at_both_ends())
+
+
+def doubt_of(replay: Replay, log: Log) -> str:
+    """Say what the replay contradicts: gains, feedforward, or the controller as a whole; "" if it agrees."""
+    unit, kg = log.unit("force"), unit_of("kg", log)
+    if replay.mass or replay.direction:
+        has = "has" if replay.mass > 0 else "lacks"
+        also = f", and {abs(replay.direction):.2g} {unit} in its direction"
+        also = also if abs(replay.direction) > settings.error_of_an_agreeing_slope * replay.force else ""
+        return (
+            f"the logged force {has} {abs(replay.mass):.3g} {kg} times the acceleration of the reference{also}, which "
+            "the controller of the stage file does not command: a feedforward"
+        )
+    if replay.agrees:
+        return ""
+    if replay.explains:
+        return (
+            f"the logged force is {replay.slope:.3g} times what the controller of the stage file commands: its gains "
+            "or the scale of the force are off by that"
+        )
+    if replay.slopes:
+        before, after = replay.slopes
+        return (
+            f"the controller answers the same error with {after / before:.2g} times the force in the later part: its "
+            "gains are switched"
+        )
+    return (
+        f"another controller drove the machine: that of the stage file leaves {percent(replay.left)} of the logged "
+        "force (check gains, derivative, filters and the mass it is tuned for)"
+    )
 
 
 CHANNELS = ("reference", "position", "force")

@@ -24,7 +24,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
     The feedforward must improve the fit while the stage is fast, too.
     """
-    fed = fed_forward(case)
+    fed = None if case.commanded else fed_forward(case)
     if fed is None or not lacks_when_fast(case.inverse, fed[1]):
         return
     model, mass = fed[0], -fed[0].value(ACCELERATION)

@@ -17,7 +17,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     is fast.
     """
     fed, share = missing_feedforward.fed_forward(case), doubt_settings.error_share_of_a_cause
-    if fed is None or fed[0].error >= share * case.inverse.error:
+    if case.commanded or fed is None or fed[0].error >= share * case.inverse.error:
         return
     if missing_feedforward.lacks_when_fast(case.inverse, fed[1]):
         return

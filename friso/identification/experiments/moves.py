@@ -27,6 +27,7 @@ from friso.identification.readings.common import cart, low_pass, on_bearing
 from friso.identification.readings.course import Course
 from friso.identification.settings import experiment_settings, identification_settings, presentation_settings
 from friso.identification.stage_file import made_up
+from friso.identification.witness import Replay
 from friso.quantities import percent
 from friso.shown.documents import entries, unit_suffix
 from friso.shown.drawing.figure import Array, Axis, Band, Figure, Limit, Markers, Panel, Series
@@ -44,21 +45,31 @@ WITHOUT_REFERENCE = (
     "the logged position"
 )
 
-OUT_OF_STEP = (
-    "with the controller of the stage file the simulated machine gets out of step with the log, which was therefore "
-    "fitted along its position; if the machine does not hunt, its controller may be another (check the gains and the "
-    "mass it is tuned for), or noise of its encoder moves it, which is not simulated"
-)
-
 ALIKE = (
     "a play of about {} between motor and load would look like these bristles: their stiffness holds for an axis "
     "without play"
 )
 
 
+UNEQUAL = (
+    "{}: friction that is {} higher {} and lower the other way would look like this constant force; one record with the "
+    "axis tilted or turned tells them apart"
+)
+
+
 def _in_newtons(log: Log) -> bool:
     """Tell whether the force of a log is in newtons."""
     return log.unit("force") == ROLES["force"]
+
+
+def _explained(replay: Replay | None) -> str:
+    """Say that the controller of the stage file explains the logged force; "" if it does not, or was not replayed."""
+    if replay is None or not replay.agrees or replay.mass:
+        return ""
+    return (
+        "replayed on the log, the controller of the stage file explains the force to "
+        f"{percent(max(abs(replay.slope - 1), replay.left))}: clock, units and signs of the log fit it"
+    )
 
 
 def _play_that_looks_alike(answers: Sequence[Sequence[Estimate]]) -> list[str]:
@@ -71,6 +82,21 @@ def _play_that_looks_alike(answers: Sequence[Sequence[Estimate]]) -> list[str]:
     needed = "friction.coulomb", "friction.bristle_stiffness"
     bends = [one[needed[0]] / one[needed[1]] for one in values if one.keys() >= {*needed}]
     return [ALIKE.format(f"{max(bends) * 1e6:.2g} um")] if bends else []
+
+
+def _direction_that_looks_alike(answers: Sequence[Sequence[Estimate]]) -> list[str]:
+    """Return a note on friction that differs by direction and would pass for the constant force; none without one."""
+    notes = {}
+    for estimates in answers:
+        values = {one.name: one for one in estimates if one.determined}
+        coulomb = values.get("friction.coulomb")
+        for name in ("bias.cart", "bias.stage"):
+            bias = values.get(name)
+            if bias is not None and coulomb is not None and not bias.low <= 0 <= bias.high:
+                share = abs(bias.value) / coulomb.value
+                if share < identification_settings.most_asymmetry_of_friction:
+                    notes[name] = UNEQUAL.format(name, percent(share), "back" if bias.value > 0 else "forward")
+    return [*notes.values()]
 
 
 def _span(log: Log) -> str:
@@ -366,8 +392,9 @@ class MovesKind(ExperimentKind[IdentifiedMoves]):
         return [
             *(sentence for sentence in dict.fromkeys(reasons) if sentence),
             *([WITHOUT_CONTROLLER if stage is None else WITHOUT_REFERENCE] if followed else []),
-            *(f"{result.log.name}: {OUT_OF_STEP}" for result in loops if not result.fit.problem.closed),
+            *(f"{one.log.name}: {explained}" for one in loops if (explained := _explained(one.replay))),
             *_play_that_looks_alike([result.estimates for result in results]),
+            *_direction_that_looks_alike([result.estimates for result in results]),
             *(
                 f"{log.name}: of a log this long {count} samples are used, {_span(log)}, where it moves most"
                 for log in long
@@ -523,6 +550,10 @@ class MovesKind(ExperimentKind[IdentifiedMoves]):
     def doubts(self, result: IdentifiedMoves) -> Sequence[str]:
         """List the doubts about the log and its fit."""
         return result.quality.doubts
+
+    def contradicted(self, result: IdentifiedMoves) -> Sequence[str]:
+        """Return the tables of the stage file that a log contradicts: the controller if its force is another."""
+        return [] if result.replay is None or (result.replay.agrees and not result.replay.mass) else ["controller"]
 
     def failed(self, result: IdentifiedMoves) -> bool:
         """Tell whether the model does not explain the log."""
