@@ -52,8 +52,8 @@ ALIKE = (
 
 
 UNEQUAL = (
-    "{}: friction that is {} higher {} and lower the other way would look like this constant force; one record with the "
-    "axis tilted or turned tells them apart"
+    "{}: friction that is {} higher {} and lower the other way would look like this constant force; a record with the "
+    "axis turned round tells them apart"
 )
 
 
