@@ -99,7 +99,7 @@ def quality_of(
     flat, left, passed = fit.stage, fit.left, fit.problem.noise_left(noise)
     findings = list(raised("record", case))
     if replay is not None and (said := doubt_of(replay, log)):
-        findings.insert(0, RaisedDoubt(said, replay.slope, doubt="controller"))
+        findings.insert(0, RaisedDoubt(words=said, size=replay.slope, doubt="controller"))
     plain = Quality(
         noise=noise,
         left=left,

@@ -68,7 +68,7 @@ class StudySettings(Settings):
     """Largest share of draws whose loop may be unstable at a bandwidth before no faster ones are tried."""
 
     most_open_draws: float = setting(0.05, "")
-    """Largest share of draws without a certain verdict with which the others decide."""
+    """Largest share of draws that hunt or have no certain verdict where the others decide: advice holds for 95 %."""
 
     most_draws: int = setting(100_000, "")
     """Most draws. At the edge of hunting a draw takes 50 ms, so more take hours."""
