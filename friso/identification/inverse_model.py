@@ -121,7 +121,7 @@ def moved_in(log: Log, position: np.ndarray, bandwidth: float) -> FilteredMotion
 def bandwidth_of(log: Log) -> float:
     """Return the bandwidth [Hz] of the motion in a log, without reading across gaps.
 
-    The bandwidth is the frequency below which the acceleration has 95 % of its power, counting only frequencies at
+    The bandwidth is the frequency below which the acceleration has 95 % of its power, counting only frequencies up to
     which the position (or the integrated velocity) stands out of its noise. Raises InputError if there are none.
     """
     role, derivatives = ("velocity", 1) if log.is_integrated else ("position", 2)
@@ -132,13 +132,29 @@ def bandwidth_of(log: Log) -> float:
     frequency = spectra[0][0]
     power = np.average([spectrum for _, spectrum in spectra], axis=0, weights=[part.size for part in whole])
     noise = np.median(power[3 * len(power) // 4 :])
-    below = np.flatnonzero(power < identification_settings.power_above_noise * noise)
-    passband = slice(0, below[0] if below.size else len(power))
-    share = np.cumsum((power - noise)[passband] * frequency[passband] ** (2 * derivatives))
+    passband = slice(0, _end_of_motion(power, noise))
+    share = np.cumsum(np.maximum(power - noise, 0.0)[passband] * frequency[passband] ** (2 * derivatives))
     if not share.size or not share[-1] > 0:
         raise InputError(role, "nothing but noise", "a motion that stands out of it", "a larger or faster move")
     most = identification_settings.power_share_of_the_motion * share[-1]
     return float(frequency[passband][np.searchsorted(share, most)])
+
+
+def _end_of_motion(power: np.ndarray, noise: float) -> int:
+    """Return the number of frequencies up to which a motion stands out of its noise.
+
+    `power` is the spectrum at even frequencies from 0 on, shape (n,). A repeated move has lines with nothing between
+    them, and a move of one duration has zeros: what stands out clearly within a few lines belongs to the motion.
+    """
+    clear = identification_settings.power_above_noise
+    below = np.flatnonzero(power < clear * noise)
+    end = int(below[0]) if below.size else len(power)
+    reach = identification_settings.lines_of_a_gap * (1 + int(np.argmax(power[1:])))
+    for line in np.flatnonzero(power[end:] >= clear**2 * noise) + end:
+        if line >= end + reach:
+            break
+        end = int(line) + 1
+    return end
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:

@@ -299,6 +299,10 @@ class IdentificationSettings(Settings):
     power_above_noise: float = setting(4.0, "")
     """Smallest ratio of the position's spectrum to its noise at frequencies that count."""
 
+    lines_of_a_gap: int = setting(5, "")
+    """Widest gap in the spectrum of a motion, in frequencies of its strongest line. Equal moves to and fro have every
+    second line, and their duration may cancel two in a row."""
+
     pieces_of_a_spectrum: int = setting(8, "")
     """Number of pieces into which a record is cut for its spectrum (Welch). More scatter less and resolve less."""
 

@@ -18,6 +18,7 @@ from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.identification.inverse_model import motion, smoothed
+from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
 from friso.identification.output_error.settings import settings as output_error_settings
@@ -292,19 +293,18 @@ def tracking(
     interpolated, nor how smooth its motion was: these stay unsettled. Raises InputError for a log that never moves for
     long enough.
     """
-    omega = 2 * np.pi * min(bandwidth, output_error_settings.bandwidth_of_holding)
-    settling, step = output_error_settings.time_constants_of_settling / omega, log.sample_time
+    step = log.sample_time
     highest = identification_settings.smoothing_bandwidths
     cutoffs = [highest * times * bandwidth for times in output_error_settings.smoothing_steps]
     smooth, *sharper = (motion(log["position"][part], step, cutoff).position for cutoff in cutoffs)
     # the force is held from each sample to the next
     held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < output_error_settings.sample_time_tolerance
     inputs = Inputs(smooth, log["force"][part], step, held)
-    counted = _moving(log["position"][part], smooth, step, settling)
+    counted, omega = moving(log["position"][part], smooth, step, bandwidth)
     counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # the smoothed signal lacks samples beyond the end
     if not counted.any():
-        actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {settling:.2g} s on end"
-        expected = "longer moves: is the time or the position in another unit, or does the body never slide?"
+        actual = f"{log.sample_time * len(counted):.3g} s of rest, as far as the noise of the position shows"
+        expected = "moves: is the time or the position in another unit, or does the body never slide?"
         raise InputError("position", actual, expected, '--unit TIME="ms", or --as presliding', log.name)
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
@@ -332,19 +332,37 @@ def _shaking(log: Log, part: slice, cutoff: float) -> float:
     return float(noise_of(log["position"][part]) * 2 * np.pi * np.sqrt(2 * log.sample_time * band**3 / 3))
 
 
-def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:
-    """Return 1 where a position [m], shape (n,), moves, and 0 where it rests.
+def moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, bandwidth: float) -> tuple[np.ndarray, float]:
+    """Return 1 where a position [m], shape (n,), moves and 0 where it rests, and the guiding controller's frequency.
 
     While a stage sticks, the guiding controller's force shows micrometres of distance to the log, not an unexplained
-    force. So rests do not count, nor does the time `settling` [s] after each rest and after the beginning.
+    force. So rests do not count, nor does the time in which the controller settles after each rest and after the
+    beginning. The frequency [rad/s] follows from the motion's `bandwidth` [Hz], and is high enough for the controller
+    to settle within the longest move.
     """
-    window = max(3, round(output_error_settings.time_of_a_rest / sample_time))
-    span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
-    resting = span <= output_error_settings.deviations_of_a_rest * blur_of(position, smooth)
+    resting = _resting(position, blur_of(position, smooth), sample_time)
     resting[0] = True
-    late = round(settling / sample_time)
-    recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
-    return np.where(recent, 0.0, 1.0)
+    longest = max((move.stop - move.start for move in runs(~resting)), default=0) * sample_time
+    constants, most = output_error_settings.time_constants_of_settling, output_error_settings.move_share_of_settling
+    needed = constants / (2 * np.pi * most * longest) if longest else bandwidth
+    omega = 2 * np.pi * min(max(bandwidth, needed), output_error_settings.bandwidth_of_holding)
+    samples = np.arange(len(position))
+    since = samples - np.maximum.accumulate(np.where(resting, samples, 0))
+    return np.where(since * sample_time > min(constants / omega, most * longest), 1.0, 0.0), omega
+
+
+def _resting(position: np.ndarray, blur: float, sample_time: float) -> np.ndarray:
+    """Tell at which samples a position [m], shape (n,), rests: it stays within its `blur` [m] for some time.
+
+    The time is so long that the fastest motion goes well beyond the blur in it.
+    """
+    still = output_error_settings.deviations_of_a_rest * blur
+    window = max(3, round(output_error_settings.time_of_a_rest / sample_time))
+    while True:
+        span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
+        if still <= output_error_settings.motion_share_of_a_rest * span.max() or 4 * window > len(position):
+            return span <= still
+        window *= 2
 
 
 def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:

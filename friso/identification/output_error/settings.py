@@ -125,11 +125,17 @@ class OutputErrorSettings(Settings):
     deviations_of_a_rest: float = setting(20.0, "")
     """Largest motion of a stage at rest, in standard deviations of the position's noise."""
 
+    motion_share_of_a_rest: float = setting(0.25, "")
+    """Largest motion of a stage at rest, relative to its fastest motion in as long a time."""
+
+    move_share_of_settling: float = setting(0.5, "")
+    """Longest time of the guiding controller to settle, relative to the longest move. Half of the move remains."""
+
     smoothing_steps: tuple[int, ...] = setting((1, 2, 4, 8), "")
     """Cut-off frequencies tried for smoothing the position, relative to the inverse model's cut-off."""
 
-    time_constants_of_settling: float = setting(3.0, "")
-    """Number of its time constants after which the guiding controller has forgotten the initial state."""
+    time_constants_of_settling: float = setting(6.0, "")
+    """Number of its time constants after which the guiding controller has forgotten the initial state, to 2 %."""
 
     samples_of_outputs: int = setting(16384, "")
     """Number of samples whose outputs are computed at once, to stay in the processor's caches."""
