@@ -302,9 +302,10 @@ def tracking(
     inputs = Inputs(smooth, log["force"][part], step, held)
     counted, omega = moving(log["position"][part], smooth, step, bandwidth)
     counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # the smoothed signal lacks samples beyond the end
-    if not counted.any():
-        actual = f"{log.sample_time * len(counted):.3g} s of rest, as far as the noise of the position shows"
-        expected = "moves: is the time or the position in another unit, or does the body never slide?"
+    if bandwidth > output_error_settings.bandwidth_of_a_machine or not counted.any():
+        fast = f"moves of {bandwidth:.3g} Hz" if counted.any() else "rest, as far as the noise of the position shows"
+        actual = f"{log.sample_time * len(counted):.3g} s of {fast}"
+        expected = "moves of a machine: is the time or the position in another unit, or does the body never slide?"
         raise InputError("position", actual, expected, '--unit TIME="ms", or --as presliding', log.name)
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}

@@ -110,6 +110,9 @@ class OutputErrorSettings(Settings):
     bandwidth_of_holding: float = setting(10.0, "Hz")
     """Highest bandwidth of the controller that drives a stage along a log. A faster one shakes the bristles."""
 
+    bandwidth_of_a_machine: float = setting(1000.0, "Hz")
+    """Highest bandwidth of moves of a body that slides. Moves of 20 ms have up to 500 Hz, with the sharpest corners."""
+
     time_of_a_start: float = setting(0.1, "s")
     """Time at the start of a closed-loop record that the fit leaves out (friso's choice)."""
 
