@@ -15,7 +15,7 @@ from friso.identification.logs.format import FORMATS
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.mapping import Mapping, load_mapping
 from friso.identification.logs.measured_response import MeasuredResponse
-from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response
+from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.logs.time_base import usual_step
@@ -51,8 +51,8 @@ class ChannelContent:
 
     @property
     def sample_rate(self) -> float | None:
-        """Return the usual sampling rate [Hz]; None if the instants are not known or never increase."""
-        steps = np.diff(self.time) if self.time is not None else np.empty(0)
+        """Return the usual rate of finite samples [Hz]; None if the instants are not known or never increase."""
+        steps = np.diff(self.time[np.isfinite(self.values)]) if self.time is not None else np.empty(0)
         steps = steps[steps > 0]
         return 1 / usual_step(steps) if steps.size else None
 
@@ -106,7 +106,7 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
         kind = next(kind for kind in KINDS if KINDS[kind].responses)
         return LogContent(path, title, (), response, kind, "the file holds a frequency response", response.read)
     mapping = options.over(load_mapping(path, folder) or Mapping())
-    table = with_user_units(FORMATS[name].read(path), mapping, FORMATS[name].times, str(path))
+    table = with_user_units(read_table(path), mapping, FORMATS[name].times, str(path))
     reading = Reading(table, mapping, False, not FORMATS[name].units, str(path))
     if not table.channels:
         raise LogError("", "no channel of numbers", "a log with columns of numbers", "", str(path))

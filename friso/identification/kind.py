@@ -153,7 +153,7 @@ class ExperimentKind(Generic[Result]):
     `si` is true if channels must be in SI units, except for the `foreign` roles (a force in volts). `per_unit` is true
     if the analysis works in any unit of force, with results such as kg per volt. `together` is true if all logs are
     realisations of one experiment, `responses` if frequency responses from another instrument are accepted. `longest`
-    is true if only the longest stretch of a log without gaps is analysed.
+    is true if only the longest stretch of a log without gaps is analysed, `stamped` if samples need no even clock.
 
     A kind claims logs `instead_of` other kinds that would claim them too. `makes_stage` is true if a stage can be made
     up around a log. `predicts` says which logs the kind predicts from its results, empty if none. `opening` is the last
@@ -169,6 +169,7 @@ class ExperimentKind(Generic[Result]):
     together: bool = False
     responses: bool = False
     longest: bool = False
+    stamped: bool = False
     instead_of: tuple[str, ...] = ()
     makes_stage: bool = False
     predicts: str = ""

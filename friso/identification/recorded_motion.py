@@ -125,14 +125,14 @@ def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | Non
     from friso.identification.logs.format import FORMATS
     from friso.identification.logs.gaps import check_gaps
     from friso.identification.logs.mapping import Mapping as Told
-    from friso.identification.logs.read import file_format
+    from friso.identification.logs.read import file_format, read_table
     from friso.identification.logs.roles import propose, role_of
     from friso.identification.logs.signals import Notes, Reading, instants, signal, with_user_units
 
     form, origin = FORMATS[file_format(path)], str(path)
     reference, time, unit = names
     roles = {role: name for role, name in (("reference", reference), ("time", time)) if name is not None}
-    table = form.read(path)
+    table = read_table(path)
     signals = [c.name for c in table.channels if c.name != time and (role_of(c.name, c.unit) or ("",))[0] != "time"]
     if reference is None and len(signals) == 1:
         roles["reference"] = signals[0]

@@ -130,7 +130,11 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
 
     If no kind recognises them as one experiment, the files are returned unchanged.
     """
-    kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
+    kindless = [
+        number
+        for number, file in enumerate(files)
+        if file.mapping.experiment is None and not (isinstance(file.source, Log) and file.source.is_uneven)
+    ]
     courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
     for name in KINDS if len(courses) > 1 else ():
         if (reason := KINDS[name].claims_together(courses)) is not None:
@@ -214,7 +218,8 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
     gaps: list[LogError] = []
     kind = reason = ""
     try:
-        log = read_log(path, mapping, strict=False, needed=MOVED)
+        log = read_log(path, mapping, strict=False, needed=MOVED, stamped=True)
+        log = log if "force" in log or not log.is_uneven else read_log(path, mapping, strict=False, needed=MOVED)
     except GapsError as error:
         gaps += error.gaps
         log = _without_clock(path, replace(mapping, roles={**mapping.roles, **error.proposed}))
@@ -251,7 +256,7 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
 def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
     """Read a log with the signals that a kind of experiment needs, in the units that it needs."""
     chosen = KINDS[kind]
-    return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)
+    return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign, chosen.stamped)
 
 
 def recognised(log: Log, path: Path) -> tuple[str, str]:
@@ -260,7 +265,8 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     Raises InputError if no kind claims it, or several do.
     """
     course = Course(log)
-    reasons = {name: reason for name in KINDS if (reason := KINDS[name].claims(course)) is not None}
+    kinds = [name for name in KINDS if KINDS[name].stamped == log.is_uneven]
+    reasons = {name: reason for name in kinds if (reason := KINDS[name].claims(course)) is not None}
     replaced = {other for name in reasons for other in KINDS[name].instead_of}
     reasons = {name: reason for name, reason in reasons.items() if name not in replaced}
     if len(reasons) == 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,11 +18,11 @@ from friso.identification.logs.gaps import check_gaps, told_by_mechanics
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.physics import MotionReading, is_ramp
-from friso.identification.logs.read import file_format
+from friso.identification.logs.read import file_format, read_table
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of, wanted_of
 from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
-from friso.identification.logs.time_base import Track, resample_tracks, track
+from friso.identification.logs.time_base import Track, as_stamped, is_uneven, resample_tracks, track
 from friso.identification.logs.units import unit_factor
 from friso.quantities import percent, quoted
 
@@ -32,16 +33,18 @@ def read_log(
     strict: bool = True,
     needed: Sequence[str] = ("position",),
     foreign: Sequence[str] = (),
+    stamped: bool = False,
 ) -> Log:
     """Read the log in a file: signals by role, in SI units, on one time base, with warnings.
 
     With `strict`, every signal must convert to the SI unit of its role, except for the `foreign` roles; without, other
     units are kept and listed in `Log.units`. `needed` are the roles that must be present; a position may be the
-    integral of the velocity. Raises LogError (one message) for files that cannot be read or used.
+    integral of the velocity. With `stamped`, a log without an even clock keeps its own instants, and its velocity.
+    Raises LogError (one message) for files that cannot be read or used.
     """
     path, mapping = Path(path), mapping or Mapping()
     form = FORMATS[file_format(path)]
-    table = with_user_units(form.read(path), mapping, form.times, str(path))
+    table = with_user_units(read_table(path), mapping, form.times, str(path))
     reading = Reading(table, mapping, strict, not form.units, str(path), tuple(foreign))
     proposal = propose(table, mapping.roles, str(path))
     readings = told_by_mechanics(table, proposal, needed)
@@ -53,24 +56,25 @@ def read_log(
     unused(mapping, chosen, str(path))
     notes = Notes(list(table.read), _undecided(proposal))
     try:
-        tracks = _tracks(chosen, reading, notes, needed)
-        base, signals = resample_tracks(tracks)
+        signals = _stamped(chosen, reading, notes, needed) if stamped else {}
+        uneven = bool(signals)
+        base, signals = as_stamped(signals) if uneven else resample_tracks(_tracks(chosen, reading, notes, needed))
         notes.read += base.read
         notes.warnings += base.warnings
         _check(base, signals, needed)
-        if by_velocity:
+        if by_velocity and not uneven:
             signals["position"] = integrated(signals["velocity"], base.period, base.segments)
             notes.warnings.append(NOTE)
             if "velocity" in notes.units:
                 notes.units["position"] = notes.units["velocity"].removesuffix("/s")
     except InputError as error:
         raise error.found_in(str(path)) from None
-    notes.warnings += [*_lost(base), *_doubts(base, signals, notes)]
+    notes.warnings += [*_lost(base), *([] if uneven else _doubts(base, signals, notes))]
     notes.read.append(_spans(base))
     return Log(
         path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
         tuple(notes.read), tuple(notes.warnings), dict(mapping.setup), mapping.axis_kind,
-        base.bridged if base.bridged.any() else None, is_integrated=by_velocity,
+        base.bridged if base.bridged.any() else None, is_integrated=by_velocity and not uneven, is_uneven=uneven,
     )  # fmt: skip
 
 
@@ -117,6 +121,26 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
     notes.read += _clocks(clock, reading)
     notes.warnings += _contradicted(chosen, reading, notes)
     return tracks
+
+
+def _stamped(
+    chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return instants and values by role of a log without an even clock, the motion first; {} for an even one.
+
+    Roles beside those `needed` and the force are left out where they lack instants or a unit.
+    """
+    clock, pairs = chosen.get("time"), {}
+    for role in [*needed, *(role for role in ("velocity", "force", *ROLES) if role in chosen and role not in needed)]:
+        time = instants(chosen[role], clock, reading, Notes())
+        if role == needed[0] and (time is None or not is_uneven(time)):
+            return {}
+        if role in pairs or time is None or time.size != chosen[role].channel.values.size:
+            continue
+        with suppress(*(() if role in (*needed, "force") or chosen[role].by_user else (InputError,))):
+            pairs[role] = time, signal(chosen[role], reading, notes)
+    notes.read += _clocks(clock, reading)
+    return pairs
 
 
 def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes) -> list[str]:

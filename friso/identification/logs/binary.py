@@ -10,6 +10,7 @@ killed.
 from __future__ import annotations
 
 import faulthandler
+import json
 import logging
 import math
 import os
@@ -17,6 +18,7 @@ import pickle
 import sys
 import threading
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -206,11 +208,115 @@ class _Heard(logging.Handler):
         self.lines.append(record.getMessage()[:120])
 
 
+def array_columns(path: Path) -> dict[str, Any]:
+    """Read the arrays of a file of NumPy (.npy, .npz), without objects."""
+    file = np.load(path, allow_pickle=False)
+    arrays = {path.stem: file} if isinstance(file, np.ndarray) else {name: file[name] for name in file.files}
+    return _content({name: values for whole, array in arrays.items() for name, values in _of_array(whole, array)})
+
+
+def _of_array(name: str, array: np.ndarray) -> list[tuple[str, Any]]:
+    """Return the columns of an array by name: its fields, or the columns of its longer side."""
+    if array.dtype.names:
+        return [(field, array[field].ravel()) for field in array.dtype.names]
+    array = np.squeeze(array)
+    if array.ndim != 2:
+        return [(name, array.item() if array.ndim == 0 else array)] if array.ndim < 2 else []
+    array = array if array.shape[0] >= array.shape[1] else array.T
+    return [(f"{name}[{i}]", column) for i, column in enumerate(array.T)]
+
+
+def json_columns(path: Path) -> dict[str, Any]:
+    """Read columns from JSON: lists by name, a list of records or rows, or one record a line."""
+    text = path.read_text(encoding="utf-8-sig")
+    try:
+        node = json.loads(text)
+    except json.JSONDecodeError as error:
+        if error.msg != "Extra data":
+            raise
+        node = [json.loads(line) for line in text.splitlines() if line.strip()]
+    return _content(_of_json(node, ""))
+
+
+def _of_json(node: Any, name: str) -> dict[str, Any]:
+    """Return the columns below a node of JSON, and its single numbers, by name."""
+    if isinstance(node, dict) and isinstance(node.get("data"), list) and isinstance(node.get("columns"), list):
+        node = [dict(zip(map(str, node["columns"]), row, strict=False)) for row in node["data"]]
+    if isinstance(node, list) and node and all(isinstance(item, dict) for item in node):
+        import pandas as pd
+
+        frame = pd.json_normalize(node, sep="/")
+        return {f"{name}{column}": frame[column].tolist() for column in map(str, frame.columns)}
+    if isinstance(node, list) and node and all(isinstance(item, list) for item in node):
+        named = len(node) > 1 and all(isinstance(cell, str) for cell in node[0])
+        heads = node[0] if named else [f"{name}column {i + 1}" for i in range(max(map(len, node)))]
+        rows = node[1:] if named else node
+        return {head: [row[i] if i < len(row) else None for row in rows] for i, head in enumerate(heads)}
+    if isinstance(node, dict) and len(node) > 1 and all(str(key).isdecimal() for key in node):
+        node = [*node.values()]  # as pandas writes a column, by the numbers of its rows
+    if isinstance(node, dict):
+        return {key: part for head, item in node.items() for key, part in _of_json(item, f"{name}{head}/").items()}
+    return {name.removesuffix("/") or "column 1": node}
+
+
+def frame_columns(path: Path) -> dict[str, Any]:
+    """Read the columns of a table in Parquet or Feather."""
+    import pandas as pd
+
+    with path.open("rb") as file:
+        frame = pd.read_parquet(path) if file.read(4) == b"PAR1" else pd.read_feather(path)
+    return _content({str(name): frame[name] for name in frame.columns})
+
+
+def _content(columns: dict[str, Any]) -> dict[str, Any]:
+    """Return columns as arrays of numbers or lists of texts, with single numbers apart.
+
+    Dates and times become seconds since the first of them.
+    """
+    import pandas as pd
+
+    content: dict[str, Any] = {"columns": {}, "scalars": {}}
+    for name, values in columns.items():
+        if isinstance(values, int | float):
+            content["scalars"][name] = float(values)
+        if not isinstance(values, list | np.ndarray | pd.Series) or len(values) < 2:
+            continue
+        series = pd.Series(values)
+        if series.dtype.kind in "mM":
+            name, series = f"{name} [s]", (series - series.dropna().iloc[0]) / pd.Timedelta(seconds=1)
+        if series.dtype.kind in "biuf":
+            content["columns"][name] = series.to_numpy(dtype=float, na_value=np.nan)
+        elif series.dtype.kind == "O" or pd.api.types.is_string_dtype(series):
+            content["columns"][name] = series.map(str, na_action="ignore").fillna("").tolist()
+    return content
+
+
+def sheet_text(path: Path) -> dict[str, Any]:
+    """Read the largest sheet of a workbook as text, with tabs between its cells."""
+    book = import_module("python_calamine").CalamineWorkbook.from_path(str(path))
+    sheets = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
+    name = max(sheets, key=lambda name: sum(map(len, sheets[name])))
+    lines = ["\t".join(map(_cell, row)) for row in sheets[name]]
+    return {"sheet": name, "others": [other for other in sheets if other != name], "text": "\n".join(lines) + "\n"}
+
+
+def _cell(value: Any) -> str:
+    """Return the text of a cell of a sheet on one line; times as in ISO 8601, durations in seconds."""
+    if hasattr(value, "total_seconds"):
+        return repr(value.total_seconds())
+    text = value.isoformat() if hasattr(value, "isoformat") else repr(value) if isinstance(value, float) else str(value)
+    return " ".join(text.split())
+
+
 READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
     "MAT": mat_tree,
     "UFF": uff_datasets,
     "LVM": lvm_content,
     "TDMS": tdms_channels,
+    "NumPy": array_columns,
+    "JSON": json_columns,
+    "Parquet": frame_columns,
+    "Workbook": sheet_text,
 }
 
 

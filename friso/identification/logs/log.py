@@ -37,7 +37,8 @@ class Log:
     `scalars` are single numbers from the file, by name. `read` lists what was read and how, `warnings` what the
     engineer should know before trusting it. `setup` are keys of the stage file that had other values for this log
     ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), marks lost samples that are interpolated; None without any.
-    `is_excerpt` marks a part of a longer log, `is_integrated` a log whose position is the integral of its velocity.
+    `is_excerpt` marks a part of a longer log, `is_integrated` a log whose position is the integral of its velocity. A
+    log that `is_uneven` has the instants of the file, and `sample_time` is the usual step.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Log:
     bridged: np.ndarray | None = None
     is_excerpt: bool = False
     is_integrated: bool = False
+    is_uneven: bool = False
 
     def __contains__(self, role: str) -> bool:
         """Tell whether the log has a role."""

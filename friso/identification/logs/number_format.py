@@ -16,7 +16,8 @@ import pandas as pd
 DECIMAL_SIGNS = (".", ",")
 SPACES = "\u00a0\u2009\u202f"
 """Spaces that stand within numbers and not between columns: no-break, thin, and narrow no-break."""
-NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"  # one way to read a run of digits: thousands take no time
+NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][+-]?\d+)?"
+"""Pattern of a plain number, with E or Fortran's D. A run of digits is read in one way: thousands take no time."""
 _SPACE, _APOSTROPHE = "\u00a0", "'"
 _ALIKE = str.maketrans({" ": _SPACE, "\u2009": _SPACE, "\u202f": _SPACE, "\u2019": _APOSTROPHE, "\u2212": "-"})
 """Signs by the one that is read in their place: all spaces are one, and the minus of typesetters is a hyphen."""
@@ -134,7 +135,7 @@ def _values(texts: Any, form: NumberFormat) -> np.ndarray:
     words = {
         word: value for name, value in (("true", "1"), ("false", "0")) for word in (name, name.title(), name.upper())
     }
-    return as_numbers(texts.replace(words))
+    return as_numbers(texts.replace(words).str.replace(r"(?<=[\d.])[dD]", "e", regex=True))
 
 
 def as_numbers(texts: Any) -> np.ndarray:

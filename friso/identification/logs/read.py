@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from friso.errors import LogError
+from friso.errors import InputError, LogError
 from friso.identification.logs.channel import ChannelTable
 from friso.identification.logs.format import FORMATS, FileHead
 from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.logs.packed import unpacked
 from friso.identification.logs.settings import settings
 from friso.platform.system import cause_of, once_free
 
 _SAVED = "the same saved as one of the formats that friso reads"
 _OTHERS = {
-    b"PK\x03\x04": ("a ZIP archive, as a workbook of Excel (.xlsx) and NumPy's .npz are, too", _SAVED),
-    b"\xd0\xcf\x11\xe0": ("a workbook of an old Excel (.xls) or another compound document", _SAVED),
-    b"\x1f\x8b": ("a file packed by gzip", "the file that is unpacked from it"),
-    b"\x93NUMPY": ("an array of NumPy (.npy)", _SAVED),
-    b"PAR1": ("a table in Parquet", _SAVED),
     b"MDF ": ("a measurement in ASAM MDF (.mf4, .dat)", _SAVED),
     b"#ROSBAG": ("a bag of ROS", "one of its topics saved as CSV"),
     b"SQLite format 3": ("a data base of SQLite, as a bag of ROS 2 is", "one of its topics saved as CSV"),
@@ -26,11 +24,34 @@ _OTHERS = {
 """First bytes of files that are no logs, with their kind and the advice on what to use instead."""
 
 
+@contextmanager
+def _plain(path: Path | str) -> Iterator[Path]:
+    """Yield the file that is packed in another one, or the file itself; errors name the latter."""
+    path = Path(path)
+    kept = unpacked(path)
+    if kept is None:
+        yield path
+        return
+    try:
+        yield kept.path
+    except InputError as error:
+        raise error.found_in(str(path)) from None
+
+
 def file_format(path: Path) -> str:
-    """Recognise the format of a file by its content, and return its name in `FORMATS`.
+    """Recognise the format of a file, packed or not, by its content, and return its name in `FORMATS`.
 
     Raises LogError for a path that is missing or a folder, and for a file that is empty, too large, or of no known
     format.
+    """
+    with _plain(path) as plain:
+        return _plain_format(plain)
+
+
+def _plain_format(path: Path) -> str:
+    """Recognise the format of a file that is not packed.
+
+    Raises LogError as `file_format` does.
     """
     try:
         if path.is_dir():
@@ -65,8 +86,8 @@ def read_table(path: Path | str) -> ChannelTable:
 
     Raises LogError for a file of unknown format, or one that its format cannot read.
     """
-    path = Path(path)
-    return FORMATS[file_format(path)].read(path)
+    with _plain(path) as plain:
+        return FORMATS[_plain_format(plain)].read(plain)
 
 
 def is_frequency_response(path: Path | str) -> bool:
@@ -74,8 +95,8 @@ def is_frequency_response(path: Path | str) -> bool:
 
     Raises LogError for a file that cannot be opened or has no known format.
     """
-    path = Path(path)
-    return FORMATS[file_format(path)].holds_response(path)
+    with _plain(path) as plain:
+        return FORMATS[_plain_format(plain)].holds_response(plain)
 
 
 def read_frequency_response(path: Path | str) -> MeasuredResponse:
@@ -83,9 +104,9 @@ def read_frequency_response(path: Path | str) -> MeasuredResponse:
 
     Raises LogError for a file that holds none.
     """
-    path = Path(path)
-    form = FORMATS[file_format(path)]
-    if form.read_response is None:
-        expected = "a format that holds frequency responses"
-        raise LogError("log", f"a file of format {form.title}", expected, "", str(path))
-    return form.read_response(path)
+    with _plain(path) as plain:
+        form = FORMATS[_plain_format(plain)]
+        if form.read_response is None:
+            expected = "a format that holds frequency responses"
+            raise LogError("log", f"a file of format {form.title}", expected, "", str(path))
+        return form.read_response(plain)

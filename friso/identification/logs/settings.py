@@ -115,6 +115,12 @@ class LogSettings(Settings):
     bytes_of_a_log: int = setting(2 << 30, "B")
     """Largest file that is read, because all its channels are in memory at once."""
 
+    bytes_unpacked: int = setting(64 << 20, "B")
+    """Size to which any packed file may unpack."""
+
+    bytes_unpacked_per_byte: int = setting(300, "")
+    """Further bytes that a byte of a packed file may unpack to. Texts of numbers shrink to a hundredth at most."""
+
     # Values.
     largest_value: float = setting(1e30, "")
     """Largest number of an instrument. Beyond it, squares of squares overflow."""
@@ -126,8 +132,18 @@ class LogSettings(Settings):
     lines_of_a_head: int = setting(1000, "")
     """Number of first lines of a text file that are tried with each delimiter."""
 
+    rows_of_a_table_begun: int = setting(50, "")
+    """Number of rows within which another one has the length of the first row of a table."""
+
     columns_of_a_table: int = setting(10_000, "")
     """Largest number of columns of a table. Reading more takes seconds."""
+
+    share_of_cells_of_other_topics: float = setting(0.25, "")
+    """Share of empty cells above which rows belong to several topics with instants of their own. Two topics of equal
+    rates leave half of the cells empty."""
+
+    steps_of_a_topic: float = setting(10.0, "")
+    """Longest step between samples of a topic in rows of several, in its usual steps. A longer one is a hole."""
 
     # One even time base.
     sample_times_of_a_gap: float = setting(1.5, "")
@@ -145,6 +161,10 @@ class LogSettings(Settings):
 
     scatter_of_even_stamps: float = setting(0.01, "")
     """Scatter of time stamps below which they count as even, relative to the sample time."""
+
+    scatter_of_uneven_stamps: float = setting(0.15, "")
+    """RMS deviation of the steps from whole numbers of the usual step, relative to it, above which a log has no even
+    clock. Interpolation onto one then loses more than the motion's corners; steps at random have 0.29."""
 
     steps_averaged: int = setting(5, "")
     """Number of steps in a row that are averaged for the usual step, because coarse stamps scatter."""

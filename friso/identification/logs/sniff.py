@@ -22,10 +22,12 @@ from friso.quantities import quoted
 REMEMBERED_LAYOUTS = 4
 """Number of files whose layout is cached, because each file is examined several times."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-_DELIMITERS = (";", "\t", ",", " ")
+_DELIMITERS = (";", "\t", "|", ",", " ")
 """Delimiters; of two that fit equally well the first is taken."""
 CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,:](\d+))?)?(?: ?([AaPp])\.?[Mm]\.?)?"
 """A time of day: hours, minutes, seconds, their fraction, and the half of the day."""
+MINUTES = r"(\d{1,3}):([0-5]\d[.,]\d+)"
+"""Minutes, seconds and their fraction, as stop watches show them."""
 _DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2}))"
 _GROUPED = re.compile(r"[+\-\u2212]?\d{1,3}(?: \d{3}|,\d{3}[.,])")
 """Digits in groups, between which stands a sign that delimits cells in other texts."""
@@ -33,8 +35,8 @@ _BLANKS = re.compile(rf"[^\S{SPACES}]+")
 DOS_END = "\x1a"
 """Ctrl-Z, with which DOS programs end a text."""
 ISO = re.compile(r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?)?")
-STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK})")
-"""A date and time as in ISO 8601, or a time of day, behind a date or not."""
+STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK}|{MINUTES})")
+"""A date and time as in ISO 8601, or a time of day, behind a date or not, or minutes and seconds."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class TextLayout:
     @property
     def in_words(self) -> str:
         """Return the layout in words."""
-        names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon"}
+        names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon", "|": "bar"}
         return (
             f"delimiter {names[self.delimiter]}, {self.numbers.in_words}, "
             f"encoding {self.encoding}, {self.first} line{'' if self.first == 1 else 's'} before the numbers"
@@ -192,7 +194,7 @@ def _best_fit(encoding: str, lines: Sequence[str]) -> tuple[_Fit, _Fit | None] |
     """Return the layout that fits lines best, with one that divides them otherwise and fits as well; None for none."""
     fits = [_fits(lines, encoding, delimiter) for delimiter in _DELIMITERS]
     plain, worded = ([fit for fit in by if fit] for by in zip(*fits, strict=True))
-    rows = max((fit.rows for fit in worded if fit.layout.delimiter in (";", "\t")), default=0)
+    rows = max((fit.rows for fit in worded if fit.layout.delimiter in (";", "\t", "|")), default=0)
     worded = [fit for fit in worded if fit.layout.delimiter != "," or fit.rows > rows]  # commas may begin decimals
     best, best_worded = (max(by, key=lambda fit: fit.score, default=None) for by in (plain, worded))
     if best_worded is not None and (best is None or best_worded.rows > 2 * best.rows):
@@ -265,11 +267,15 @@ def _fit(lines: Sequence[str], encoding: str, delimiter: str, rows: list[list[st
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
-    """Tell whether a row of numbers is followed by a row of equal length, as in a table."""
-    following = next((j for j in range(i + 1, len(rows)) if any(rows[j])), None)
-    if following is None or not any(is_row[i + 1 :]):
+    """Tell whether a row of numbers is followed by a row of numbers, and some row of equal length, as in a table.
+
+    Rows of several topics differ in length, but each kind comes again.
+    """
+    following = [j for j in range(i + 1, len(rows)) if any(rows[j])][: settings.rows_of_a_table_begun]
+    if not following or not any(is_row[i + 1 :]):
         return True
-    return is_row[following] and len(_filled(rows[following])) == len(_filled(rows[i]))
+    length = len(_filled(rows[i]))
+    return is_row[following[0]] and any(is_row[j] and len(_filled(rows[j])) == length for j in following)
 
 
 def _headings(

@@ -13,11 +13,12 @@ import pandas as pd
 from friso.errors import LogError
 from friso.identification.logs.cells import read_cells
 from friso.identification.logs.channel import Channel, ChannelTable, unique
-from friso.identification.logs.number_format import as_floats, as_numbers, number_texts
+from friso.identification.logs.number_format import NumberFormat, as_floats, as_numbers, number_texts
 from friso.identification.logs.preamble import preamble
 from friso.identification.logs.roles import role_of
-from friso.identification.logs.sniff import CLOCK, ISO, STAMP, TextLayout, layout, split_line
-from friso.identification.logs.units import unit_factor
+from friso.identification.logs.settings import settings
+from friso.identification.logs.sniff import CLOCK, ISO, MINUTES, STAMP, TextLayout, layout, split_line
+from friso.identification.logs.units import unit_factor, unit_since_1970
 from friso.quantities import quoted
 
 
@@ -37,13 +38,14 @@ def read_text(path: Path) -> ChannelTable:
     frame, blanks = (frame[~blank], int(blank.sum())) if blank.any() else (frame, 0)
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):
         cells = frame.iloc[:, i]
-        values = _numbers(path, form, cells, name)
+        values = column_values(cells, form.numbers, form.first, name, path)
         if values is None and not name and cells.isna().all():
             continue  # each row ends with a delimiter
         if values is None:
             notes += [f"left out: column {i + 1} ({name or 'no name'}), which holds no numbers{_such_as(cells)}"]
         else:
-            columns.append(Channel(name or f"column {i + 1}", unit or values[1], values[0], None, f"column {i + 1}"))
+            unit = unit or values[1] or unit_since_1970(name, values[0])
+            columns.append(Channel(name or f"column {i + 1}", unit, values[0], None, f"column {i + 1}"))
     if blanks:
         notes.append(f"{blanks} empty lines left out")
     channels = with_times(_same_ends(path, form, columns, frame))
@@ -78,10 +80,12 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
                 raise LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
 
 
-def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
+def column_values(
+    cells: Any, numbers: NumberFormat, first: int, name: str, path: Path
+) -> tuple[np.ndarray, str] | None:
     """Return a column's values, with "s" if they are time stamps; None for a column of texts.
 
-    Raises LogError for a text among numbers.
+    The texts are `numbers` of a format, below the `first` lines of a file. Raises LogError for a text among numbers.
     """
     if cells.dtype == bool or pd.api.types.is_numeric_dtype(cells.dtype):
         values = cells.to_numpy(dtype=float)
@@ -89,20 +93,20 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
     texts = cells.astype(str).str.strip()
     present = cells.notna() & (texts != "")
     if texts[present].str.fullmatch(STAMP.pattern).all() and present.any():
-        return _stamped(path, texts, present, form), "s"
-    values = as_floats(number_texts(cells), form.numbers)
+        return _stamped(path, texts, present), "s"
+    values = as_floats(number_texts(cells), numbers)
     wrong = present.to_numpy() & np.isnan(values) & (texts.str.lower() != "nan").to_numpy()
     if wrong.sum() > 0.5 * present.sum() or not present.any():
         return None
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
-        line = form.first + 1 + int(cells.index[row])
+        line = first + 1 + int(cells.index[row])
         actual = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
         raise LogError("log", actual, "numbers in every row", "", str(path))
     return values, ""
 
 
-def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
+def _stamped(path: Path, texts: Any, present: Any) -> np.ndarray:
     """Return the seconds since the first of some time stamps; NaN where none is `present`.
 
     In dates that are not ISO 8601, day or month may come first: only the time of day counts, and a time that steps back
@@ -113,6 +117,9 @@ def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarr
         if texts[present].str.fullmatch(ISO.pattern).all():
             stamps: Any = pd.to_datetime(texts.where(present), format="ISO8601", utc=True)
             seconds = (stamps - stamps[present].iloc[0]).dt.total_seconds().to_numpy(dtype=float)
+        elif texts[present].str.fullmatch(MINUTES).all():
+            parts = texts.where(present).str.extract(rf"^{MINUTES}$")
+            seconds = 60 * as_numbers(parts[0]) + as_numbers(parts[1])
         else:
             seconds = _time_of_day(texts.where(present))
             seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
@@ -138,13 +145,18 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
     """Return the columns without the empty cells below their last value.
 
     Raises LogError if one of the last two rows of the file ends before a column that the others have. Columns with
-    times of their own may have different lengths.
+    times of their own may have different lengths, and so may topics that have cells of their own rows only.
     """
-    out = []
+    out, sparse = [], False
     for column in columns:
         last = int(np.flatnonzero(~np.isnan(column.values))[-1]) + 1
+        sparse = sparse or bool(np.isnan(column.values[:last]).mean() > settings.share_of_cells_of_other_topics)
         out.append(replace(column, values=column.values[:last]))
-    if len({len(column.values) for column in out}) > 1 and sum(role_of(c.name) == ("time", "time") for c in out) < 2:
+    if (
+        not sparse
+        and len({len(column.values) for column in out}) > 1
+        and sum(role_of(c.name) == ("time", "time") for c in out) < 2
+    ):
         shortest = min(out, key=lambda column: len(column.values))
         missing = len(frame) - len(shortest.values)
         if missing <= 2 and missing < 0.01 * len(frame):

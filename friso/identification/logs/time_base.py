@@ -67,6 +67,43 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     return _evened(name, Track(time, values, period, [slice(a, b) for a, b in pairwise(ends)], filled, read))
 
 
+def is_uneven(time: np.ndarray) -> bool:
+    """Tell whether instants [s] belong to no even clock: their steps are no whole numbers of a usual one.
+
+    Lost samples, and the rounding of stamps, whose steps take two values only, leave a clock even.
+    """
+    steps = np.diff(time[np.isfinite(time)])
+    steps = steps[steps > 0]
+    if steps.size < settings.samples_of_a_log:
+        return False
+    whole = steps / np.median(steps)
+    off = whole - np.round(whole)
+    rounded = np.unique(np.round(whole / settings.scatter_of_even_stamps)).size <= 2
+    return bool(not rounded and np.sqrt(np.mean(off**2)) > settings.scatter_of_uneven_stamps)
+
+
+def as_stamped(signals: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[Track, dict[str, np.ndarray]]:
+    """Bring signals, pairs of instants [s] and values by role, to the instants of the first.
+
+    Values that are no numbers are left out. Raises LogError for decreasing time, and for stamps repeated with other
+    values.
+    """
+    base, values, read = np.zeros(0), {}, []
+    for role, (time, held) in signals.items():
+        finite = np.isfinite(time) & np.isfinite(held)
+        time, held, _ = repeated_stamps(role, time[finite], held[finite])
+        base = base if values else time
+        if not np.array_equal(time, base):
+            read.append(f"{role}: interpolated linearly onto the instants of {next(iter(values))}")
+            held = np.interp(base, time, held)
+        values[role] = held
+    steps = np.diff(base)
+    spread = f"{1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms"
+    read.append(f"time stamps are uneven, {spread} apart: taken as they are")
+    period = float(np.median(steps))
+    return Track(base, base, period, [slice(0, base.size)], np.zeros(base.size, bool), read), values
+
+
 def usual_step(steps: np.ndarray) -> float:
     """Return the mean of the time steps [s], shape (n,), without gaps."""
     return float(steps[~gaps(steps)].mean())
@@ -106,12 +143,15 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return the samples that are numbers, and how many samples between them are not.
 
-    Raises LogError if fewer than half of the samples are numbers.
+    Raises LogError if fewer than half of the samples are numbers, unless these are even, as those of a topic are that
+    shares its rows with faster ones.
     """
     finite = np.isfinite(time) & np.isfinite(values)
     if finite.size < 2:
         raise LogError(name, f"{finite.size} sample{'' if finite.size == 1 else 's'}", "a record over time", "")
-    if finite.sum() < max(2, 0.5 * finite.size):
+    steps = np.diff(time[finite])
+    even = steps.size > 1 and (steps >= 0).all() and steps.max() <= settings.steps_of_a_topic * np.median(steps)
+    if finite.sum() < (2 if even else max(2, 0.5 * finite.size)):
         actual = f"{finite.size - finite.sum()} of {finite.size} samples that are not numbers (NaN)"
         raise LogError(name, actual, "at least half of the samples", "")
     inside = np.flatnonzero(finite)

@@ -7,6 +7,8 @@ import unicodedata
 from collections.abc import Iterable
 from functools import lru_cache
 
+import numpy as np
+
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
@@ -173,6 +175,18 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
             return value, target
     text = spelled(unit)
     return 1.0, "count" if text.lower() in COUNTS else text or "1"
+
+
+def unit_since_1970(name: str, values: np.ndarray) -> str:
+    """Return the unit of a clock that counts from 1970, as computers' clocks do; "" for another channel.
+
+    The name says that it is a time, and between 2001 and 2096 no other unit gives such values.
+    """
+    if not {"time", "stamp", "timestamp", "t"} & {*re.split(r"[^a-z]+", name.lower())}:
+        return ""
+    finite = values[np.isfinite(values)]
+    units = (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9))
+    return next((unit for unit, size in units if finite.size and (abs(finite / size - 2.5e9) < 1.5e9).all()), "")
 
 
 def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR) -> tuple[float, str]:

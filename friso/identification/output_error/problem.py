@@ -18,7 +18,7 @@ from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.identification.inverse_model import motion, smoothed
-from friso.identification.logs.checks import runs
+from friso.identification.logs.checks import runs as stretches
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
 from friso.identification.output_error.settings import settings as output_error_settings
@@ -343,7 +343,7 @@ def moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, bandwid
     """
     resting = _resting(position, blur_of(position, smooth), sample_time)
     resting[0] = True
-    longest = max((move.stop - move.start for move in runs(~resting)), default=0) * sample_time
+    longest = max((move.stop - move.start for move in stretches(~resting)), default=0) * sample_time
     constants, most = output_error_settings.time_constants_of_settling, output_error_settings.move_share_of_settling
     needed = constants / (2 * np.pi * most * longest) if longest else bandwidth
     omega = 2 * np.pi * min(max(bandwidth, needed), output_error_settings.bandwidth_of_holding)

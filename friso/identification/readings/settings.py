@@ -11,6 +11,23 @@ from friso.settings import Settings, setting
 class ReadingSettings(Settings):
     """Settings of readings: passes, slips, ramps, friction over speed and place."""
 
+    # Mass and friction at uneven instants.
+    degree_of_polynomials: int = setting(3, "")
+    """Degree of local polynomials of force and velocity; a position has one more. With 2 a quintic move of 17 samples
+    shows 3 % too much mass, with 3 0.2 %."""
+
+    widths_of_polynomials: tuple[int, ...] = setting((5, 7, 9, 13, 19, 27, 39), "")
+    """Numbers of samples tried for local polynomials. Noise needs many, short moves need few."""
+
+    speed_share_of_stamped_sliding: float = setting(0.03, "")
+    """Smallest speed that counts as sliding, relative to the highest."""
+
+    steps_of_a_hole: float = setting(4.0, "")
+    """Longest step between uneven instants over which a polynomial may reach, in usual steps."""
+
+    rows_of_a_stamped_fit: int = setting(30, "")
+    """Fewest samples within moves for mass and friction. With fewer, four numbers have no honest interval."""
+
     # Force and motion of the body on the bearing, from command and sensor.
     points_per_sample: int = setting(8, "")
     """Points per sample when a structural mode is simulated. A mode at a tenth of the sampling rate errs by 0.05 %."""

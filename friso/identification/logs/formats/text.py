@@ -1,4 +1,4 @@
-"""CSV, TXT and TSV: one table of numbers, of any delimiter, decimal sign and encoding."""
+"""CSV, TXT and TSV: one table of numbers, of any delimiter, decimal sign and encoding; packed, too."""
 
 from __future__ import annotations
 
