@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import InverseModel, inverse_model
+from friso.identification.inverse_model import InverseModel, inverse_model, passes_once, unit_of
 from friso.identification.kinds import in_order
 from friso.identification.logs.log import Log
 from friso.identification.output_error.effects import (
@@ -81,6 +81,28 @@ class RecordCase:
     def unit(self) -> str:
         """Return the unit of the force."""
         return self.log.unit("force")
+
+    @property
+    def passes_once(self) -> bool:
+        """Tell whether the record passes its way only once."""
+        return passes_once(self.log["position"][self.log.longest])
+
+    def largest(self, unit: str) -> float:
+        """Return the size in a unit that nothing in the record exceeds; infinite for a unit of nothing in it.
+
+        A force that differs with place or time differs by no more than the whole force does; a length is at most the
+        travel, a time the duration; a mass or a viscous friction that takes the largest force at the usual acceleration
+        or speed is the largest.
+        """
+        axes, position = (unit_of("kg", self.log), unit_of("N*s/m", self.log)), self.log["position"][self.log.longest]
+        whole = np.append(self.log["force"][self.log.longest], 0.0)
+        force, step = float(np.ptp(whole)), self.log.sample_time
+        if unit in axes:
+            usual = float(np.sqrt(np.mean(self.inverse.columns[:, axes.index(unit)] ** 2)))
+            return force / usual if usual > 0 else np.inf
+        speed, duration = float(np.abs(np.diff(position)).max()) / step, step * len(self.log.time)
+        sizes = {f"{self.unit}/s": 2 * force / step, "m": float(np.ptp(position)), "m/s": speed, "s": duration}
+        return {self.unit: force, **sizes}.get(unit, np.inf)
 
     def modelled(self, log: Log, **options: Any) -> InverseModel:
         """Return the inverse model of a log changed for an effect, with further `options` of `inverse_model`."""
@@ -296,7 +318,8 @@ class Doubt:
     `find` yields findings from the case at its `moment`. The docs list what it `looks_at`, its `consequence`, and by
     which measurement it is decided (`decided_by`). `after` names doubts that are examined earlier. `forces` returns
     forces that the effect would add, to be fitted to the residual. The doubt whose forces explain most leads, and no
-    other doubt names a cause.
+    other doubt names a cause. An effect of `places` shows in a record only that passes its way more than once, because
+    a single pass does not tell a place from a time.
     """
 
     moment: Moment
@@ -306,6 +329,7 @@ class Doubt:
     decided_by: str
     after: tuple[str, ...] = ()
     forces: Callable[[FittedCase], Iterable[TriedForces]] | None = None
+    places: bool = False
 
 
 DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
@@ -354,11 +378,13 @@ def way_of(velocity: np.ndarray) -> np.ndarray:
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
     """Return the effect whose forces explain most of a fit's residual; None if none suffices."""
     best: LeadingEffect | None = None
-    searches = [(name, tries) for name in _at("fit") if (tries := DOUBTS[name].forces) is not None]
+    names = [name for name in _at("fit") if _may_show(name, case)]
+    searches = [(name, tries) for name in names if (tries := DOUBTS[name].forces) is not None]
     every = [(name, tried) for name, tries in searches for tried in tries(case)]
     forces = [force for _, tried in every for force in tried.forces]
     if not forces:
         return None
+    largest = case.largest(case.unit)
     effects = iter(effects_of(forces, [unit for _, tried in every for unit in tried.units], case.fit))
     rest, slopes = beside_all_numbers(case.fit)
     for name, tried in every:
@@ -366,6 +392,8 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
         explained = explained_by(slopes, rest, own, case.fit.problem.counted, tried.searched)
         if explained is None or explained.sizes.max() < tried.least:
             continue
+        if np.sqrt(np.mean((explained.sizes @ np.stack([*tried.forces])) ** 2)) > largest:
+            continue  # no record contains it; a delay may exceed the force at its steps, for some samples
         if best is None or explained.left < best.explained.left:
             best = LeadingEffect(name, tried, explained)
     if best is None:
@@ -420,5 +448,21 @@ def _at(moment: Moment) -> list[str]:
 
 
 def _named(name: str, case: Any) -> Iterator[RaisedDoubt]:
-    """Yield the findings of the doubt `name`, each with this name in its field `doubt`."""
-    return (replace(finding, doubt=name) for finding in DOUBTS[name].find(case))
+    """Yield the findings of the doubt `name`, each with this name in its field `doubt`.
+
+    An effect larger than the record can contain is left out, and the size of another finding is bounded by it.
+    """
+    if not isinstance(case, RecordCase):
+        yield from (replace(finding, doubt=name) for finding in DOUBTS[name].find(case))
+        return
+    for finding in DOUBTS[name].find(case) if _may_show(name, case) else ():
+        most = np.inf if np.isnan(finding.size) else case.largest(finding.unit)
+        if abs(finding.size) > most and DOUBTS[name].moment in ("cause", "fit"):
+            continue
+        bounded = float(np.clip(finding.size, -most, most))
+        yield replace(finding, size=bounded, doubt=name)
+
+
+def _may_show(name: str, case: RecordCase) -> bool:
+    """Tell whether the way of a record is passed often enough for a doubt."""
+    return not DOUBTS[name].places or not case.passes_once

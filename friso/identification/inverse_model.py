@@ -162,11 +162,22 @@ def directions(position: np.ndarray) -> tuple[bool, bool]:
 
     Noise does not count as motion.
     """
-    turns = turns_of(position, identification_settings.deviations_of_standing_still * noise_of(position))
-    steps = np.diff(position[[0, *turns, len(position) - 1]])
+    steps = _ways(position)
     travelled = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
     forward, back = travelled > identification_settings.way_share_of_a_direction * travelled.sum()
     return bool(forward), bool(back)
+
+
+def passes_once(position: np.ndarray) -> bool:
+    """Tell whether a motion [m], shape (n,), passes most of its way only once, so that a place is as good as a time."""
+    travelled = float(np.abs(_ways(position)).sum())
+    return travelled < identification_settings.travels_of_a_single_pass * float(np.ptp(position))
+
+
+def _ways(position: np.ndarray) -> np.ndarray:
+    """Return the ways [m] between the turning points of a motion [m], shape (n,), without those of noise."""
+    turns = turns_of(position, identification_settings.deviations_of_standing_still * noise_of(position))
+    return np.diff(position[[0, *turns, len(position) - 1]])
 
 
 def inverse_model(

@@ -306,6 +306,9 @@ class IdentificationSettings(Settings):
     pieces_of_a_spectrum: int = setting(8, "")
     """Number of pieces into which a record is cut for its spectrum (Welch). More scatter less and resolve less."""
 
+    travels_of_a_single_pass: float = setting(1.5, "")
+    """Way below which a record passes its places once, in ranges of the position. To and fro makes 2."""
+
     way_share_of_a_direction: float = setting(0.02, "")
     """Smallest fraction of the way in either direction for separating friction from a constant force."""
 

@@ -45,14 +45,14 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     changes = None
     if not quality.failed:
         changes = changes_beside(inverse) if quality.rejected else _changes_of_fit(case.fit, case.velocity)
-    if changes is None:
+    if changes is None or max(changes.friction_reach, changes.constant_reach) > case.largest(case.unit):
         return
     if quality.rejected:
         yield RaisedDoubt(inverse=inverse_reaching(inverse, changes))
     else:
         yield RaisedDoubt(fit=_reaching(case.fit, changes))
     for what, size, cause in (
-        ("Friction", changes.friction, "warming up?"),
+        ("Friction", changes.friction, "warming up?" if not case.passes_once else "warming up, or a place on the way?"),
         ("The constant force", changes.constant, "a drift of the force?"),
     ):
         if changes.sure and size > doubt_settings.friction_share_of_a_change * case.inverse.value("coulomb"):

@@ -77,4 +77,5 @@ DOUBT = Doubt(
     "slow passes to and fro over the same way",
     after=("friction-by-direction",),
     forces=forces,
+    places=True,
 )

@@ -38,6 +38,8 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
     """
     for one in halves(case.inverse) if case.lacks else ():
         unit = case.inverse.estimate(one.name).unit
+        if abs(one.first - one.second) > case.largest(unit):
+            continue
         values = f"{one.first:.4g} and {one.second:.4g} {unit}"
         words = f"The halves of the record differ in {WORDS[one.name]}: {values}; its interval holds both"
         reaches = {one.name: (one.low, one.high)}

@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.inverse_model import InverseModel, least_squares
 from friso.identification.settings import doubt_settings
 
 
@@ -18,9 +19,18 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     with suppress(InputError):
         if places:
             model = case.modelled(case.log, extra=places)
-            size = float(np.ptp([0.0, *(model.value(name) for name in places)]))
+            size = _size(case.inverse, model)
             words = f"a force that varies with position, by {size:.2g} {case.unit}, accounts for most of it"
             yield RaisedDoubt(words=words, size=size, unit=case.unit, without=model, spoils=True)
+
+
+def _size(without: InverseModel, model: InverseModel) -> float:
+    """Return by how much a force differs from place to place, beyond what a mass and friction could do as well.
+
+    The models are without and with the force. In a sine, the force of a spring is that of a mass.
+    """
+    along = without.measured - model.measured
+    return float(np.ptp(least_squares(without.columns, along)[1]))
 
 
 def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
@@ -44,4 +54,5 @@ DOUBT = Doubt(
     "intervals reach to the values without it; friction at low speed is refused",
     "slow passes to and fro over the same way",
     after=("drifting-force",),
+    places=True,
 )

@@ -43,5 +43,6 @@ DOUBT = Doubt(
     "slow passes to and fro over the same way",
     after=("friction-by-direction",),
     forces=forces,
+    places=True,
 )
 """The doubt divides the way into the places of `cogging`; a force that changes sign with direction is friction."""

@@ -100,4 +100,5 @@ DOUBT = Doubt(
     "a dial gauge on the load while the motor turns to and fro",
     after=("friction-by-direction",),
     forces=forces,
+    places=True,
 )

@@ -86,9 +86,9 @@ def rises_evenly(values: np.ndarray) -> bool:
 def clipped_share(values: np.ndarray) -> float:
     """Return the fraction of samples in flat tops, which show that a signal is clipped.
 
-    A flat top lies at an extreme and has at least 3 equal samples. The signal enters it abruptly (the step before is at
-    least a fifth of the largest step), or hardly ever repeats a value elsewhere. A command that switches between two
-    values is not clipped.
+    A flat top lies at an extreme and has at least 3 equal samples. One at either end of a record may be a rest: it
+    counts beside others only. The signal enters it abruptly (the step before is at least a fifth of the largest step),
+    or hardly ever repeats a value elsewhere. A command that switches between two values is not clipped.
     """
     steps = np.abs(np.diff(values))
     if values.size < 5 or steps.max() == 0:
@@ -96,10 +96,10 @@ def clipped_share(values: np.ndarray) -> float:
     count, inside = 0, (values[1:] > values.min()) & (values[1:] < values.max())
     repeats = np.count_nonzero(steps[inside] == 0) >= settings.share_of_repeated_values * np.count_nonzero(inside)
     for extreme in (values.max(), values.min()):
-        for top in runs(values == extreme):
-            kink = top.start >= 2 and steps[top.start - 2] >= 0.2 * steps.max()
-            if top.stop - top.start >= 3 and (kink or not repeats):
-                count += top.stop - top.start
+        tops = [top for top in runs(values == extreme) if top.stop - top.start >= 3]
+        flat = [top for top in tops if not repeats or (top.start >= 2 and steps[top.start - 2] >= 0.2 * steps.max())]
+        if any(top.start > 0 and top.stop < values.size for top in flat):
+            count += sum(top.stop - top.start for top in flat)
     return count / values.size
 
 

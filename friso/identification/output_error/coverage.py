@@ -41,9 +41,11 @@ class Coverage:
         """Return the range of speeds [m/s], widest by ratio, in which there is no steady motion.
 
         The range lies between neighbouring steady speeds, or below the lowest. If there is no steady motion at all, its
-        upper end is infinite.
+        upper end is infinite. Speeds far below the highest count as rest, however little noise there is.
         """
-        speeds = np.concatenate([[self.slowest], self.steady]) if self.steady.size else np.array([self.slowest, np.inf])
+        slowest = max(self.slowest, settings.speed_share_of_rest * float(self.steady.max(initial=0.0)))
+        faster = self.steady[self.steady > slowest]
+        speeds = np.concatenate([[slowest], faster]) if faster.size else np.array([slowest, np.inf])
         widest = int(np.argmax(speeds[1:] / speeds[:-1]))
         return float(speeds[widest]), float(speeds[widest + 1])
 

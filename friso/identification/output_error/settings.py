@@ -204,6 +204,9 @@ class OutputErrorSettings(Settings):
     time_of_steady_motion: float = setting(0.02, "s")
     """Shortest stretch of steady motion. Shorter stretches show no speed above the noise."""
 
+    speed_share_of_rest: float = setting(1e-4, "")
+    """Speed that is told as rest, relative to the highest steady one. No stage moves over more than four decades."""
+
     speed_factor_of_coverage: float = setting(3.0, "")
     """Factor below and above the Stribeck velocity within which a record must move steadily to show it."""
 
