@@ -10,6 +10,7 @@ import numpy as np
 from friso.errors import LogError
 from friso.identification.kind import Source
 from friso.identification.kinds import KINDS
+from friso.identification.logs.assemble import read_log
 from friso.identification.logs.channel import Channel
 from friso.identification.logs.format import FORMATS
 from friso.identification.logs.gaps import GapsError
@@ -116,9 +117,18 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
         source, kind, reason = _recognised(path, mapping)
     except LogError as error:
         gaps = error.gaps if isinstance(error, GapsError) else (error,)
-        return LogContent(path, title, channels, None, "", "", table.read, gaps=gaps, options=options.options)
+        warnings = _warnings(path, mapping)
+        return LogContent(path, title, channels, None, "", "", table.read, warnings, gaps, options.options)
     warnings = getattr(source, "warnings", ())
     return LogContent(path, title, channels, None, kind, reason, source.read, warnings, options=options.options)
+
+
+def _warnings(path: Path, mapping: Mapping) -> tuple[str, ...]:
+    """Return the warnings about a log whose kind of experiment is open; none if something else is open, too."""
+    try:
+        return read_log(path, mapping, strict=False).warnings
+    except LogError:
+        return ()
 
 
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:

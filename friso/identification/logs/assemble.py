@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +70,7 @@ def read_log(
                 notes.units["position"] = notes.units["velocity"].removesuffix("/s")
     except InputError as error:
         raise error.found_in(str(path)) from None
-    notes.warnings += [*_lost(base), *([] if uneven else _doubts(base, signals, notes))]
+    notes.warnings += [*_lost(base), *_missing(base), *([] if uneven else _doubts(base, signals, notes))]
     notes.read.append(_spans(base))
     return Log(
         path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
@@ -242,6 +243,23 @@ def _lost(base: Track) -> list[str]:
         f"{np.count_nonzero(base.bridged)} of {base.bridged.size} samples lost, in {where}, interpolated by a cubic "
         "spline; the fit of a whole model does not count them"
     ]
+
+
+def _missing(base: Track) -> list[str]:
+    """Write which parts of a log are missing, and whether its clock is too fast for a machine; [] without either."""
+    lines = []
+    if base.period <= settings.shortest_sample_time:
+        lines.append(
+            f"time: {base.period * 1e6:.3g} us between samples ({1e-6 / base.period:.3g} MHz), faster than drives log: "
+            "is the time in a larger unit than its heading says? --unit states another"
+        )
+    holes = [(base.time[left.stop - 1], base.time[right.start]) for left, right in pairwise(base.segments)]
+    if holes:
+        whole, lost = float(base.time[-1] - base.time[0]), sum(end - start - base.period for start, end in holes)
+        first = ", ".join(f"{start:.4g} to {end:.4g} s" for start, end in holes[:3])
+        more = f" and {len(holes) - 3} more" if len(holes) > 3 else ""
+        lines.append(f"time: {lost:.3g} s of {whole:.3g} s are missing ({first}{more})")
+    return lines
 
 
 def _spans(base: Track) -> str:

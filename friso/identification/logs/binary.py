@@ -15,6 +15,7 @@ import logging
 import math
 import os
 import pickle
+import re
 import sys
 import threading
 from collections.abc import Callable
@@ -166,7 +167,30 @@ def lvm_content(path: Path) -> dict[str, Any]:
     """Read the content of a measurement text of LabVIEW."""
     import lvm_read
 
+    _no_words_among_numbers(path)
     return {str(key): part for key, part in lvm_read.read(str(path), read_from_pickle=False, dump_file=False).items()}
+
+
+_ODD = re.compile(r"[^\s\d.,;+\-eE]")
+"""A sign that stands in no plain number and separates none."""
+_PLAIN = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)", re.IGNORECASE)
+
+
+def _no_words_among_numbers(path: Path) -> None:
+    """Check the rows of a measurement text of LabVIEW.
+
+    Raises ValueError, with the line, for a cell that is no number: the library reads 1_0 as 10, and a word as a gap.
+    """
+    names: list[str] = []
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if line.startswith(("X_Value", "***")) or not line.strip():
+                names = line.rstrip("\r\n").split("\t") if line.startswith("X_Value") else []
+            elif names and _ODD.search(line):
+                cells = zip(line.rstrip("\r\n").split("\t"), names, strict=False)
+                for cell in (cell.strip() for cell, name in cells if name != "Comment"):
+                    if cell and _PLAIN.fullmatch(cell) is None:
+                        raise ValueError(f"{cell[:40]!r} in line {number} is no number")
 
 
 def tdms_channels(path: Path) -> dict[str, Any]:

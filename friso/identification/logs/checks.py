@@ -37,13 +37,24 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
     if other.size:
         i = int(other[0])
         actual = f"two values at {time[i]:.9g} s ({values[i]:.6g} and {values[i + 1]:.6g}), at {other.size} instants"
-        step = 1e3 * (time[-1] - time[0]) / (len(time) - 1)
+        step = 1e3 * _step_of_rounded(time)
         expected = "one value per time stamp; if the stamps are rounded too coarsely, use --dt"
         raise LogError(name, actual, expected, f'--dt "{step:.4g} ms"')
     keep = np.r_[True, steps > 0]
     if keep.sum() < 2:
         raise LogError(name, f"the same time stamp {time[0]:.9g} s throughout", "time that increases", '--dt "1 ms"')
     return time[keep], values[keep], int(again.size)
+
+
+def _step_of_rounded(time: np.ndarray) -> float:
+    """Return the likely step [s] between samples whose stamps are rounded, from how many share a stamp.
+
+    The first and the last stamp may be of few samples.
+    """
+    stamps, counts = np.unique(time, return_counts=True)
+    if stamps.size < 4:
+        return float(time[-1] - time[0]) / (len(time) - 1)
+    return float(stamps[-1] - stamps[1]) / float(counts[1:-1].sum())
 
 
 COUNTER_BITS = 64

@@ -166,6 +166,9 @@ class LogSettings(Settings):
     """RMS deviation of the steps from whole numbers of the usual step, relative to it, above which a log has no even
     clock. Interpolation onto one then loses more than the motion's corners; steps at random have 0.29."""
 
+    shortest_sample_time: float = setting(1e-5, "s")
+    """Sample time up to which the unit of the time is doubted. Drives sample at 62.5 us and more slowly."""
+
     steps_averaged: int = setting(5, "")
     """Number of steps in a row that are averaged for the usual step, because coarse stamps scatter."""
 
