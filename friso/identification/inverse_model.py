@@ -149,7 +149,7 @@ def _end_of_motion(power: np.ndarray, noise: float) -> int:
     clear = identification_settings.power_above_noise
     below = np.flatnonzero(power < clear * noise)
     end = int(below[0]) if below.size else len(power)
-    reach = identification_settings.lines_of_a_gap * (1 + int(np.argmax(power[1:])))
+    reach = identification_settings.lines_of_a_gap * (1 + int(np.argmax(power[1:]))) if len(power) > 1 else 0
     for line in np.flatnonzero(power[end:] >= clear**2 * noise) + end:
         if line >= end + reach:
             break

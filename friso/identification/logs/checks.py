@@ -295,15 +295,16 @@ def _peak(heights: np.ndarray) -> float:
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
     """Return the mean estimate over blocks of a record and half of its 95 % interval (Student).
 
-    `estimate` takes the first and the last sample of a block, of a record of `size` samples. Both results are NaN for a
-    short record, or if fewer than half of the blocks have an estimate.
+    Of long blocks only the beginning counts. `estimate` takes the first and the last sample of a block, of a record of
+    `size` samples. Both results are NaN for a short record, or if fewer than half of the blocks have an estimate.
     """
     from scipy.stats import t as student
 
     length = size // settings.blocks_of_a_delay
     if length < 10 * settings.longest_delay_samples:
         return np.nan, np.nan
-    delays = np.array([estimate(k * length, (k + 1) * length) for k in range(settings.blocks_of_a_delay)])
+    reach = min(length, settings.samples_of_a_block)
+    delays = np.array([estimate(k * length, k * length + reach) for k in range(settings.blocks_of_a_delay)])
     delays = delays[np.isfinite(delays)]
     if delays.size < settings.blocks_of_a_delay / 2:
         return np.nan, np.nan

@@ -54,6 +54,9 @@ class LogSettings(Settings):
     blocks_of_a_delay: int = setting(8, "")
     """Number of parts of a record whose separate estimates give the interval of a delay."""
 
+    samples_of_a_block: int = setting(16384, "")
+    """Largest number of samples of a part of a record for its delay. Longer ones take seconds and change nothing."""
+
     longest_delay_samples: int = setting(20, "")
     """Longest delay that is searched, in samples. Longer delays do not come from instruments."""
 
