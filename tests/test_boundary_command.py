@@ -34,7 +34,7 @@ from friso.hunting import (
 )
 from friso.hunting.boundary.plane import LastEnd
 from friso.interface.output_folder import MARKER
-from friso.questions.boundary.document import boundary_document
+from friso.questions.boundary.blocks import boundary_document
 from friso.questions.boundary.figures import LOST, LOST_END, MEETING, NODES, boundary_figure
 from friso.questions.boundary.words import (
     VERDICTS,

@@ -28,9 +28,9 @@ from friso.frequency.members import limit_cases, member
 from friso.frequency.settings import FrequencySettings
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
 from friso.interface.output_folder import MARKER
-from friso.questions.compare.document import compare_document
+from friso.questions.compare.blocks import compare_document
 from friso.questions.compare.figures import compare_figures
-from friso.questions.compare.page import compare_files
+from friso.questions.compare.question import CompareAnswer
 from friso.questions.compare.words import _turning, conclusion, paired_rows, sentences, table_rows
 from friso.shares import share
 from friso.shown.drawing import matplotlib_renderer
@@ -480,7 +480,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
         assert ("1.00 nm RMS" in " ".join(said)) == compared
         assert ("[floor]" in said[-1]) != compared
         assert paired_rows(item)[0][1][4] == ratio
-        document, text = compare_document(item), Page(str(compare_files(item)["compare.html"])).text
+        document, text = compare_document(item), Page(str(CompareAnswer(item).files()["compare.html"])).text
         rms = document["options"]["c"]["against_a"]["in_position_rms"]
         assert (document["standstill_compared"], rms is not None) == (compared, compared)
         assert any("no [floor]" in note for note in document["notes"]) is not compared

@@ -14,8 +14,7 @@ import friso
 from friso.cli import main
 from friso.hunting import find_margin
 from friso.hunting.criteria import ATTRACTED, VERDICTS
-from friso.questions.check.document import draws_document
-from friso.questions.check.draws import draws_figure, draws_rows, draws_sentences
+from friso.questions.check.draws import draws_document, draws_figure, draws_rows, draws_sentences
 from friso.shown.documents import plain_json
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Sample, draw

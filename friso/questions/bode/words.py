@@ -12,9 +12,8 @@ from friso.frequency.bode import Bode, Unstable
 from friso.frequency.crossover import COMFORTABLE_MARGIN, Limits, Range
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
-from friso.interface.answer import AnswerTable
-from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, shown_states
-from friso.questions.bode.table import growth, rows
+from friso.questions.bode.numbers import growth
+from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place
 from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
 
 SETTLED = "the limit cases, and stuck under any bias force"
@@ -225,9 +224,3 @@ def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
     unit = _unit(bode)
     windows = [window_with_unit(*window, limits.searched, unit) for window in ranges]
     return listed(windows, "and") or f"none from {range_with_unit(*limits.searched, unit)}"
-
-
-def tables(bode: Bode) -> list[AnswerTable]:
-    """Return the table of stability margins, with a column for each state."""
-    states = shown_states(bode)
-    return [AnswerTable(bode.stage.name, [item.label for item in states], rows(states))]

@@ -1,10 +1,13 @@
-"""Show what machines drawn from uncertain keys do: in the table, sentences and a figure."""
+"""Show what machines drawn from uncertain keys do: in sentences, a table, a figure, and the JSON document."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from typing import Any
+
 import numpy as np
 
-from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
+from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import Axis, Band, Figure, Panel
@@ -186,3 +189,28 @@ def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
     x_axis = Axis(key, draws.unit(key), (float(edges[0]), float(edges[-1])))
     title = f"{label}: all {bands[0].label}" if len(bands) == 1 else label  # a single band has no legend
     return Panel(title, x_axis, Axis("Draws", "", limits), bands=tuple(bands))
+
+
+def draws_document(draws: Draws, case: str) -> dict[str, Any]:
+    """Return the verdicts on the stages drawn, with the joint as given, locked or free."""
+    fates = draws.fates[case]
+    return {
+        "count": draws.sample.count,
+        "seed": draws.seed,
+        "left_out": draws.sample.left_out,
+        "hunts": asdict(fates.share(("hunts",))),
+        "attracting_cycle": asdict(fates.share(ATTRACTED)),
+        "criterion": VERDICT_CRITERION,
+        "verdicts": fates.counts,
+        "loop_unstable": int(fates.unstable.sum()),
+        "separation": fates.separations(draws.sample.keys),
+        "amplitude_m": _ends(fates.amplitudes),
+        "period_s": _ends(fates.periods),
+        "edge_hz": _ends(np.r_[draws.edges.low, draws.edges.high]) if draws.edges and case == "given" else None,
+    }
+
+
+def _ends(values: np.ndarray) -> list[float] | None:
+    """Return the least and the largest finite value; None if no value is finite."""
+    finite = values[np.isfinite(values)]
+    return [float(finite.min()), float(finite.max())] if finite.size else None

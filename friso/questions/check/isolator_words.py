@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from friso.hunting import SEARCH_LIMITS
 from friso.questions.check.margin_words import other_static_friction
@@ -33,3 +33,15 @@ def isolator_sentence(suggestion: Suggestion) -> str:
         f"to attract it down to {kept}. Its modulus margin would be {suggestion.margin:.2f}{low}. How soon moves "
         "settle on it was not computed: friso tune finds the best isolator and tells for which moves it holds."
     )
+
+
+def isolator_document(isolator: Suggestion) -> dict[str, Any]:
+    """Return the suggested isolator, and whether the stage settles on it."""
+    flat = isolator.stage.flat()
+    return {
+        "settles": isolator.settles,
+        "stiffness_n_per_m": flat["joint.stiffness"],
+        "stroke_m": flat["joint.stroke"],
+        "damping_ns_per_m": flat["joint.damping"],
+        "modulus_margin": isolator.margin,
+    }

@@ -282,13 +282,6 @@ def seconds(time: float) -> str:
     return with_unit(time, "s") if math.isfinite(time) else "never"
 
 
-def sentences(design: Design | UnfinishedDesign) -> list[str]:
-    """Return the verdicts on the design; if it is unfinished, what is decided so far."""
-    if isinstance(design, UnfinishedDesign):
-        return so_far(design)
-    return [sentence for _, sentence in headline(design)]
-
-
 def next_steps(design: Design | UnfinishedDesign, files: Sequence[Path]) -> list[str]:
     """Return the command that checks the design; empty if no file was written."""
     return [f"friso check {shell_word(str(files[0]))}"] if files else []

@@ -17,7 +17,7 @@ from friso.identification.method import Prediction, around, axis_of_all, check_p
 from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_usable
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface import inputs
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import (
     LOGGER,
     Changes,
@@ -42,8 +42,7 @@ if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
     from friso.identification.method import Identification
     from friso.questions.check.question import CheckAnswer
-    from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
+    from friso.shown.pages import Report
 
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
@@ -73,29 +72,15 @@ class IdentifyAnswer(Answer):
         """Say that a model does not describe its log; empty if all do."""
         return "a model does not describe its log" if self.result.failed else ""
 
-    def sentences(self) -> Sequence[str]:
-        """Return what was identified, how well other logs are predicted, and notes.
+    @property
+    def subject(self) -> IdentifyAnswer:
+        """Return the answer itself, which has the logs and the predictions."""
+        return self
 
-        The sentences of a check follow, if the identified stage was checked.
-        """
-        from friso.questions.identify.words import sentences
-
-        verdicts = [] if self.checked is None else self.checked.sentences()
-        return [*sentences(self.result, self.predictions), *verdicts]
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return the table of estimates with their intervals."""
-        from friso.questions.identify.words import COLUMNS, estimate_rows
-
-        rows = [(first, rest) for first, *rest in (row.texts for row in estimate_rows(self.result))]
-        checked = [] if self.checked is None else self.checked.tables()
-        return [*([AnswerTable("", COLUMNS[1:], rows)] if rows else []), *checked]
-
-    def details(self) -> Sequence[str]:
-        """Return the experiments behind the estimates, and what was read."""
-        from friso.questions.identify.words import details
-
-        return details(self.result, self.inputs)
+    def page(self) -> Report:
+        """Return the page, named after the logs if there is no stage."""
+        page = super().page()
+        return page if self.result.stage else replace(page, name=", ".join(file.path.name for file in self.inputs))
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that checks the identified stage.
@@ -106,25 +91,6 @@ class IdentifyAnswer(Answer):
             return []
         draws = " --draws 1000" if self.result.stage.uncertain() else ""
         return [f"friso check {shell_word(str(files[0]))}{draws}"]
-
-    def figures(self) -> Sequence[Figure]:
-        """Return the figures of logs beside what the models predict."""
-        from friso.questions.identify.figures import identify_figures
-
-        return identify_figures(self.result, self.predictions)
-
-    def document(self) -> dict[str, Any]:
-        """Return estimates, experiments and logs as a document."""
-        from friso.questions.identify.document import identify_document
-
-        document = identify_document(self.result, self.inputs, self.predictions)
-        return document if self.checked is None else {**document, "check": self.checked.document()}
-
-    def files(self) -> Files:
-        """Return the stage file, the correlations, the page and the figures."""
-        from friso.questions.identify.page import identify_files
-
-        return identify_files(self.result, self.inputs, self.predictions)
 
 
 @question

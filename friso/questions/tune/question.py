@@ -66,7 +66,7 @@ class TuneAnswer(Answer):
         There are none if `friso design` does not know the controller.
         """
         from friso.design_method.prepare import check_designable
-        from friso.questions.tune.page import NOT_SURE, OF_LEAVES
+        from friso.questions.tune.blocks import NOT_SURE, OF_LEAVES
 
         try:
             check_designable(self.result.stage)

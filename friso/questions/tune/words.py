@@ -15,15 +15,12 @@ from friso.design_method.geometry import Geometry
 from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at
-from friso.interface.answer import AnswerTable
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
-from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
-from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.remedies.catalogue import BANDWIDTH
 from friso.remedies.least import ChangeSize
 from friso.remedies.machines import Goal
@@ -571,18 +568,3 @@ def assumptions(tuning: Advice) -> list[str]:
     if machines.left_out:
         lines.append(f"{machines.left_out} draws that no stage may have were replaced by others.")
     return lines
-
-
-def sentences(tuning: Advice) -> list[str]:
-    """Return what to change, what it brings and costs, and why other remedies do not work."""
-    return [*answer(tuning), *failing(tuning)]
-
-
-def tables(tuning: Advice) -> list[AnswerTable]:
-    """Return the table in which remedies and the stage as it is stand side by side."""
-    return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]
-
-
-def details(tuning: Advice) -> list[str]:
-    """Return gains for drives, what matters most, and assumptions."""
-    return [*gain_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)]

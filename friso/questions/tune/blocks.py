@@ -1,14 +1,80 @@
-"""Build the JSON document of `friso tune`."""
+"""Give the blocks of `friso tune`, and a stage file for every remedy."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
+from pathlib import Path
 from typing import Any
 
-from friso.questions.tune.words import answer, changes, failing, unsure_why, why_unmet
+from friso.questions.tune.figures import tune_figures
+from friso.questions.tune.gain_words import gain_lines
+from friso.questions.tune.sensitivity_words import sensitivity_sentences
+from friso.questions.tune.words import COLUMNS, answer, assumptions, changes, failing, rows, unsure_why, why_unmet
 from friso.remedies.method import Advice
 from friso.remedies.verified import Performance, RemedyOutcome
+from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
+from friso.shown.files import Content
+from friso.stage import Stage
+from friso.stage.correlations import correlations_file, correlations_text
+
+NOT_SURE, LARGE_MOVES = "-not-sure", "-for-large-moves"
+"""Suffixes of stage files whose remedies are not sure to work, or work for large moves only."""
+
+OF_LEAVES = "-of-leaf-springs"
+"""Suffix of stage files with joints made of leaf springs."""
+
+
+def basis(tuning: Advice) -> str:
+    """Name the seed of the machines."""
+    return f", seed {tuning.seed}"
+
+
+def blocks(tuning: Advice) -> list[AnswerBlock]:
+    """Return the blocks: what to change, what does not work, and everything behind that."""
+    behind = {
+        "The numbers to type in, in the terms of drives (friso export gains)": gain_lines(tuning),
+        "What matters for the edge of hunting": sensitivity_sentences(tuning),
+        "What is assumed, and how machines were drawn": assumptions(tuning),
+    }
+    return [
+        AnswerBlock(
+            title=tuning.stage.name,
+            sentences=answer(tuning),
+            columns=COLUMNS,
+            rows=rows(tuning),
+            draw=partial(tune_figures, tuning),
+            numbers=partial(tune_document, tuning),
+        ),
+        AnswerBlock(title="What does not work, and why", sentences=failing(tuning)),
+        *(AnswerBlock(title=title, details=texts, behind=True) for title, texts in behind.items()),
+    ]
+
+
+def further_files(tuning: Advice) -> dict[str, Content]:
+    """Return a stage file for every remedy with settings; unsure ones have names that say so."""
+    files: dict[str, Content] = {}
+    for outcome in tuning.outcomes:
+        if outcome.stage is None:
+            continue
+        slug = outcome.remedy.name.replace(",", "").replace(" ", "-")
+        unsure = {"works": "", "large moves": LARGE_MOVES}.get(outcome.certainty, NOT_SURE)
+        files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
+    least = tuning.least
+    return {**_stage_file(tuning, "tuned.toml", least.stage if least else None), **files}
+
+
+def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Content]:
+    """Return a stage file and the correlations of its uncertain keys; None removes an old file."""
+    beside = correlations_file(Path(name)).name
+    if stage is None:
+        return {name: None, beside: None}
+    correlations = tuning.correlations.among(stage.uncertain())
+    return {
+        name: tuning.complete(stage).to_toml(),
+        beside: correlations_text(correlations, stage) if correlations.keys else None,
+    }
 
 
 def tune_document(tuning: Advice) -> dict[str, Any]:

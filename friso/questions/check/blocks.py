@@ -1,0 +1,102 @@
+"""Give the blocks of a check: the cases, an isolator, the machines drawn, and other friction laws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from friso.hunting.criteria import PEAK_RULE
+from friso.questions.check.cases import case_document, rows, rows_behind
+from friso.questions.check.draws import draws_document, draws_figure, draws_rows, draws_sentences
+from friso.questions.check.figures import check_figures
+from friso.questions.check.isolator_words import isolator_document, isolator_sentence
+from friso.questions.check.laws import laws_columns, laws_document, laws_rows, laws_sentences
+from friso.questions.check.margin_words import joint_sentences
+from friso.questions.check.words import activity_sentences, answer, between_surveyed, details_of
+from friso.shown.blocks import AnswerBlock
+from friso.shown.cases import case_labels, shown_cases
+from friso.shown.documents import plain_json
+from friso.shown.motion_words import motion_sentences
+from friso.stage.rig import left_out
+from friso.stage.tables import passive_where
+
+if TYPE_CHECKING:
+    from friso.questions.check.question import CheckAnswer
+
+
+def basis(check: CheckAnswer) -> str:
+    """Say how accurately the cases were simulated, and by which criteria they are judged."""
+    tolerances = sorted({f"{case.solver.rtol:g}" for case in check.result.values()})
+    return (
+        f", relative tolerance {', '.join(tolerances)}. The verdict is by everything that attracts the stage. Peaks "
+        f"are counted beside it: maxima of the position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2). Settling "
+        "times count from the last corner of the reference; where it stands at several places, the longest"
+    )
+
+
+def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
+    """Yield the blocks: first how probable hunting is, where machines were drawn, and then the verdicts."""
+    stage, cases = check.stage, shown_cases(check.result)
+    if check.draws:
+        yield AnswerBlock(sentences=draws_sentences(check.draws))
+    elif check.cut:
+        yield AnswerBlock(sentences=["Interrupted: no stages were drawn yet."])
+    notes = filter(None, [stage.controller.note(stage.flat()), stage.note])
+    omitted = left_out(stage)
+    yield AnswerBlock(
+        title=stage.name,
+        sentences=[*answer(check.result), *motion_sentences(stage), *notes],
+        colours=[item.colour for item in cases],
+        columns=cases,
+        rows=rows(cases),
+        details=[*details_of(check.result), *([f"{omitted}."] if omitted else [])],
+        draw=lambda: check_figures(check.traced),
+        numbers=partial(_cases_document, check),
+    )
+    if suggested := check.isolator:
+        yield AnswerBlock(
+            sentences=[isolator_sentence(suggested)],
+            numbers=lambda: {"isolator": plain_json(isolator_document(suggested))},
+        )
+    if draws := check.draws:
+        yield AnswerBlock(
+            title=f"{draws.sample.count} stages drawn from the uncertain keys, seed {draws.seed}",
+            columns=[*case_labels(draws.stage).values()],
+            rows=draws_rows(draws),
+            draw=lambda: [draws_figure(draws)],
+            numbers=lambda: plain_json(
+                {"cases": {name: {"draws": draws_document(draws, name)} for name in check.result}}
+            ),
+        )
+    if laws := check.laws:
+        yield AnswerBlock(
+            title="Across friction laws",
+            sentences=laws_sentences(laws),
+            columns=laws_columns(laws),
+            rows=laws_rows(laws),
+            numbers=lambda: plain_json({"laws": laws_document(laws)}),
+        )
+    yield AnswerBlock(
+        title="How that was computed",
+        columns=cases,
+        rows=rows_behind(cases),
+        behind=True,
+        long_details=lambda: [
+            *between_surveyed(check.result),
+            *joint_sentences(check.joint_margins),
+            *activity_sentences(passive_where(stage.flat())),
+        ],
+    )
+
+
+def _cases_document(check: CheckAnswer) -> dict[str, Any]:
+    """Return the verdicts as given, with the joint locked and free."""
+    return plain_json(
+        {
+            "conclusion": " ".join(answer(check.result)),
+            "stage": check.stage.name,
+            "friction_passive_where": passive_where(check.stage.flat()) or None,
+            "cases": {name: case_document(case) for name, case in check.result.items()},
+        }
+    )
