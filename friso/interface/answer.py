@@ -67,49 +67,18 @@ _SHOWN = {
 
 
 def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) -> Callable[..., Returned]:
-    """Wrap a method of an answer so that it speaks in the units of the answer's axis."""
+    """Wrap a method of an answer so that it speaks in the units of the answer's axis, and makes blocks only once."""
 
     @wraps(method)
     def shown(answer: Answer, *arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
         with speaking_of(answer.axis_kind):
-            return method(answer, *arguments, **options)
+            if method.__name__ != "blocks":
+                return method(answer, *arguments, **options)
+            if "_blocks" not in vars(answer):
+                vars(answer)["_blocks"] = method(answer, *arguments, **options)
+            return vars(answer)["_blocks"]
 
     return shown
-
-
-def _sentences_under_condition(method: Callable[[Any], Sequence[str]]) -> Callable[[Any], Sequence[str]]:
-    """Wrap the sentences of an answer so that the first one states the condition under which they hold."""
-
-    @wraps(method)
-    def shown(answer: Answer) -> Sequence[str]:
-        sentences, condition = method(answer), answer.condition
-        return [condition + sentences[0], *sentences[1:]] if condition and sentences else sentences
-
-    return shown
-
-
-def _document_under_condition(method: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:
-    """Wrap the document of an answer so that it, and its conclusion, state the condition under which they hold."""
-
-    @wraps(method)
-    def shown(answer: Answer) -> dict[str, Any]:
-        document, condition = method(answer), answer.condition
-        if not condition:
-            return document
-        said = document.get("conclusion", "")
-        conclusion = {"conclusion": said if said.startswith(condition) else condition + said} if said else {}
-        return {**document, **conclusion, "condition": condition.removesuffix(": ")}
-
-    return shown
-
-
-_CONDITIONAL = {"sentences": _sentences_under_condition, "document": _document_under_condition}
-"""Wrappers of the methods that state the condition under which an answer holds, by the method's name."""
-
-
-def _shown(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a method by which an answer is shown, called `name`."""
-    return _in_its_units(_CONDITIONAL[name](method) if name in _CONDITIONAL else method)
 
 
 class Answer:
@@ -119,9 +88,8 @@ class Answer:
     function `blocks` in the folder of its question makes them, in the module `blocks` or `words`. Further functions
     there are optional: `basis` says how all was computed, `further_files` returns files beside the page, `page_values`
     what a template of the question's own names, and `next_steps` what to do next. Each takes the `subject`. `result` is
-    what the analysis returned.
-    Attributes and items that the answer lacks are taken from the result, so that ``cases["given"]`` is a case of
-    `friso.check` and ``runs.outcome`` a variable of `friso.sweep`.
+    what the analysis returned. Attributes and items that the answer lacks are taken from the result, so that
+    ``cases["given"]`` is a case of `friso.check` and ``runs.outcome`` a variable of `friso.sweep`.
 
     Attributes
     ----------
@@ -152,7 +120,7 @@ class Answer:
         """Make all methods that show an answer use the units of its axis."""
         cls.package = cls.__module__.rpartition(".")[0]
         for name in _SHOWN & vars(cls).keys():
-            setattr(cls, name, _shown(name, vars(cls)[name]))
+            setattr(cls, name, _in_its_units(vars(cls)[name]))
 
     templates: ClassVar[str] = "friso.shown"
     """Package whose folder `templates` may have a template for the page of the question."""
@@ -220,14 +188,13 @@ class Answer:
         return otherwise
 
     def blocks(self) -> Sequence[AnswerBlock]:
-        """Return the parts of the answer, the conclusion first; they are made once."""
-        if "_blocks" not in vars(self):
-            self._blocks = [*self._shown_by("blocks", ())]
-        return self._blocks
+        """Return the parts of the answer, the conclusion first."""
+        return [*self._shown_by("blocks", ())]
 
     def sentences(self) -> Sequence[str]:
-        """Return the answer in words, the conclusion first."""
-        return [sentence for block in self.blocks() for sentence in block.sentences]
+        """Return the answer in words, the conclusion first, after the condition under which it holds."""
+        sentences = [sentence for block in self.blocks() for sentence in block.sentences]
+        return [self.condition + sentences[0], *sentences[1:]] if sentences else []
 
     def tables(self) -> Sequence[AnswerBlock]:
         """Return the blocks that have small tables, with the numbers behind the answer as texts."""
@@ -246,10 +213,15 @@ class Answer:
         return [figure for block in self.blocks() for figure in block.figures]
 
     def document(self) -> dict[str, Any]:
-        """Return the JSON document of the command: the numbers of all blocks."""
+        """Return the JSON document of the command: the numbers of all blocks, and the condition if there is one."""
         from friso.shown.documents import merged
 
-        return merged(block.numbers() for block in self.blocks())
+        document, condition = merged(block.numbers() for block in self.blocks()), self.condition
+        if not condition:
+            return document
+        said = document.get("conclusion", "")
+        conclusion = {"conclusion": said if said.startswith(condition) else condition + said} if said else {}
+        return {**document, **conclusion, "condition": condition.removesuffix(": ")}
 
     def page(self) -> Report:
         """Return the page that shows the answer."""
@@ -414,7 +386,7 @@ class Answer:
 
 
 for _name in _SHOWN:
-    setattr(Answer, _name, _shown(_name, getattr(Answer, _name)))
+    setattr(Answer, _name, _in_its_units(getattr(Answer, _name)))
 
 
 def _html_table(table: AnswerBlock) -> str:
