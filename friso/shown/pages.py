@@ -10,7 +10,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from importlib import resources
-from types import MappingProxyType
 from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
@@ -22,7 +21,7 @@ from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.images import ON_PAGE, draw_beforehand, image
 from friso.shown.drawing.prefixes import listed
-from friso.shown.files import Content, Files, pictures
+from friso.shown.files import Content, pictures
 from friso.shown.glossary import Glossary
 from friso.stage import Stage
 from friso.stage.foreign import foreign
@@ -76,13 +75,13 @@ class Report:
         """Return the figures of all blocks."""
         return [figure for block in self.blocks for figure in block.figures]
 
-    def files(self, beside: Files = MappingProxyType({})) -> dict[str, Content]:
-        """Return the page, files `beside` it, and every figure in all formats, by file name.
+    def files(self) -> dict[str, Content]:
+        """Return the page, and every figure in all formats, by file name.
 
         The page has the name of the command's question.
         """
         images = pictures(self.figures)  # other processes draw them while the page is written
-        return {f"{self.command.partition(' ')[0]}.html": self.html(), **beside, **images}
+        return {f"{self.command.partition(' ')[0]}.html": self.html(), **images}
 
     def html(self) -> str:
         """Return the page, which opens offline and prints; every run gives the same bytes."""

@@ -16,7 +16,6 @@ from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.virtual_rig.run import as_built_keys
 
 if TYPE_CHECKING:
-    from friso.shown.files import Files
     from friso.shown.pages import Report
 
 LEAST_DELAY = 4
@@ -35,12 +34,6 @@ class RigAnswer(Answer):
     def page(self) -> Report:
         """Return the page of the experiment."""
         return replace(super().page(), command=f"rig {self.result.experiment}")
-
-    def files(self) -> Files:
-        """Return the page, its figures, the logs, and the truth behind them."""
-        from friso.questions.rig.log_files import further_files
-
-        return self.page().files(further_files(self.result))
 
 
 @question

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 from friso.questions.rig.outcome_view import view_of
-from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.figure import Figure
 from friso.studies.rig.outcome import Outcome
@@ -31,34 +29,6 @@ def _failures(outcome: Outcome) -> list[str]:
         f"{len(names)} of {len(outcome.logs)} logs stopped early: {reason} ({', '.join(names)})."
         for reason, names in by_reason.items()
     ]
-
-
-def blocks(outcome: Outcome) -> list[AnswerBlock]:
-    """Return the blocks of the answer: the results, and the logs with the seeds of their noise."""
-    return [
-        AnswerBlock(
-            title=outcome.stage.name,
-            sentences=sentences(outcome),
-            details=[f"seed of the noise: {outcome.seed}", *(f"note: {note}" for note in outcome.notes)],
-            draw=partial(rig_figures, outcome),
-            numbers=partial(rig_document, outcome),
-        ),
-        AnswerBlock(
-            title="The logs",
-            columns=("Kind", "Seed", "Sample time", "Ended"),
-            rows=[
-                (log.name, [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"])
-                for log in outcome.logs
-            ],
-            behind=True,
-        ),
-    ]
-
-
-def basis(outcome: Outcome) -> str:
-    """Say on what the experiment ran, and how many logs it wrote."""
-    logs = f"{len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}"
-    return f" on a drive as built, seed {outcome.seed}; {logs}"
 
 
 def rig_document(outcome: Outcome) -> dict[str, Any]:

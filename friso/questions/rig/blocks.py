@@ -1,4 +1,4 @@
-"""Write the logs of an experiment of the rig."""
+"""Give the blocks of `friso rig`, and write the logs of an experiment."""
 
 from __future__ import annotations
 
@@ -10,9 +10,39 @@ import numpy as np
 
 from friso.axis import LINEAR, unit_shown
 from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
+from friso.questions.rig.words import rig_document, rig_figures, sentences
+from friso.shown.blocks import AnswerBlock
 from friso.shown.files import Content
 from friso.stage import Stage
 from friso.studies.rig.outcome import Outcome, RigLog
+
+
+def blocks(outcome: Outcome) -> list[AnswerBlock]:
+    """Return the blocks of the answer: the results, and the logs with the seeds of their noise."""
+    return [
+        AnswerBlock(
+            title=outcome.stage.name,
+            sentences=sentences(outcome),
+            details=[f"seed of the noise: {outcome.seed}", *(f"note: {note}" for note in outcome.notes)],
+            draw=partial(rig_figures, outcome),
+            numbers=partial(rig_document, outcome),
+        ),
+        AnswerBlock(
+            title="The logs",
+            columns=("Kind", "Seed", "Sample time", "Ended"),
+            rows=[
+                (log.name, [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"])
+                for log in outcome.logs
+            ],
+            behind=True,
+        ),
+    ]
+
+
+def basis(outcome: Outcome) -> str:
+    """Say on what the experiment ran, and how many logs it wrote."""
+    logs = f"{len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}"
+    return f" on a drive as built, seed {outcome.seed}; {logs}"
 
 
 def further_files(outcome: Outcome) -> dict[str, Content]:
