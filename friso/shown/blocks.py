@@ -45,8 +45,8 @@ class AnswerBlock:
     text: str = ""
     """Drawing or file as text for a fixed-width font."""
 
-    svg: str = ""
-    """Drawing as SVG, which the page alone shows."""
+    svg: Callable[[], str] = str
+    """Function that makes a drawing as SVG, which the page alone shows."""
 
     columns: Sequence[str | ColouredLabel] = ()
     rows: Sequence[tuple[str, Sequence[str]]] = ()

@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.hunting import Diagram, Meeting, Plane
-from friso.questions.boundary.figures import boundary_figure
 from friso.questions.boundary.words import ShownKey, conclusion, sentences
-from friso.questions.map.places import SHOWN, with_places
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
-from friso.shown.drawing.figure import Figure
 from friso.studies import boundary
 from friso.studies.boundary import Line, lines
 
 if TYPE_CHECKING:
     from friso.questions.boundary.question import BoundaryAnswer
+    from friso.shown.drawing.figure import Figure
 
 
 def blocks(answer: BoundaryAnswer) -> list[AnswerBlock]:
@@ -38,6 +36,9 @@ def blocks(answer: BoundaryAnswer) -> list[AnswerBlock]:
 
 def _figure(answer: BoundaryAnswer) -> Figure:
     """Draw the branches of cycles, or the curves on which hunting ends with the place of the stage between them."""
+    from friso.questions.boundary.figures import boundary_figure  # 0.9 s to import
+    from friso.questions.map.places import SHOWN, with_places
+
     figure = boundary_figure(answer.result, answer.keys, answer.stage.name, answer.condition)
     if isinstance(answer.result, Plane):
         return with_places(figure, [(SHOWN, answer.stage)], [key.key for key in answer.keys])

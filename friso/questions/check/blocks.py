@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from friso.hunting.criteria import PEAK_RULE
 from friso.questions.check.cases import case_document, rows, rows_behind
 from friso.questions.check.draws import draws_document, draws_figure, draws_rows, draws_sentences
-from friso.questions.check.figures import check_figures
 from friso.questions.check.isolator_words import isolator_document, isolator_sentence
 from friso.questions.check.laws import laws_columns, laws_document, laws_rows, laws_sentences
 from friso.questions.check.margin_words import joint_sentences
@@ -23,6 +22,7 @@ from friso.stage.tables import passive_where
 
 if TYPE_CHECKING:
     from friso.questions.check.question import CheckAnswer
+    from friso.shown.drawing.figure import Figure
 
 
 def basis(check: CheckAnswer) -> str:
@@ -51,7 +51,7 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
         columns=cases,
         rows=rows(cases),
         details=[*details_of(check.result), *([f"{omitted}."] if omitted else [])],
-        draw=lambda: check_figures(check.traced),
+        draw=partial(_figures, check),
         numbers=partial(_cases_document, check),
     )
     if suggested := check.isolator:
@@ -88,6 +88,13 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
             *activity_sentences(passive_where(stage.flat())),
         ],
     )
+
+
+def _figures(check: CheckAnswer) -> Sequence[Figure]:
+    """Draw motion and hunting cycles of all cases."""
+    from friso.questions.check.figures import check_figures  # 0.7 s to import
+
+    return check_figures(check.traced)
 
 
 def _cases_document(check: CheckAnswer) -> dict[str, Any]:

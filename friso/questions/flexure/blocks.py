@@ -34,7 +34,7 @@ def blocks(flexure: BothModels) -> list[AnswerBlock]:
         title=flexure.stage.name,
         sentences=sentences(flexure),
         colours=[GREEN, *(VERMILLION for _ in warnings(flexure))],
-        svg=_drawing(flexure),
+        svg=partial(_drawing, flexure),
         columns=[Category(name, COLOURS[name]) for name in flexure.models],
         rows=rows(flexure),
         draw=partial(flexure_figures, flexure),
