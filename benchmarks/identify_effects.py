@@ -308,9 +308,7 @@ def outcome(family: str, seed: int) -> Outcome:
     machine, result = Effects(**numbers), Outcome(family, seed)
     begin = time.process_time()
     try:
-        identified = KIND.analyse(
-            [log := simulated(machine, rng)], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN
-        )
+        identified = KIND.analyse([log := simulated(machine, rng)], Prior(KIND.around(log)), NOTHING_CHOSEN)
     except InputError as error:
         result.refused = f"{error.actual}; {error.expected}"
         return result

@@ -8,7 +8,7 @@ moments of inertia for masses, in unchanged equations. Every text of a unit come
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
@@ -24,14 +24,15 @@ LENGTH, FORCE, MASS = "m", "N", "kg"
 class AxisKind:
     """A kind of axis: its name, and its units in place of metre, newton and kilogram.
 
-    `per_ampere` is the force or torque of the motor per ampere [N, or N m], if it is known. Forces may then be written
-    in amperes.
+    `effort` is what its actuator exerts, in words. `per_ampere` is the force or torque of the motor per ampere [N, or
+    N m], if it is known. Forces may then be written in amperes.
     """
 
     name: str
     length: str = LENGTH
     force: str = FORCE
     mass: str = MASS
+    effort: str = "force"
     per_ampere: float | None = field(default=None, compare=False)
 
     @property
@@ -43,6 +44,10 @@ class AxisKind:
     def plain(self) -> bool:
         """Tell whether its units are those of a linear axis, in which everything is declared."""
         return (self.length, self.force) == (LENGTH, FORCE)
+
+    def named(self, texts: Iterable[str]) -> list[str]:
+        """Return names of quantities with what the actuator of this axis exerts in place of {effort}."""
+        return [text.format(effort=self.effort) for text in texts]
 
     def per(self, unit: str) -> AxisKind:
         """Return this axis with forces in the unit in which they were logged, such as amperes.
@@ -98,7 +103,7 @@ def _in_key(unit: str) -> str:
 
 
 LINEAR = AxisKind("linear")
-ROTARY = AxisKind("rotary", "rad", "N*m", "kg*m^2")
+ROTARY = AxisKind("rotary", "rad", "N*m", "kg*m^2", "torque")
 KINDS: Mapping[str, AxisKind] = {kind.name: kind for kind in (LINEAR, ROTARY)}
 
 

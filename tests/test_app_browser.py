@@ -693,7 +693,7 @@ def test_where_the_server_fails_it_can_be_asked_again(browsed: Browsed, tmp_path
 def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browsed: Browsed) -> None:
     page, slider = browsed.page, '[data-path="controller.crossover"] input[type=range]'
     page.click("#tab-bode")
-    said = "() => document.getElementById('picture').innerText.includes('How fast this controller can be')"
+    said = "() => document.getElementById('picture').innerText.includes('the loop is stable')"
     page.wait_for_function(said)
     with page.expect_response(re.compile("ask/loops")):
         page.eval_on_selector(slider, "one => { one.value = 300; one.dispatchEvent(new Event('input')); }")

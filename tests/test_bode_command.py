@@ -21,13 +21,14 @@ import friso
 from friso.frequency.bode import Bode, Unstable, bode
 from friso.interface.output_folder import MARKER
 from friso.questions.bode.blocks import bode_document
-from friso.questions.bode.figures import bode_figures, phases
+from friso.questions.bode.figures import bode_figures
 from friso.questions.bode.numbers import rows
 from friso.questions.bode.states import shown_states
-from friso.questions.bode.words import caveats, crossovers, sentences, stability
+from friso.questions.bode.words import details, sentences
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Band, Figure, Panel, Series
+from friso.shown.drawing.phases import phases
 from friso.stage import Stage
 
 command = command_of("bode")
@@ -196,7 +197,7 @@ def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode, sna
     assert document["cases"]["stuck"]["phase_margin_deg"] is None
     assert document["worst_settled"]["stable"]
     assert document["unstable_speeds_m_per_s"] == []
-    texts = sentences(emps)
+    texts = [*sentences(emps), *details(emps)]
     assert "20.4 N" in " ".join(texts)
     assert "crossover" not in " ".join(texts)
     snapshots.check("bode", "gains", "\n".join(texts))
@@ -208,8 +209,7 @@ def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> N
     assert document["worst"]["at"] == {"bias_n": 0.0, "speed_m_per_s": 0.0, "limiter": None, "forward": True}
     assert document["limits"].keys() == {"given"}
     assert [item.label for item in shown_states(rigid)] == ["As given"]
-    (texts,) = stability(rigid)
-    assert "0.73" in texts
+    assert "0.73" in sentences(rigid)[0]
     figures = _figures(rigid)
     assert [*figures] == ["bode_plant", "bode_loop", "bode_nyquist", "bode_sensitivity"]
     assert not figures["bode_sensitivity"].panels[0].bands
@@ -233,12 +233,12 @@ def test_an_unstable_loop_is_a_plain_statement(unstable: Bode, snapshots: Snapsh
     labels = [line.label for line in figures["bode_loop"].panels[0].series]
     assert labels[:3] == ["Stuck (unstable)", "Sliding (unstable)", "Stuck, limiter touched"]
     assert all(line.label.endswith("(unstable)") for line in figures["bode_speeds"].panels[0].series)
-    settled, where, why = stability(unstable)
-    for text, words in ((settled, ("8.00 Hz", "64.4 ms", "9.26 Hz")), (where, ("stuck", "1.60 µm/s", "1.60 m/s"))):
-        assert [word for word in words if word not in text] == []
+    first, why, fast = sentences(unstable)
+    assert [word for word in ("8.00 Hz", "64.4 ms", "9.26 Hz") if word not in first] == []
+    assert [word for word in ("stuck", "any speed") if word not in details(unstable)[0]] == []
     assert "Stribeck" not in why
-    assert caveats(unstable) == []
-    snapshots.check("bode", "unstable", "\n".join([settled, where, why, crossovers(unstable)["free"]]))
+    assert "stage file" not in fast
+    snapshots.check("bode", "unstable", "\n".join([first, why, fast]))
 
 
 # ---------------------------------------------------------------- what is said
@@ -267,22 +267,22 @@ def _but(response: Bode, **other: Any) -> Bode:
 def test_friction_that_rises_is_not_blamed(response: Bode) -> None:
     assert all(item.falling for item in response.unstable)
     risen = _but(response, unstable=(Unstable(1e-2, 1.0, False, True, falling=False),))
-    assert not any("Stribeck" in sentence for sentence in stability(risen))
-    assert any("Stribeck" in sentence for sentence in stability(response))
+    assert not any("Stribeck" in sentence for sentence in sentences(risen))
+    assert any("Stribeck" in sentence for sentence in sentences(response))
 
 
 def test_the_state_that_is_lost_first_is_named(rig: Stage) -> None:
     """Tuned for too light a mass, the loop of a sliding cart is too slow for its integral action."""
-    text = crossovers(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
+    texts = details(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
     for joint, highest in (("locked", "8.41 Hz"), ("free", "5.92 Hz")):
-        assert text[joint].count(highest) == 2
-        assert "sliding fast" in text[joint].partition(highest)[2]
+        (text,) = (text for text in texts if text.startswith(f"Joint {joint}"))
+        assert "lost first: sliding fast" in text.partition(highest)[2]
 
 
 def test_what_the_stage_file_lacks_is_named(response: Bode, rig: Stage, snapshots: Snapshots) -> None:
-    (bare,) = caveats(response)
+    bare = sentences(response)[-1]
     assert [key for key in ("10.0 kHz", "drive.sample_time", "drive.delay") if key not in bare] == []
-    (sampled,) = caveats(_but(response, stage=rig.replace({"drive.sample_time": "50 us", "drive.delay": "0 s"})))
+    *_, sampled = sentences(_but(response, stage=rig.replace({"drive.sample_time": "50 us", "drive.delay": "0 s"})))
     assert "drive." not in sampled
     snapshots.check("bode", "caveats", f"{bare}\n{sampled}")
 

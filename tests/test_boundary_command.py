@@ -334,7 +334,7 @@ def test_where_curves_meet_and_end_is_told(met: Plane) -> None:
     expected += [f"together from {here} to", "near joint.stroke = 1.9 mm, controller.kp = 3.16228 N/m, where the first"]
     for sentence, words in zip(meeting_sentences(met, KEYS), expected, strict=True):
         assert words in sentence
-    assert conclusion(met, KEYS).endswith("Curves meet at 2 more places.")
+    assert conclusion(met, KEYS).endswith("There is 1 more curve.")
     assert "No two of the curves meet." in sentences(replace(met, meetings=()), KEYS)
 
 

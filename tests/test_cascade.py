@@ -382,7 +382,7 @@ def test_rig_hunting(whole: Stage) -> None:
         "rails": lambda machine: rails(machine)[:2],
     }
     with patched({rig_hunting: sizes}):
-        outcome = rig_hunting.run_experiment(whole, 1, silent)
+        outcome = rig_hunting.EXPERIMENT.run(whole, 1, silent)
     assert all(sentences(outcome))
 
 

@@ -14,11 +14,11 @@ import friso
 from friso.cli import main
 from friso.hunting import find_margin
 from friso.hunting.criteria import ATTRACTED, VERDICTS
-from friso.questions.check.draws import draws_document, draws_figure, draws_rows, draws_sentences
+from friso.questions.check.draws import draws_details, draws_document, draws_figure, draws_rows, draws_sentences
 from friso.shown.documents import plain_json
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Sample, draw
-from friso.studies.draws import DrawnEdges, Draws, Fates, different, edges, fates
+from friso.studies.draws import DrawnBandwidths, Draws, Fates, by_bandwidth, different, fates
 from friso.studies.settings import StudySettings
 
 pytestmark = pytest.mark.xdist_group("rig")
@@ -143,43 +143,73 @@ def test_ranges_of_what_hunts_are_told_first_with_what_narrows_them() -> None:
     swings = {"amplitudes": np.linspace(2.5e-4, 3e-4, count), "periods": np.linspace(1.4, 1.9, count)}
     words, stable = np.array(["hunts"] * count, dtype=object), np.zeros(count, bool)
     shown = draws(Fates(words, stable, **swings))
-    edges = DrawnEdges(np.array([17.0, np.nan]), np.array([18.5, np.nan]))
-    shown = replace(shown, sample=Sample(keys, count, 0, {}), edges=edges)
-    first, second = draws_sentences(shown)
-    for text in ("± 250 to 300 µm", "1.40 to 1.90 s", "17.0 to 18.5 Hz", "1 of 2"):
+    shown = replace(shown, sample=Sample(keys, count, 0, {}))
+    (first,) = draws_sentences(shown)
+    for text in ("± 250 to 300 µm", "1.40 to 1.90 s", "all of 30"):
         assert text in first
-    assert "measure friction.coulomb" in second
+    assert "measure friction.coulomb" in draws_details(shown)[0]
+    assert draws_document(shown, "given")["amplitude_m"] == [2.5e-4, 3e-4]
+
+
+def test_the_cure_holds_for_all_draws_over_a_step() -> None:
+    """A bandwidth at which none hunts, but one does a little above, is no cure; an uncertain draw counts as hunting."""
+    factors = np.array([0.8, 1.0, 1.1, 1.3, 1.4, 1.7, 2.2])
+    hunts = np.array([[1, 1, 1, 0, 0, 0, 0], [1, 1, 0, 0, np.nan, 0, 0], [0, 1, 0, 0, 0, 0, 0.0]])
+    tried = DrawnBandwidths(factors, hunts, 10.0)
+    assert tried.cure == (1.7, 2.2)
+    low, high = tried.edges
+    assert (low[0], high[0], low[2], high[2]) == (1.1, 1.3, 1.0, 1.1)
+    assert DrawnBandwidths(factors[:4], hunts[:, :4], 10.0).cure is None
+    shown = replace(draws(made(3, 0)), bandwidths={"given": tried})
     document = draws_document(shown, "given")
-    assert (document["amplitude_m"], document["edge_hz"]) == ([2.5e-4, 3e-4], [17.0, 18.5])
+    assert document["cure_hz"] == [17.0, 22.0]
+    assert document["edge_hz"] == [10.0, 13.0]
 
 
 @pytest.mark.parametrize("case", ["locked", "free"])
-def test_the_edge_stands_with_the_joint_as_given(rig: Stage, case: str) -> None:
-    """The drawn stages hunt with the joint locked, and do not with it free."""
+def test_each_case_has_its_own_bandwidths(rig: Stage, case: str) -> None:
+    """The drawn stages hunt with the joint locked, and do not with it free, which is a cure then."""
     stage = rig.replace({"joint.locked": case == "locked"})
     words = {"locked": "hunts", "free": "settles"}
     judged = {name: Fates(np.array([word] * 9, dtype=object), np.zeros(9, bool)) for name, word in words.items()}
     sample = Sample({"friction.coulomb": np.linspace(0.5, 1.5, 9)}, 9, 0, {})
-    edges = DrawnEdges(np.array([9.0]), np.array([10.0]))
-    shown = Draws(stage, sample, 0, {**judged, "given": judged[case]}, 9, edges)
-    lines = [line for line in draws_sentences(shown) if "9.00 to 10.0 Hz" in line]
-    assert [line.partition(",")[0].lower() for line in lines] == [f"{case} (as given)"]
+    factors = np.array([0.5, 1.0, 1.3, 2.0])
+    tried = {
+        "locked": DrawnBandwidths(factors, np.tile([1.0, 1.0, 0.0, 0.0], (9, 1)), 8.0),
+        "free": DrawnBandwidths(factors, np.tile([1.0, 0.0, 0.0, 0.0], (9, 1)), 8.0),
+    }
+    tried["given"], judged["given"] = tried[case], judged[case]
+    locked_says, free_says = draws_sentences(Draws(stage, sample, 0, judged, 9, tried))
+    assert "10.4 Hz or more" in locked_says
+    assert "free the joint" in locked_says
+    assert "4.00 Hz to 8.00 Hz" in free_says
+    assert "Cure" not in free_says
 
 
-def test_the_edge_of_every_draw_is_that_of_its_own_stage(rig: Stage) -> None:
-    """Each edge agrees with the margin of that stage alone, to the step between the bandwidths tried."""
+def test_bandwidths_of_draws_agree_with_the_margin_of_each_stage(rig: Stage) -> None:
+    """Each stage hunts up to its own edge; the cure lies beyond the farther one, by less than a coarse step."""
     stage = locked(rig, "8 Hz")
-    margin = friso.check(stage).result["given"].judgement.margin
     own = stage.flat()["friction.static"]
-    drawn_edges = edges(stage, Sample({"friction.static": np.array([own, 1.1 * own])}, 2, 0, {}), margin)
-    assert drawn_edges is not None
-    other = find_margin(stage.replace({"friction.static": f"{1.1 * own} N"}), True)
-    for row, alone in enumerate((margin, other)):
-        assert drawn_edges.low[row] <= 1.001 * alone.crossover
-        assert alone.crossover <= 1.001 * drawn_edges.high[row]
-    nowhere = edges(stage, Sample({"friction.static": np.array([own])}, 1, 0, {}), replace(margin, crossover=100.0))
-    assert nowhere is not None
-    assert np.isnan([*nowhere.low, *nowhere.high]).all()
+    tried = by_bandwidth(stage, Sample({"friction.static": np.array([own, 1.1 * own])}, 2, 0, {}))
+    assert tried is not None
+    margins = [find_margin(stage.replace({"friction.static": f"{share * own} N"}), True) for share in (1, 1.1)]
+    low, high = tried.edges
+    for row, alone in enumerate(margins):
+        assert 8 * low[row] <= 1.001 * alone.crossover
+        assert alone.crossover <= 1.001 * 8 * high[row]
+    assert tried.cure is not None
+    farther = max(one.crossover for one in margins)
+    assert farther / 1.001 < 8 * tried.cure[0] < 1.26 * farther
+
+
+def test_verdicts_that_hang_on_uncertain_keys_are_not_certain(rig: Stage) -> None:
+    """Static friction on both sides of an edge: the headline says may, and names the key."""
+    stage = locked(rig, "8 Hz").replace({"friction.static": "1.2 N .. 3 N", "unknown": "friction.static"})
+    answer = friso.check(stage, draws=24)
+    assert answer.draws.split("given")
+    assert not answer["given"].judgement.hunting.certain
+    assert "may hunt" in answer.sentences()[0]
+    assert "friction.static, which nobody measured" in answer.sentences()[0]
 
 
 def test_document_rows_and_sentences() -> None:
@@ -194,14 +224,17 @@ def test_document_rows_and_sentences() -> None:
     assert rows["Verdict hunts"] == ["6"]
     assert rows["Decided by friction.coulomb"] == ["-1.00"]
     says = " ".join(draws_sentences(shown))
-    assert "of 10 draws, hunts with a probability of 66.7 % (26.2 to 93.3 %)" in says
-    for words in ("1 undecided", "friction.coulomb matters most (-1.00): smaller", "5 invalid draws", "3: a rule"):
+    assert "may hunt: 66.7 % (26.2 to 93.3 %) of 10 machines" in says
+    for words in ("1 of them not for certain", "friction.coulomb: smaller"):
         assert words in says
+    details = " ".join(draws_details(shown))
+    for words in ("5 invalid draws", "3: a rule"):
+        assert words in details
     assert "unstable" not in says
     lost = draws(made(6, 3, unstable=2))
     text = draws_sentences(lost)[0]
     assert "2 of 9" in text
-    assert text.index("unstable") < text.index("hunts")
+    assert text.index("unstable") < text.index("may hunt")
     assert draws_document(lost, "given")["loop_unstable"] == 2
     unknown = plain_json(draws_document(draws(made(0, 0, 3)), "given"))
     assert unknown["hunts"] == {"probability": None, "low": 0.0, "high": 1.0}
@@ -244,7 +277,7 @@ def test_check_draws(
     assert sum(draws["verdicts"].values()) == 8
     assert draws["attracting_cycle"]["probability"] == 0
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "8 draws" in page
+    assert "none of 8 machines" in page
     beside.write_text('keys = ["masses.cart"]\nmatrix = [[1]]')
     assert run(monkeypatch, "check", path, *options) == 2
     assert "masses.cart" in rows_of(capsys.readouterr().err)["given"]

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from friso.app.uploads import Uploads
 from friso.app.work import Work
 from friso.cli.app import main
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.kinds import KINDS, in_order
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import FORMATS, LogFormat
@@ -28,14 +29,13 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.read import file_format, read_table
 from friso.interface.question import HUNTS, QUESTIONS
 from friso.progress import Progress
-from friso.questions.identify.kind_view import VIEWS, KindView
 from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.studies.metric import METRICS, MapFinding, Metric, Word
-from friso.studies.rig.experiments import RIG_EXPERIMENTS
+from friso.studies.rig.experiments import RIG_EXPERIMENTS, RigExperiment
 from friso.studies.rig.outcome import Outcome, RigLog
 
 ROOT = Path(__file__).parents[1]
@@ -50,33 +50,40 @@ class Hold:
     force: np.ndarray
 
 
-def analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Hold:
-    (log,) = logs
-    assert isinstance(log, Log)
-    force = np.abs(log["force"])
-    top = float(force.max())
-    return Hold(Estimate.unknown("friction.static", "N", "holds", "it holds", top), log.time, log["force"])
+class HoldKind(ExperimentKind[Hold]):
+    title = "Hold"
+    after = ("moves",)
+
+    def analyse_log(self, log: Log, prior: Prior, settings: AnalysisSettings) -> Hold:
+        top = float(np.abs(log["force"]).max())
+        return Hold(Estimate.unknown("friction.static", "N", "holds", "it holds", top), log.time, log["force"])
+
+    def estimates(self, result: Hold, stage: Stage | None) -> tuple[Estimate, ...]:
+        return (result.least,)
 
 
-def figures(hold: Hold, logs: Sequence[Source], name: str) -> list[Figure]:
-    lines = (Series(hold.time, hold.force, "force", "#000000"),)
-    return [Figure(f"{name}_force", "Forces held", "Held.", (Panel("", Axis("Time", "s"), Axis("Force", "N"), lines),))]
+class HeldForce(HoldKind):
+    """A kind of experiment that says by itself how it is shown."""
+
+    title = "Held force"
+
+    def facts(self, result: Hold) -> Facts:
+        return (("Held", f"{result.least.low:.3g} N"),)
+
+    def numbers(self, result: Hold) -> dict[str, Any]:
+        return {"held_n": result.least.low}
+
+    def figures(self, result: Hold, logs: Sequence[Source], name: str) -> list[Figure]:
+        panel = Panel("", Axis("Time", "s"), Axis("Force", "N"), (Series(result.time, result.force, "", "#000000"),))
+        return [Figure(f"{name}_force", "Forces held", "Held.", (panel,))]
 
 
-KIND = ExperimentKind[Hold](analyse, lambda hold, stage: (hold.least,), after=("moves",))
-VIEW = KindView[Hold](
-    "Held force",
-    lambda hold: (("Held", f"{hold.least.low:.3g} N"),),
-    lambda hold: {"held_n": hold.least.low},
-    figures,
-    warnings=lambda hold: (),
-)
-
-
-def push(stage: Stage, seed: int, progress: Progress) -> Outcome:
+class Push(RigExperiment):
     """An experiment of the rig: nothing moves."""
-    logged = {"position": np.zeros(100), "force": np.full(100, float(seed))}
-    return Outcome("push", stage, seed, (RigLog("pushed", "hold", 1e-3, logged, logged, stage, seed),), None)
+
+    def run(self, stage: Stage, seed: int, progress: Progress) -> Outcome:
+        logged = {"position": np.zeros(100), "force": np.full(100, float(seed))}
+        return Outcome("push", stage, seed, (RigLog("pushed", "hold", 1e-3, logged, logged, stage, seed),), None)
 
 
 LOADED = Metric(
@@ -111,8 +118,8 @@ FORMAT = LogFormat("Pairs", lambda head: head.start.startswith(b"PAIR"), read_pa
 
 @pytest.fixture
 def extended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(KINDS.added, "hold", (KIND, "Forces that the stage bears without moving"))
-    monkeypatch.setitem(RIG_EXPERIMENTS.added, "push", (push, "Push without moving"))
+    monkeypatch.setitem(KINDS.added, "hold", (HoldKind(), "Forces that the stage bears without moving"))
+    monkeypatch.setitem(RIG_EXPERIMENTS.added, "push", (Push(), "Push without moving"))
     monkeypatch.setitem(FORMATS.added, "pairs", (FORMAT, "Pairs of doubles"))
     monkeypatch.setitem(METRICS.added, "loaded", (LOADED, "How hard the actuator works"))
     monkeypatch.setitem(METRICS.added, "attracting", (ATTRACTORS, "How much attracts the stage"))
@@ -142,7 +149,7 @@ def test_a_format_of_its_own_is_read(extended: None, log: Path) -> None:
 def test_a_kind_of_its_own_is_identified_and_shown(
     extended: None, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By its estimates, and by a view of its own once it has one."""
+    """By its estimates, and as it says itself once it does."""
     stage, out = ROOT / "examples" / "emps_axis.toml", tmp_path / "out"
     assert run(log, "--as", "hold", "--stage", stage, "--json", "--out", out) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -153,7 +160,7 @@ def test_a_kind_of_its_own_is_identified_and_shown(
         assert estimate["low"] == pytest.approx(2, rel=1e-3)
     assert "Hold: held" in (out / "identify.html").read_text(encoding="utf-8")
     assert (out / "identify_hold_1.png").stat().st_size > 0
-    monkeypatch.setitem(VIEWS.added, "hold", (VIEW, ""))
+    monkeypatch.setitem(KINDS.added, "hold", (HeldForce(), ""))
     assert run(log, "--stage", stage, "--json", "--out", out) == 0  # as kept beside the log
     (experiment,) = json.loads(capsys.readouterr().out)["experiments"]
     assert experiment["held_n"] == pytest.approx(2, rel=1e-3)
@@ -195,7 +202,8 @@ def test_a_metric_of_its_own_is_swept_drawn_and_told(
 
 
 def test_a_page_of_its_own_needs_no_template() -> None:
-    figure = figures(Hold(Estimate.unknown("a", "N", "", "", 1.0), np.arange(3.0), np.ones(3)), (), "held")[0]
+    hold = Hold(Estimate.unknown("a", "N", "", "", 1.0), np.arange(3.0), np.ones(3))
+    (figure,) = HeldForce().figures(hold, (), "held")
     rows = [("Held", ["2 N"])]
     block = AnswerBlock(sentences=["It <holds>."], columns=["Force"], rows=rows, draw=lambda: [figure])
     page = Report("hold", "A stage", [block], computed=", by hand").html()

@@ -443,7 +443,6 @@ def test_ramps_from_rest_are_recognised() -> None:
     few = ramps(LUGRE, [1.0, 2.0], 1.0, np.random.default_rng(7))
     assert recognised(few, Path("log.csv"))[0] == "moves"
     together = KINDS["break-away"].claims_together
-    assert together is not None
     assert together([Course(few), Course(few)])
     assert not together([Course(few), Course(record("rest", DT, position=np.zeros(4000), force=np.zeros(4000)))])
 

@@ -18,7 +18,7 @@ from scipy.signal import lsim
 import friso
 from friso.identification import moves as moves_analysis
 from friso.identification.doubt import DOUBTS, FitCase, RaisedDoubt, RecordCase, leading_effect
-from friso.identification.doubts import coupling, delay, force_digits, friction_by_direction, load_friction, play
+from friso.identification.doubts import coupling, delay, friction_by_direction, load_friction, play
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.moves import _play_that_looks_alike
 from friso.identification.inverse_model import inverse_model, moved_in
@@ -336,7 +336,7 @@ def rigid(log: Log) -> tuple[OutputErrorFit, float]:
     return polished(problem, free, first_values(parameters)), inverse.bandwidth
 
 
-WELL = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+WELL = Quality(noise=0.05, left=0.05, noise_left=0.05, inverse_error=0.1, whole_error=0.1)
 """The quality of a fit that lacks nothing."""
 
 
@@ -369,7 +369,7 @@ def test_no_effect_is_seen_where_there_is_none(sound: Log) -> None:
     case = fit_case(sound, *rigid(sound))
     assert case.leading is None
     assert not [raised for doubt in (coupling, load_friction, delay) for raised in doubt.find(case)]
-    assert not [*force_digits.find(RecordCase(sound, inverse_model(sound)))]
+    assert not [*DOUBTS["force-digits"].find(RecordCase(sound, inverse_model(sound)))]
 
 
 @pytest.mark.parametrize("behind", [False, True], ids=["position of the motor", "position of the load"])
@@ -479,7 +479,7 @@ def test_first_estimates_are_told_before_the_whole_model_is_fitted(sound: Log) -
 def test_a_force_in_coarse_digits_is_told(sound: Log) -> None:
     digit = 0.4 * FRICTION[0]
     log = replace(sound, signals={**sound.signals, "force": np.round(sound["force"] / digit) * digit})
-    (doubt,) = force_digits.find(RecordCase(log, inverse_model(log)))
+    (doubt,) = DOUBTS["force-digits"].find(RecordCase(log, inverse_model(log)))
     assert "41 % of Coulomb friction" in doubt.words
     assert doubt.size == pytest.approx(digit)
 

@@ -24,7 +24,7 @@ from friso.identification.sources import recognised
 from friso.progress import silent
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import with_friction
-from friso.studies.rig.experiments.presliding import GENTLE, LOOP_COUNT, loop_log, presliding_log, run_experiment
+from friso.studies.rig.experiments.presliding import EXPERIMENT, GENTLE, LOOP_COUNT, loop_log, presliding_log
 from friso.studies.rig.outcome import excite, locked_stage, rig_log, travel
 
 DT, SECONDS = 5e-4, 6.0
@@ -190,7 +190,7 @@ def test_what_has_no_force_or_no_bristles_is_refused() -> None:
     with refused("force"):
         bristles_from_presliding(record("x", DT, position=np.zeros(10000)))
     with refused("friction.model"):
-        run_experiment(friso.load(EXAMPLE).replace({"friction": {"model": "none"}}), 1, silent)
+        EXPERIMENT.run(friso.load(EXAMPLE).replace({"friction": {"model": "none"}}), 1, silent)
 
 
 @pytest.mark.parametrize("size", [3e-6, 1e-5, 2e-5])

@@ -29,13 +29,13 @@ from friso.identification.doubt import (
 from friso.identification.doubts import (
     changing_gains,
     differing_halves,
-    gaps,
     little_friction,
     missing_feedforward,
     perhaps_feedforward,
 )
 from friso.identification.doubts.changing_friction import changes_beside, inverse_reaching
 from friso.identification.estimate import Estimate
+from friso.identification.estimate_words import interval_text, value_text
 from friso.identification.inverse_model import InverseModel, directions, inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for, of_inverse_model, with_model_error
@@ -60,7 +60,6 @@ from friso.identification.stage_file import (
 )
 from friso.intervals import NORMAL_COVERAGE
 from friso.progress import silent
-from friso.questions.identify.numbers import interval_text, value_text
 
 DT = 1e-3
 MASS, VISCOUS, COULOMB, OFFSET = 6.0, 20.0, 11.0, 0.5
@@ -151,7 +150,7 @@ def test_a_motion_that_is_repeated_says_nothing_new_of_what_the_model_lacks() ->
 
 # --- quality ----------------------------------------------------------------------------------------------------------
 
-GOOD = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+GOOD = Quality(noise=0.05, left=0.05, noise_left=0.05, inverse_error=0.1, whole_error=0.1)
 """The quality of a fit that lacks nothing."""
 
 
@@ -316,7 +315,9 @@ def test_what_a_model_lacks_may_pass_for_bristles(lacking: bool) -> None:
 def test_bristles_are_reported_only_from_a_fit_that_leaves_little_more_than_noise(left: float, reported: bool) -> None:
     """Play of 49 um on a machine with bristles of 262 kN/m left 8.2 times the noise, and bristles of 31 to 96 kN/m."""
     stiffness = Estimate.normal("friction.bristle_stiffness", "N/m", 63e3, 16e3, "output error")
-    (one,) = allowed([stiffness], Quality(0.04, left * 0.01, 0.01, 0.1, 0.1)).estimates
+    (one,) = allowed(
+        [stiffness], Quality(noise=0.04, left=left * 0.01, noise_left=0.01, inverse_error=0.1, whole_error=0.1)
+    ).estimates
     assert one.determined == reported
 
 
@@ -370,9 +371,11 @@ def test_model_error_reaches_the_other_model_where_noise_does_not_explain_the_re
 
 
 def test_lacking_is_what_noise_does_not_explain() -> None:
-    assert Quality(1.0, 1.0, 1.0, 0.1, 0.1).lacking == 0.0
-    assert Quality(1.0, 10.0, 1.0, 0.1, 0.1).lacking == pytest.approx(1.0, abs=0.01)
-    assert Quality(0.0, 1.0, 0.0, 0.1, 0.1).ratio == math.inf
+    assert Quality(noise=1.0, left=1.0, noise_left=1.0, inverse_error=0.1, whole_error=0.1).lacking == 0.0
+    assert Quality(noise=1.0, left=10.0, noise_left=1.0, inverse_error=0.1, whole_error=0.1).lacking == pytest.approx(
+        1.0, abs=0.01
+    )
+    assert Quality(noise=0.0, left=1.0, noise_left=0.0, inverse_error=0.1, whole_error=0.1).ratio == math.inf
 
 
 def test_the_inverse_model_steps_in_with_its_values() -> None:
@@ -448,7 +451,7 @@ def test_an_interval_spans_what_the_log_says_with_and_without_a_delay() -> None:
     inverse, (cause,) = inverse_model(delayed, 5.0), causes_of(delayed)
     off = Estimate.normal("masses.cart", "kg", inverse.value("mass"), 0.01, "output error")
     slow = Estimate.normal("friction.static", "N", 9.0, 0.1, "output error")
-    quality = Quality(0.05, 1.0, 0.05, inverse.error, inverse.error)
+    quality = Quality(noise=0.05, left=1.0, noise_left=0.05, inverse_error=inverse.error, whole_error=inverse.error)
     (blind,) = allowed([off], quality, inverse).estimates
     assert cause.without is not None
     case = allowed([off, slow], replace(quality, without=(cause.without,), spoilt=True), inverse)
@@ -535,7 +538,7 @@ def test_an_integral_that_stands_while_the_force_is_limited_is_no_change_of_gain
 def test_much_that_nothing_explains_makes_intervals_wider() -> None:
     inverse = usual()[1]
     one = Estimate.normal("masses.cart", "kg", MASS, 0.1, "output error")
-    plain = Quality(0.05, 1.0, 0.05, inverse.error, inverse.error)
+    plain = Quality(noise=0.05, left=1.0, noise_left=0.05, inverse_error=inverse.error, whole_error=inverse.error)
     (same,) = allowed([one], plain).estimates
     (wide,) = allowed([one], replace(plain, spoilt=True, unsettled=True)).estimates
     assert wide.half_width == pytest.approx(2 * same.half_width)
@@ -548,7 +551,7 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
     unknown = Estimate.unknown("coulomb", "N", coulomb.method, "one way")
     one_way = replace(inverse, estimates=(mass, viscous, unknown, *rest))
     whole = Estimate.normal("friction.viscous", "N*s/m", VISCOUS, viscous.half_width / 100, "output error")
-    quality = Quality(0.05, 0.0005, 0.01, inverse.error, inverse.error)
+    quality = Quality(noise=0.05, left=0.0005, noise_left=0.01, inverse_error=inverse.error, whole_error=inverse.error)
     fair, narrow = (allowed([whole], quality, one).estimates[0] for one in (one_way, inverse))
     assert narrow.half_width < 0.5 * viscous.half_width
     assert fair.half_width <= viscous.half_width
@@ -556,9 +559,9 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
 
 def test_a_record_in_pieces_says_how_little_is_fitted() -> None:
     log, inverse = usual()
-    assert not [*gaps.find(RecordCase(log, inverse))]
+    assert not [*DOUBTS["gaps"].find(RecordCase(log, inverse))]
     pieces = replace(log, segments=tuple(slice(a, a + 400) for a in range(0, 7600, 401)))
-    (finding,) = gaps.find(RecordCase(pieces, inverse))
+    (finding,) = DOUBTS["gaps"].find(RecordCase(pieces, inverse))
     assert "0.4 s of 8 s" in finding.words
 
 

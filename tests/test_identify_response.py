@@ -20,13 +20,12 @@ from friso.identification.response.closed_loop import crossovers, feedback
 from friso.identification.response.departure import Drag, departure, explained, friction_from_departure, slid
 from friso.identification.response.estimators import local_polynomial, multisine
 from friso.identification.response.mass_line import mass_lines, straight_lines
+from friso.identification.response.masses import fit_one_mass, fit_two_mass, two_masses, widened
 from friso.identification.response.modes import fit_modes
-from friso.identification.response.one_mass import fit_one_mass
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift, from_log, relative_error
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import ResponseSettings
-from friso.identification.response.two_mass import fit_two_mass, two_masses, widened
 
 DT, PERIOD = 2e-3, 1000  # period of 2 s: lines at 0.5, 1, ... Hz
 TRUE = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 1e-3, 0.0, 0.0, 0.0])
@@ -67,7 +66,15 @@ def exact(
             1 + relative * (rng.normal(size=len(values)) + 1j * rng.normal(size=len(values))) / np.sqrt(2)
         )
     deviation, many = relative * np.abs(values), np.full(len(frequency), 1e6)
-    return FrequencyResponse(frequency, values, deviation, deviation, unknown, many, "multisine")
+    return FrequencyResponse(
+        frequency=frequency,
+        response=values,
+        deviation=deviation,
+        noise=deviation,
+        distortion=unknown,
+        degrees=many,
+        kind="multisine",
+    )
 
 
 # The period
@@ -511,12 +518,19 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
     frequency = np.geomspace(2.0, 100.0, 300)
     values = exact(rig, frequency, 1e-4, np.random.default_rng(28)).response
     for sign in (1, -1):
-        bench = analyse((), measured=MeasuredResponse(frequency, sign * values, None, "", unit="m/N"))
+        bench = analyse(
+            (),
+            measured=MeasuredResponse(frequency, sign * values, None, "", unit="m/N"),
+        )
         assert bench.two_masses is not None
         assert all(bench.two_masses[name].value == pytest.approx(value, rel=1e-3) for name, value in truth.items())
         assert bool(KINDS["frequency"].doubts(bench)) is (sign < 0)
     above = 1.1 * bench.two_masses["antiresonance frequency"].value
-    cut = analyse((), (above, 100.0), measured=MeasuredResponse(frequency, values, None, "", unit="m/N")).two_masses
+    cut = analyse(
+        (),
+        (above, 100.0),
+        measured=MeasuredResponse(frequency, values, None, "", unit="m/N"),
+    ).two_masses
     assert cut is not None, "the resonance lies in the band that the user gave"
     assert all(cut[name].value == pytest.approx(value, rel=1e-2) for name, value in truth.items())
 

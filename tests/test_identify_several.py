@@ -47,12 +47,9 @@ def test_ramps_of_one_break_away_each_are_one_experiment(whole: Log) -> None:
 
 def claims(kind: str, *courses: Course) -> bool:
     """Whether logs are of a kind: one by itself, or several together."""
-    alone, together = KINDS[kind].claimed, KINDS[kind].claims_together
-    assert alone is not None
     if len(courses) == 1:
-        return bool(alone(courses[0]))
-    assert together is not None
-    return bool(together([*courses]))
+        return bool(KINDS[kind].claims(courses[0]))
+    return bool(KINDS[kind].claims_together(courses))
 
 
 def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
@@ -83,7 +80,6 @@ def test_runs_that_stick_and_slip_are_of_the_same_experiment_and_moves_are_not()
     assert claims("constant-speed", *steady)
     assert claims("constant-speed", *steady, course(slipping + 1e-3 * np.clip(time % 0.4 / 0.05, 0, 1)))
     assert not claims("constant-speed", *steady, course(0.05 * np.sin(2 * np.pi * time)))
-    assert together is not None
     assert not together([course(slipping)])
 
 

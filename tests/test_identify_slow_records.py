@@ -15,6 +15,7 @@ from friso.identification.doubt import KeyCase, RaisedDoubt
 from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
 from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
+from friso.identification.experiments.moves import FALLING, _inverse_text
 from friso.identification.inverse_model import bandwidth_of, inverse_model
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.output_error.settings import OutputErrorSettings
@@ -23,7 +24,6 @@ from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
 from friso.identification.stage_file import made_up
-from friso.questions.identify.kinds.moves import FALLING, _inverse_text
 
 FLAT = {"friction.stribeck_velocity": 1e-3, "axis.kind": "linear"}
 MASSES = Estimate.normal("masses.cart", "kg", 3.0, 0.1, "drawn")
@@ -35,7 +35,12 @@ STRIBECK = Estimate.normal("friction.stribeck_velocity", "m/s", 1e-3, 1e-5, "dra
 def case_of(estimates: tuple[Estimate, ...], **seen: Any) -> KeyCase:
     """Return estimates together with a log of zeros, as the checks of an identification take them."""
     log: Any = record("made up", 1e-3, position=np.zeros(100), force=np.zeros(100))
-    rest: Any = {"log": log, "inverse": None, "fit": None, "quality": Quality(0.1, 0.1, 0.1, 0.1, 0.1)}
+    rest: Any = {
+        "log": log,
+        "inverse": None,
+        "fit": None,
+        "quality": Quality(noise=0.1, left=0.1, noise_left=0.1, inverse_error=0.1, whole_error=0.1),
+    }
     rest |= {"flat": FLAT, "velocity": np.zeros(1), "correlation": np.eye(sum(one.determined for one in estimates))}
     return KeyCase(**rest | {"estimates": estimates} | seen)
 

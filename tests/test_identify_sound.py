@@ -32,7 +32,7 @@ def test_a_sound_log_raises_no_doubt(machine: dict[str, float], digit: float) ->
     log = simulated(Effects(**machine), np.random.default_rng(1))
     position = np.round(log["position"] / digit) * digit if digit else log["position"]
     log = replace(log, signals={**log.signals, "position": position})
-    moves = KIND.analyse([log], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN)
+    moves = KIND.analyse([log], Prior(KIND.around(log)), NOTHING_CHOSEN)
     assert not moves.quality.doubts
     assert not moves.quality.rejected
     reported = [estimate for estimate in moves.estimates if estimate.determined and estimate.name in KEYS]
@@ -47,7 +47,7 @@ def test_bristles_are_refused_if_their_damping_falls_with_the_speed(seed: int, f
     rng = np.random.default_rng((seed, 56))
     machine = {**plain(rng), "damping_falls": falls}
     log = simulated(Effects(**machine), rng)
-    moves = KIND.analyse([log], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN)
+    moves = KIND.analyse([log], Prior(KIND.around(log)), NOTHING_CHOSEN)
     (stiffness,) = (estimate for estimate in moves.estimates if estimate.name == "friction.bristle_stiffness")
     assert stiffness.determined == (falls == 0)
     assert stiffness.reason == decaying_damping.WHY if falls else stiffness.holds(machine["bristle"])
@@ -60,4 +60,4 @@ def test_a_constant_force_hides_no_effect() -> None:
     log = simulated(Effects(**machine, cogging=machine["coulomb"] / 8), rng)
     carried = log["force"] + 120 * machine["coulomb"]
     log = replace(log, signals={**log.signals, "force": carried})
-    assert KIND.analyse([log], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN).quality.doubts
+    assert KIND.analyse([log], Prior(KIND.around(log)), NOTHING_CHOSEN).quality.doubts

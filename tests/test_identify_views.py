@@ -17,8 +17,12 @@ from snapshots import Snapshots
 
 from friso.identification.combine import combined
 from friso.identification.estimate import NO_INTERVAL, Estimate
+from friso.identification.estimate_words import interval_text, unit_of, value_text, with_interval
 from friso.identification.experiments.break_away import static_from_ramps
+from friso.identification.experiments.constant_speed import KIND as CONSTANT_SPEED
 from friso.identification.experiments.constant_speed import FrictionAtSpeeds
+from friso.identification.experiments.moves import KIND as MOVES
+from friso.identification.experiments.moves import record_panels
 from friso.identification.experiments.presliding import bristles_from_presliding
 from friso.identification.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
 from friso.identification.experiments.steps import stiffness_from_steps
@@ -39,14 +43,11 @@ from friso.identification.readings.common import deflections, record
 from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
-from friso.identification.response.two_mass import two_masses
+from friso.identification.response.masses import two_masses
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import estimate_text, identified_stage, made_up
 from friso.questions.identify.blocks import identify_document
 from friso.questions.identify.figures import identify_figures
-from friso.questions.identify.kinds.constant_speed import VIEW as CONSTANT_SPEED
-from friso.questions.identify.kinds.moves import moves_figures, record_panels
-from friso.questions.identify.numbers import interval_text, unit_of, value_text, with_interval
 from friso.questions.identify.question import IdentifyAnswer
 from friso.questions.identify.words import (
     COLUMNS,
@@ -111,12 +112,21 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[IdentifiedMoves, Log]:
         Estimate.unknown("friction.stribeck_velocity", "m/s", "output error", WHY, 5e-5, 0.16),
     )
     result = IdentifiedMoves(
-        log, part, inverse, inverse_model(log, 5.0, by_direction=True), fit, profiles, expected, np.eye(2),
-        coverage(log["position"], moved, MASS, COULOMB, DT),
-        Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
-        SimulationErrors(1e-5, 2e-3, 0.05, 0.04) if own_loop else SimulationErrors(np.nan, np.nan, np.nan, 0.04),
-        residual_of(residual, moved, DT), loop, Quality(0.2, 0.2, 0.2, 0.05, 0.04),
-    )  # fmt: skip
+        log=log,
+        part=part,
+        inverse=inverse,
+        by_direction=inverse_model(log, 5.0, by_direction=True),
+        fit=fit,
+        profiles=profiles,
+        estimates=expected,
+        correlation=np.eye(2),
+        covered=coverage(log["position"], moved, MASS, COULOMB, DT),
+        simulated=Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
+        errors=SimulationErrors(1e-5, 2e-3, 0.05, 0.04) if own_loop else SimulationErrors(np.nan, np.nan, np.nan, 0.04),
+        residual=residual_of(residual, moved, DT),
+        loop=loop,
+        quality=Quality(noise=0.2, left=0.2, noise_left=0.2, inverse_error=0.05, whole_error=0.04),
+    )
     return result, log
 
 
@@ -438,7 +448,7 @@ def named(figures: list[Figure], name: str) -> Figure:
 
 
 def figure_of(result: IdentifiedMoves, name: str) -> Figure:
-    return named(moves_figures(result, "identify_m"), f"identify_m_{name}")
+    return named(MOVES.figures(result, (), "identify_m"), f"identify_m_{name}")
 
 
 def line(panel: Panel, label: str) -> Series:

@@ -20,7 +20,7 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.tune.blocks import further_files
 from friso.questions.tune.present_words import DOUBTS
 from friso.questions.tune.question import TuneAnswer
-from friso.questions.tune.words import UNMADE, answer
+from friso.questions.tune.words import UNMADE, explained
 from friso.remedies.catalogue import remedies
 from friso.remedies.machines import Goal
 from friso.remedies.method import Advice, Unmade, _Session, tune
@@ -126,7 +126,7 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
     assert made.confirmation is not None
     assert (made.confirmation.verdict, made.confirmation.certain) == ("settles", True)
     length = f"{made.stage.flat()['flexure.length'] * 1e3:.3g} x"
-    assert any("2 leaves of" in line and length in line for line in answer(tuning))
+    assert any("2 leaves of" in line and length in line for line in explained(tuning))
     files = further_files(tuning)
     written = loads(str(files["tuned-isolator-of-leaf-springs.toml"]))
     assert written.flat()["flexure.length"] == made.stage.flat()["flexure.length"]
@@ -141,7 +141,7 @@ def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(tuning: Advic
     """The mode of the present joint is named if the file states it as a number, not if the file has leaf springs."""
 
     def replaced(present: Stage) -> bool:
-        sentences = " ".join(answer(replace(tuning, stage=present)))
+        sentences = " ".join(explained(replace(tuning, stage=present)))
         assert "Leaf springs for its joint" in sentences
         return ", in place of the parasitic mode of the file (300 Hz). With them" in sentences
 
@@ -152,14 +152,14 @@ def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(tuning: Advic
 def test_why_no_leaves_were_sized_is_said(tuning: Advice, why: Unmade) -> None:
     (isolator, _) = tuning.outcomes
     without = replace(tuning, outcomes=(isolator,), unmade={isolator.remedy.name: why})
-    (sentence,) = (line for line in answer(without) if "leaf springs" in line)
+    (sentence,) = (line for line in explained(without) if "leaf springs" in line)
     assert UNMADE[why] in sentence
 
 
 def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) -> None:
     isolator, made = tuning.outcomes
     doubted = replace(tuning, outcomes=(isolator, replace(made, doubts=("distance",))))
-    (sentence,) = (line for line in answer(doubted) if line.startswith("Leaf springs"))
+    (sentence,) = (line for line in explained(doubted) if line.startswith("Leaf springs"))
     assert DOUBTS["distance"] in sentence
     names = [name for name in further_files(doubted) if "leaf-springs" in name]
     assert all("not-sure" in name for name in names)

@@ -83,7 +83,7 @@ def test_the_move_is_the_thesis_s() -> None:
     assert task.duration == 20.0
     assert distance(RIG.replace({"motion.acceleration_time": "0.1 s"})) == pytest.approx(1.0)
     with refused("joint"):
-        hunting.run_experiment(RIG.replace({"joint": None, "parasitic": None}), 1, silent)
+        hunting.EXPERIMENT.run(RIG.replace({"joint": None, "parasitic": None}), 1, silent)
 
 
 def test_hunting_ends_at_more_crossover() -> None:
@@ -115,7 +115,7 @@ SMALL = {
 def test_free_joint_does_not_hunt() -> None:
     """The result agrees with Fig. 24, and the page says so."""
     with patched({hunting: SMALL}):
-        outcome = hunting.run_experiment(RIG, 1, silent)
+        outcome = hunting.EXPERIMENT.run(RIG, 1, silent)
     assert not outcome.result.cases["free"].peaks.any()
     assert outcome.result.cases["locked"].peaks[0].any()
     assert [log.kind for log in outcome.logs] == ["moves"] * 6

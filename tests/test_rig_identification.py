@@ -34,11 +34,11 @@ def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
 
 def test_steps_show_the_joint_on_its_cables(built: Stage) -> None:
     """A weaker motor makes it look stiffer."""
-    result = stiffness.run_experiment(built, 1, silent).result
+    result = stiffness.EXPERIMENT.run(built, 1, silent).result
     on_cables = result.true + built.flat()["cable.stiffness"]
     assert result.steps.stiffness.holds(on_cables)
     assert result.steps.stiffness.value == pytest.approx(on_cables, rel=1e-3)
-    result = stiffness.run_experiment(built.replace({"drive.motor_constant_ratio": 0.68}), 1, silent).result
+    result = stiffness.EXPERIMENT.run(built.replace({"drive.motor_constant_ratio": 0.68}), 1, silent).result
     assert result.steps.stiffness.value == pytest.approx(result.apparent, rel=5e-3)
     assert result.apparent > result.true
 
@@ -62,7 +62,7 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
     monkeypatch.setattr(outcome, "WAY_FACTOR", 1 / 6)
     monkeypatch.setattr(constant_speed, "PASS_DURATIONS", (48.0, 12.0))
     monkeypatch.setattr(many_speeds, "SHARED_PLACES", 1)
-    result = constant_speed.run_experiment(built, 1, silent).result
+    result = constant_speed.EXPERIMENT.run(built, 1, silent).result
     free, (place,) = result.cases[0], result.many.places
     assert not free.place.separated
     assert not free.velocity.both.coulomb.determined
@@ -119,7 +119,7 @@ def test_an_experiment_on_the_joint_needs_one(built: Stage) -> None:
     rigid = built.replace({"joint": None, "parasitic": None})
     for item in (frf, stiffness, stiction, constant_speed):
         with refused("joint"):
-            item.run_experiment(rigid, 1, silent)
+            item.EXPERIMENT.run(rigid, 1, silent)
 
 
 def test_a_standing_stage_is_simulated_as_exactly_as_a_moving_one(built: Stage) -> None:

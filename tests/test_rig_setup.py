@@ -45,14 +45,14 @@ def test_friction_without_what_is_looked_for_is_refused(built: Stage) -> None:
     bare |= {"rail": None}
     none = built.replace({**bare, "friction.model": "none"})
     with refused("friction.model"):
-        stiction.run_experiment(none, 1, silent)
+        stiction.EXPERIMENT.run(none, 1, silent)
     with refused("friction.model"):
-        presliding.run_experiment(none, 1, silent)
+        presliding.EXPERIMENT.run(none, 1, silent)
 
 
 @pytest.mark.thorough
 def test_a_loop_that_swings_between_its_limits_is_told(built: Stage) -> None:
     """Logs that end at once show no passes: their page is written all the same."""
-    outcome = constant_speed.run_experiment(built.replace({"controller.crossover": "500 Hz"}), 1, silent)
+    outcome = constant_speed.EXPERIMENT.run(built.replace({"controller.crossover": "500 Hz"}), 1, silent)
     assert all(log.failure for log in outcome.logs)
     assert "5 of 5 logs stopped early" in " ".join(sentences(outcome))

@@ -27,16 +27,15 @@ LITERALS = {
     "friso/interface": 4,
     "friso/leaf_springs": 13,
     "friso/platform": 11,
-    "friso/questions": 100,
+    "friso/questions": 86,
     "friso/remedies": 8,
-    "friso/shown": 36,
+    "friso/shown": 37,
     "friso/stage": 15,
-    "friso/studies": 90,
+    "friso/studies": 92,
     "friso/virtual_rig": 1,
     "friso": 11,
     "friso_thesis/questions": 19,
-    "friso_thesis/shown": 1,
-    "friso_thesis/studies": 192,
+    "friso_thesis/studies": 193,
 }
 """Number of constants that each folder's modules may still define outside its settings.
 

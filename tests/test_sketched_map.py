@@ -104,7 +104,7 @@ def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(locked: Sta
     """The nearest cell is not called the stage."""
     (sentence,) = own_place(sketched.data, "sketch")
     assert "hunts" in sentence
-    assert "1.0 to 1.3" in sentence or "1 to 1.3" in sentence
+    assert "crossover 8.000 to 10.40 Hz" in sentence
     assert not own_place(sketched.data, "outcome")
     assert sentence.split(";")[0] in map_html(sketched.data, "sketch", "{indices}")
     beside = friso.sweep(locked, {"controller.crossover": ["5 Hz", "9.9 Hz", "14 Hz"]})

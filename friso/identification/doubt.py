@@ -1,9 +1,10 @@
 """Define doubts: effects that may be in a log and are not in the model, with the test that detects each.
 
-Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`. It states what it looks at, at which
-moment of an analysis, and which measurement would decide it; its `find` yields findings. A finding is the cause in
-words, with its size and its consequence: wider intervals, or values that are not reported. The analysis applies
-consequences in this module, so that one more effect is one more file.
+Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`, or, if it is about the record itself, an
+entry in the table of that package. It states what it looks at, at which moment of an analysis, and which measurement
+would decide it; its `find` yields findings. A finding is the cause in words, with its size and its consequence: wider
+intervals, or values that are not reported. The analysis applies consequences in this module, so that one more effect is
+one more file.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from friso.identification.output_error.effects import (
 from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.settings import settings
 from friso.identification.settings import doubt_settings
+from friso.identification.witness import Replay
 from friso.progress import Progress, silent
 from friso.registry import Registry
 
@@ -61,12 +63,19 @@ Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve
 class RecordCase:
     """A log of moves with its inverse model, a least-squares fit of mass, friction and offset.
 
-    `cart_share` is the fraction of the mass that moves with a measured cart; 0 if none is measured.
+    `cart_share` is the fraction of the mass that moves with a measured cart; 0 if none is measured. `replay` compares
+    the force with that of the given controller; None without one.
     """
 
     log: Log
     inverse: InverseModel
     cart_share: float = 0.0
+    replay: Replay | None = None
+
+    @property
+    def commanded(self) -> bool:
+        """Tell whether the given controller explains the force, without a feedforward that it lacks."""
+        return self.replay is not None and self.replay.agrees and not self.replay.mass
 
     @property
     def unit(self) -> str:
@@ -196,7 +205,7 @@ class FitCase(FittedCase):
         """
         refuses: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED)
         wider = self.reaching(effect.explained.moved, further)
-        return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
+        return RaisedDoubt(words=words, size=size, unit=unit, fit=wider, refuses=refuses, explains=True)
 
     def named_along(
         self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] | None = None
@@ -253,7 +262,7 @@ class KeyCase(FitCase):
         return replace(self, estimates=estimates, correlation=self.correlation[np.ix_(kept, kept)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RaisedDoubt:
     """What a doubt found in a log: the cause in `words`, its `size` in `unit`, and what follows.
 
@@ -300,7 +309,7 @@ class Doubt:
 
 
 DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
-"""All doubts; every module of `friso/identification/doubts/` declares one."""
+"""All doubts: every module of `friso/identification/doubts/` declares one, and the table of the package more."""
 
 
 def raised(moment: Moment, case: Any) -> Iterator[RaisedDoubt]:
@@ -387,10 +396,17 @@ def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[s
     """Return the withheld estimates by key, each with its reason in place of the value.
 
     `reasons` are by key; an estimate without a reason is left out. The range left to Coulomb friction reaches down to
-    its lower end divided by the highest ratio of static to Coulomb friction.
+    its lower end divided by the highest ratio of static to Coulomb friction, that of imitated bristles as far as known
+    effects have moved them.
     """
-    ratio = settings.highest_friction_ratio
-    ranges = {one.name: (one.low / ratio, one.high) for one in estimates if one.name == "friction.coulomb"}
+    softer, stiffer = doubt_settings.bristles_fitted_too_stiff, doubt_settings.bristles_fitted_too_soft
+    by_key = {"friction.coulomb": (1 / settings.highest_friction_ratio, 1.0)}
+    by_key |= {key: (1 / softer, stiffer) for key in BRISTLES if reasons.get(key) == IMITATED}
+    ranges = {
+        one.name: (one.low * by_key[one.name][0], one.high * by_key[one.name][1])
+        for one in estimates
+        if one.name in by_key and one.low > 0
+    }
     return {
         one.name: one.withheld(reasons[one.name], *ranges.get(one.name, ()))
         for one in estimates

@@ -1,9 +1,10 @@
-"""Define what a kind of experiment declares: its logs, their analysis, and the keys of a stage that it determines."""
+"""Define a kind of experiment: its logs, their analysis, what that says of a stage, and how it is shown."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -11,15 +12,25 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
+from friso.identification.estimate_words import name_of, with_interval
 from friso.identification.logs.log import Log, join_alike
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import Course
 from friso.progress import Progress, silent
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, ORANGE
 from friso.stage import Stage, parse_set
 from friso.stage.controllers import CONTROLLER
 
 Source = Log | MeasuredResponse
 """Contents of a file: signals over time, or a frequency response from another instrument."""
+
+Facts = tuple[tuple[str, str], ...]
+"""Values in words, with their names."""
+
+AREA = "#cfdfee"
+WAYS: Mapping[str, str] = MappingProxyType({"forward": BLUE, "backward": ORANGE})
+TIME = Axis("Time", "s")
 
 Result = TypeVar("Result")
 
@@ -111,24 +122,6 @@ def left_out(stage: Stage, log: Log) -> list[str]:
     return [key for key in log.setup if key not in stage.flat() and not key.startswith(f"{CONTROLLER}.")]
 
 
-def of_one(
-    analyse: Callable[[Log, Prior, AnalysisSettings], Result],
-) -> Callable[[Sequence[Source], Prior, AnalysisSettings], Result]:
-    """Return the analysis of an experiment that consists of one log, from that of the log."""
-
-    def of_group(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Result:
-        (log,) = logs
-        assert isinstance(log, Log)
-        return analyse(log, prior, settings)
-
-    return of_group
-
-
-def nothing(result: Any, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return no estimates, for experiments that determine no key of a stage."""
-    return ()
-
-
 def by_rows(result: Any, estimates: Sequence[Estimate], row: Callable[[Estimate], int]) -> Correlated:
     """Return the estimates that have a value, with their part of the `correlation` of a result.
 
@@ -139,70 +132,149 @@ def by_rows(result: Any, estimates: Sequence[Estimate], row: Callable[[Estimate]
     return certain, result.correlation[np.ix_(rows, rows)]
 
 
-def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the estimates that have a value, as independent of one another: correlations of 0."""
-    certain = determined(estimates)
-    return certain, np.eye(len(certain))
+def log_figure(log: Log, roles: Sequence[str], name: str) -> Figure:
+    """Draw some signals of a log, by role, over time."""
+    panels = tuple(
+        Panel(
+            "", TIME, Axis(role.replace("_", " ").capitalize(), log.unit(role)), (Series(log.time, log[role], "", INK),)
+        )
+        for role in roles
+    )
+    return Figure(name, log.name, "As logged.", panels)
 
 
-@dataclass(frozen=True)
-class Predictor(Generic[Result]):
-    """How a kind of experiment predicts another log from its result and the prior knowledge.
-
-    `predict` returns the prediction, or None for a log that it cannot predict. `needs` states the requirements in
-    words. `check` raises InputError, before any fit, if logs will not meet them.
-    """
-
-    needs: str
-    predict: Callable[[Result, Log, Prior, AnalysisSettings], Any]
-    check: Callable[[Sequence[Source], Log, Prior], None] = lambda logs, other, prior: None
-
-
-@dataclass(frozen=True)
 class ExperimentKind(Generic[Result]):
     """A kind of experiment, named by its module, which is also its word on the command line.
 
-    `analyse` returns the result of a group of logs, of a class of the kind's own; `estimates` gives keys of the stage
-    file from the result, and `correlated` their correlation. `after` names the kinds whose results it uses.
+    A subclass overrides what its kind does otherwise, above all the analysis. `title` names its results. `after` names
+    the kinds whose results it uses.
 
     `roles` are the channels that a log needs; of alternatives separated by |, the first that is mapped, or the last.
     `si` is true if channels must be in SI units, except for the `foreign` roles (a force in volts). `per_unit` is true
-    if the analysis works in any unit of force, with results such as kg per volt. `partial` returns true for a log that
-    shows too little by itself, such as one event; such logs are joined to one log with gaps. `together` is true if all
-    logs are realisations of one experiment, `responses` if frequency responses from another instrument are accepted.
+    if the analysis works in any unit of force, with results such as kg per volt. `together` is true if all logs are
+    realisations of one experiment, `responses` if frequency responses from another instrument are accepted. `longest`
+    is true if only the longest stretch of a log without gaps is analysed.
 
-    `claims` returns why a log without a stated kind may be of this kind, or None; `claims_together` does so for several
-    logs together, and for one if there are no `claims`. A kind claims logs `instead_of` other kinds that would claim
-    them too. `around` makes a stage with assumed values for a log if none is given. `notes` are remarks on results for
-    the engineer, with or without a stage; `doubts` are sentences against trusting a result. `failed` returns true if
-    the analysis failed, even if parts of the result hold. Functions raise InputError for logs that cannot be used.
+    A kind claims logs `instead_of` other kinds that would claim them too. `makes_stage` is true if a stage can be made
+    up around a log. `predicts` says which logs the kind predicts from its results, empty if none. `opening` is the last
+    part of the name of the figure that opens the page, or empty. Methods raise InputError for logs that cannot be used.
     """
 
-    analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
-    estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]] = nothing
-    correlated: Callable[[Result, Sequence[Estimate]], Correlated] = independent
+    title: str
     after: tuple[str, ...] = ()
     roles: tuple[str, ...] = ("position", "force")
     si: bool = True
     foreign: tuple[str, ...] = ()
     per_unit: bool = False
-    partial: Callable[[Log], bool] = lambda log: False
     together: bool = False
     responses: bool = False
-    claims: Callable[[Course], str | None] | None = None
-    claims_together: Callable[[Sequence[Course]], str | None] | None = None
+    longest: bool = False
     instead_of: tuple[str, ...] = ()
-    around: Callable[[Log], Stage | None] | None = None
-    notes: Callable[[Sequence[Result], Stage | None], Sequence[str]] = lambda results, stage: ()
-    predictor: Predictor[Result] | None = None
-    doubts: Callable[[Result], Sequence[str]] = lambda result: ()
-    failed: Callable[[Result], bool] = lambda result: False
+    makes_stage: bool = False
+    predicts: str = ""
+    opening: str = ""
 
-    def claimed(self, course: Course) -> str | None:
+    def analyse(self, logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Result:
+        """Return the result of a group of logs, of a class of the kind's own."""
+        (log,) = logs
+        assert isinstance(log, Log)
+        return self.analyse_log(log, prior, settings)
+
+    def analyse_log(self, log: Log, prior: Prior, settings: AnalysisSettings) -> Result:
+        """Return the result of one log, for kinds that analyse each by itself."""
+        raise NotImplementedError
+
+    def estimates(self, result: Result, stage: Stage | None) -> tuple[Estimate, ...]:
+        """Return what a result says of keys of the stage file; nothing by default."""
+        return ()
+
+    def correlated(self, result: Result, estimates: Sequence[Estimate]) -> Correlated:
+        """Return the estimates that have a value, with their correlations: of 0 by default."""
+        certain = determined(estimates)
+        return certain, np.eye(len(certain))
+
+    def partial(self, log: Log) -> bool:
+        """Tell whether a log shows too little by itself, such as one event; such logs are joined to one with gaps."""
+        return False
+
+    def claims(self, course: Course) -> str | None:
         """Return why a log without a stated kind may be of this kind; None if it may not."""
-        if self.claims is not None:
-            return self.claims(course)
-        return self.claims_together([course]) if self.claims_together is not None else None
+        return self.claims_together([course])
+
+    def claims_together(self, courses: Sequence[Course]) -> str | None:
+        """Return why several logs without a stated kind may be one experiment of this kind; None if they may not."""
+        return None
+
+    def around(self, log: Log) -> Stage | None:
+        """Make a stage with assumed values for a log if none is given; None if that cannot be done."""
+        return None
+
+    def notes(self, results: Sequence[Result], stage: Stage | None) -> Sequence[str]:
+        """List remarks on results for the engineer, with or without a stage."""
+        return ()
+
+    def doubts(self, result: Result) -> Sequence[str]:
+        """List sentences against trusting a result."""
+        return ()
+
+    def contradicted(self, result: Result) -> Sequence[str]:
+        """Return the tables of the stage file that a result contradicts, so that nobody knows them."""
+        return ()
+
+    def failed(self, result: Result) -> bool:
+        """Tell whether the analysis failed, even if parts of the result hold."""
+        return False
+
+    def check_prediction(self, logs: Sequence[Source], other: Log, prior: Prior) -> None:
+        """Check before any fit that logs can predict another log. Raises InputError if not."""
+
+    def predict(self, result: Result, log: Log, prior: Prior, settings: AnalysisSettings) -> Any:
+        """Return the prediction of another log, or None for one that cannot be predicted."""
+        return None
+
+    def prediction_error(self, prediction: Any) -> float:
+        """Return the largest relative error of a prediction."""
+        raise NotImplementedError
+
+    def prediction_sentence(self, prediction: Any) -> str:
+        """Describe the errors of a prediction."""
+        raise NotImplementedError
+
+    def prediction_numbers(self, prediction: Any) -> dict[str, Any]:
+        """Return a prediction for the JSON document."""
+        raise NotImplementedError
+
+    def prediction_figures(self, log: Log, prediction: Any, number: int) -> list[Figure]:
+        """Draw a prediction of a log; `number` is that of the log, for the figures' names."""
+        return []
+
+    def facts(self, result: Result) -> Facts:
+        """List values of a result in words: by default its estimates with their intervals."""
+        return tuple((name_of(one.name), with_interval(one)) for one in self.estimates(result, None))
+
+    def sentences(self, result: Result) -> tuple[str, ...]:
+        """Say what is not among the facts."""
+        return ()
+
+    def warnings(self, result: Result) -> tuple[str, ...]:
+        """Return the warnings of a result, if its class has any."""
+        return getattr(result, "warnings", ())
+
+    def headline(self, result: Result) -> str:
+        """Write a sentence at the head of the page, beside the estimates of keys; it may be empty."""
+        return ""
+
+    def numbers(self, result: Result) -> dict[str, Any]:
+        """Return a result for the JSON document, in SI with the unit in the key or beside it."""
+        return {}
+
+    def figures(self, result: Result, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw a result: by default, for each log, the signals that this kind needs.
+
+        The names of the figures begin with `name`.
+        """
+        records = [log for log in logs if isinstance(log, Log)]
+        return [log_figure(log, self.needed(log.signals), f"{name}_{i}") for i, log in enumerate(records, 1)]
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
         """Return the roles that a log needs, such as position, given the roles that it has.

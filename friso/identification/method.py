@@ -23,7 +23,7 @@ from friso.identification.stage_file import identified_stage, origins, with_unkn
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, silent, together
 from friso.stage import Stage
-from friso.stage.correlations import Correlations
+from friso.stage.correlations import Correlations, guessed_together
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,25 @@ def identify(
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
     doubts += words_of("stage", (fitted, estimates))
     sources = origins(fitted, fits.estimates, fits.follows, None if base is None else made_up)
-    fitted = with_unknown(fitted, sources, fits.left)
-    unknown = [f"the stage file lists as unknown: {', '.join(fitted.unknown_keys)}"] if fitted.unknown_keys else []
+    contradicted = {table for one in experiments for table in KINDS[one.kind].contradicted(one.result)}
+    fitted = with_unknown(fitted, sources, (*fits.left, *contradicted), estimates)
+    unknown = _unknown(fitted)
     shown = (tuple(experiments), tuple(estimates), (*warnings, *fits.notes, *unknown))
     correlated = _correlations(experiments, estimates, fits, fitted)
     return Identification(fitted, correlated, *shown, doubts, failed, sources)
+
+
+def _unknown(stage: Stage) -> list[str]:
+    """Say which values of the identified stage nobody knows: those with the range of similar machines, and others."""
+    ranges, assumed = stage.uncertain(), stage.assumed_keys
+    usual = [f"{key} {ranges[key].text}" for key in stage.unknown_keys if key in ranges]
+    similar = "; state your own, or the contact ([friction] guess)"
+    says = (
+        [f"not shown, so the stage file has the range of similar machines: {', '.join(usual)}{similar}"]
+        if usual
+        else []
+    )
+    return [*says, f"the stage file lists as unknown: {', '.join(assumed)}"] if assumed else says
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
@@ -152,12 +166,12 @@ def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log],
     Raises InputError for a log that no given log can predict.
     """
     prior = Prior(base, base is not None)
-    predictors = {kind: predictor for _, kind in logs if (predictor := KINDS[kind].predictor) is not None}
+    predictors = [kind for kind in dict.fromkeys(kind for _, kind in logs) if KINDS[kind].predicts]
     for other in others:
         reasons: list[InputError] = []
-        for kind, predictor in predictors.items():
+        for kind in predictors:
             try:
-                predictor.check([log for log, name in logs if name == kind], other, prior)
+                KINDS[kind].check_prediction([log for log, name in logs if name == kind], other, prior)
             except InputError as error:
                 reasons.append(error)
         if not predictors:
@@ -176,19 +190,18 @@ def predict(
     [setup]. Raises InputError if no experiment can.
     """
     prior = Prior(base, base is not None)
-    predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
-    for kind, predictor in predictors.items():
+    for kind in reversed(in_order()):
         for experiment in identification.experiments:
-            result = predictor.predict(experiment.result, log, prior, settings) if experiment.kind == kind else None
-            if result is not None:
-                return Prediction(log, kind, result)
+            if experiment.kind == kind:
+                result = KINDS[kind].predict(experiment.result, log, prior, settings)
+                if result is not None:
+                    return Prediction(log, kind, result)
     raise _unpredictable(log)
 
 
 def _unpredictable(log: Log) -> InputError:
     """Return the error for a log that no available kind of experiment can predict."""
-    needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
-    expected = ", or ".join(needs)
+    expected = ", or ".join(filter(None, (KINDS[name].predicts for name in reversed(in_order()))))
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
 
 
@@ -231,8 +244,7 @@ def _analysed(kind: str, prior: Prior, settings: AnalysisSettings, group: Sequen
 def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
     """Make a stage with assumed values for the first log that suffices; None without one."""
     for log, kind in logs:
-        make = KINDS[kind].around
-        if make is not None and isinstance(log, Log) and (stage := make(log)) is not None:
+        if isinstance(log, Log) and (stage := KINDS[kind].around(log)) is not None:
             return stage
     return None
 
@@ -271,4 +283,4 @@ def _correlations(
     part = matrix[np.ix_(places, places)]
     alone = np.abs(part - np.eye(len(leading))).max(axis=1, initial=0.0) == 0
     together = [key for key, single in zip(leading, alone, strict=True) if not single]
-    return Correlations(tuple(leading), part).among(together)
+    return Correlations(tuple(leading), part).among(together).with_others(guessed_together(stage))

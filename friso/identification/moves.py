@@ -33,6 +33,7 @@ from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
 from friso.identification.settings import identification_settings
 from friso.identification.spread import binned, correlation_length
+from friso.identification.witness import Replay, replayed
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -42,7 +43,7 @@ direction alone are the last step.
 """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class IdentifiedMoves:
     """Result of an analysis of moves.
 
@@ -68,6 +69,7 @@ class IdentifiedMoves:
     residual: Residual
     loop: Problem | None
     quality: Quality
+    replay: Replay | None = None
 
     @property
     def correlated(self) -> tuple[Estimate, ...]:
@@ -98,15 +100,16 @@ def identify_moves(
 ) -> IdentifiedMoves:
     """Identify mass, friction and other keys of a stage from a log of moves.
 
-    `flat` has the stage as flat keys with SI values. With `own_loop` its controller is the machine's, and the closed
-    loop is simulated on the logged reference; otherwise the model follows the logged position. `bandwidth` [Hz] is the
-    motion's, read from the log by default. If the force is not in newtons (not allowed with `own_loop`), estimates are
-    per unit of force. `tell` gets the inverse model's estimates as soon as they are known. Raises InputError for a log
-    without position or force.
+    `flat` has the stage as flat keys with SI values. With `own_loop` its controller is the machine's: it is replayed on
+    the log, and the closed loop is simulated on the logged reference. Otherwise the model follows the logged position.
+    `bandwidth` [Hz] is the motion's, read from the log by default. If the force is not in newtons (not allowed with
+    `own_loop`), estimates are per unit of force. `tell` gets the inverse model's estimates as soon as they are known.
+    Raises InputError for a log without position or force, or one whose clock, unit or sign the controller contradicts.
     """
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
+    replay = replayed(log, flat) if own_loop else None
     inverse = inverse_model(log, bandwidth, False, share)
     by_direction = inverse_model(log, inverse.bandwidth, True, share)
     tell(log.name, inverse.estimates)
@@ -120,26 +123,45 @@ def identify_moves(
     fit = answer.fit
     fitted = FittedCase(log, inverse, share, flat=flat, fit=fit, velocity=moved.velocity)
     leading = leading_effect(fitted) if fit.left > fit.problem.noise_left(noise) else None
-    quality = quality_of(log, inverse, fit, noise, share, leading is not None)
+    quality = quality_of(log, inverse, fit, noise, share, leading is not None, replay)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(
             fit, log, part, inverse.bandwidth, noise, between(progress, FITTED_SHARE, REPEATED_SHARE)
         )
         fit = fit if fit.explains(noise) else late_by_a_sample(fit)
     case = FitCase(
-        log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
-        leading=None if quality.seen else leading, progress=between(progress, REPEATED_SHARE, 1),
-    )  # fmt: skip
+        log,
+        inverse,
+        share,
+        flat=flat,
+        fit=fit,
+        quality=quality,
+        velocity=moved.velocity,
+        leading=None if quality.seen else leading,
+        progress=between(progress, REPEATED_SHARE, 1),
+    )
     doubted = judged_fit(case)
     inverse, quality, answer = doubted.inverse, doubted.quality, replace(answer, fit=doubted.fit)
     case = _with_estimates(doubted, answer, covered, moved.acceleration)
     fit, estimates, correlation = case.fit, case.estimates, case.correlation
     simulated = (loop or fit.problem).record(fit.inner)
     return IdentifiedMoves(
-        log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
-        errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
-        residual_of(fit.residual, moved, log.sample_time), loop, quality,
-    )  # fmt: skip
+        log=log,
+        part=part,
+        inverse=inverse,
+        by_direction=by_direction,
+        fit=fit,
+        profiles=answer.profiles,
+        estimates=estimates,
+        correlation=correlation,
+        covered=covered,
+        simulated=simulated,
+        errors=errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
+        residual=residual_of(fit.residual, moved, log.sample_time),
+        loop=loop,
+        quality=quality,
+        replay=replay,
+    )
 
 
 def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage, acceleration: np.ndarray) -> KeyCase:

@@ -13,6 +13,7 @@ from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.settings import doubt_settings
+from friso.identification.witness import Replay, doubt_of
 from friso.quantities import percent, plain_factor
 
 UNKNOWN = (
@@ -25,7 +26,7 @@ WITHOUT_FRICTION = ". The stage file says that there is no friction: with a tabl
 """Advice added to a message if the stage file has no friction."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Quality:
     """Quality of a fit of moves, with reasons against trusting it.
 
@@ -78,7 +79,13 @@ class Quality:
 
 
 def quality_of(
-    log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float, led: bool = False
+    log: Log,
+    inverse: InverseModel,
+    fit: OutputErrorFit,
+    noise: float,
+    cart_share: float,
+    led: bool = False,
+    replay: Replay | None = None,
 ) -> Quality:
     """Judge a fit of moves, and name in sentences what is wrong with it.
 
@@ -88,10 +95,19 @@ def quality_of(
     The whole model may describe a record that the inverse model, which has no sticking, does not. A cause then raises
     no doubt if the whole model is clearly better than the inverse model corrected for the cause.
     """
-    case = RecordCase(log, inverse, cart_share)
+    case = RecordCase(log, inverse, cart_share, replay)
     flat, left, passed = fit.stage, fit.left, fit.problem.noise_left(noise)
     findings = list(raised("record", case))
-    plain = Quality(noise, left, passed, inverse.error, whole_error(flat, inverse), tuple(findings))
+    if replay is not None and (said := doubt_of(replay, log)):
+        findings.insert(0, RaisedDoubt(said, replay.slope, doubt="controller"))
+    plain = Quality(
+        noise=noise,
+        left=left,
+        noise_left=passed,
+        inverse_error=inverse.error,
+        whole_error=whole_error(flat, inverse),
+        findings=tuple(findings),
+    )
     if fit.problem.closed and fit.explains(noise):
         return plain
     force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
@@ -108,7 +124,7 @@ def quality_of(
     seen = any(cause.without is None and DOUBTS[cause.doubt].moment == "cause" for cause in reasons)
     named = [] if led and not (poor or seen) else reasons
     words = _verdict(plain, named, case.unit, poor, rejected, flat["friction.model"] == "none")
-    findings += [RaisedDoubt(words, plain.ratio, doubt="model")] if words else []
+    findings += [RaisedDoubt(words=words, size=plain.ratio, doubt="model")] if words else []
     findings += raised("value", ValueCase(log, inverse, cart_share, plain.lacks_something, poor))
     without = tuple(cause.without for cause in reasons if cause.without)
     best = min([inverse.error, *(model.error for model in without)])

@@ -157,7 +157,7 @@ def _check(times: np.ndarray, values: np.ndarray) -> None:
     from friso.identification.logs.time_base import gaps
 
     if times.size < 2:
-        raise InputError("", f"{times.size} sample{'s' * (times.size != 1)}", "a reference over time")
+        raise InputError("", f"{times.size} sample{'' if times.size == 1 else 's'}", "a reference over time")
     if (lost := np.flatnonzero(~(np.isfinite(times) & np.isfinite(values)))).size:
         actual = f"no number in sample {lost[0] + 1} of {times.size}"
         raise InputError("", actual, "a number at every instant: fill the gap in the file")

@@ -1,4 +1,4 @@
-"""Settings of identification: doubts, the inverse model, and experiments."""
+"""Settings of identification: doubts, the inverse model, experiments, and how results are shown."""
 
 from __future__ import annotations
 
@@ -67,6 +67,13 @@ class DoubtSettings(Settings):
     noise_ratio_of_imitated_bristles: float = setting(3.0, "")
     """Ratio of residual to noise above which missing effects may look like bristles. With play, a fit that left 8 times
     the noise gave 31 to 96 kN/m instead of 262 kN/m."""
+
+    bristles_fitted_too_soft: float = setting(10.0, "")
+    """Largest ratio of the true stiffness or damping of bristles to one that missing effects imitate. With play it was
+    8.5."""
+
+    bristles_fitted_too_stiff: float = setting(3.0, "")
+    """Largest ratio of imitated stiffness or damping of bristles to the true one. None above 1 was seen."""
 
     error_of_a_poor_model: float = setting(0.3, "")
     """Relative error of the force above which a model does not describe the record."""
@@ -239,6 +246,10 @@ class DoubtSettings(Settings):
 @dataclass(frozen=True)
 class IdentificationSettings(Settings):
     """Settings of the inverse model, of the spread of fits, and of the stage file that is written."""
+
+    most_asymmetry_of_friction: float = setting(0.3, "")
+    """Largest difference of friction by direction, relative to its mean, that bearings show. A constant force beyond
+    that is no asymmetry."""
 
     # Estimates of several experiments.
     chance_of_agreement: float = setting(0.01, "")
@@ -460,6 +471,88 @@ class ExperimentSettings(Settings):
     """Largest stiffness of a joint, relative to its limiter's stiffness."""
 
 
+@dataclass(frozen=True)
+class WitnessSettings(Settings):
+    """Settings of the replay of the given controller on a log."""
+
+    force_left_by_the_controller: float = setting(0.15, "")
+    """Largest share of the logged force that a controller leaves which explains it. Sound records leave 0.02 to 0.09,
+    a clock that is off by two 0.6 and more."""
+
+    error_of_an_agreeing_slope: float = setting(0.15, "")
+    """Largest error of the force by the given controller. Sound records have slopes of 0.94 to 1.00."""
+
+    slopes_of_a_scale: tuple[float, float] = setting((0.3, 3.0), "")
+    """Slopes between which gains may be others than stated. Beyond, a unit or a sign is wrong."""
+
+    share_of_a_limit: float = setting(0.999, "")
+    """Share of the largest force from which a sample counts as at the limit."""
+
+    share_at_a_limit: float = setting(0.005, "")
+    """Share of samples at the largest force above which it counts as a limit."""
+
+    reach_of_a_clock: float = setting(20.0, "")
+    """Largest ratio of clocks searched. Larger ones are units, which the logged names tell."""
+
+    clocks_tried: int = setting(41, "")
+    """Clocks tried over that range, a sixth apart. The best one is refined."""
+
+    refinements_of_a_clock: int = setting(6, "")
+    """Halvings of the step between clocks. Six find a clock to 0.3 %."""
+
+    share_left_by_a_cause: float = setting(0.4, "")
+    """Largest share left with another clock or feedforward, relative to that without, for the cause to be believed."""
+
+    shares_of_a_record: tuple[float, float] = setting((0.2, 0.8), "")
+    """First and last share of a record at which gains may be switched."""
+
+    instants_tried: int = setting(13, "")
+    """Instants tried over that range."""
+
+    samples_of_a_start: int = setting(10, "")
+    """Samples at the start that do not count, in which filters of the controller forget that they began at rest."""
+
+    samples_of_delay: int = setting(4, "")
+    """Longest delay searched from position to force [samples]."""
+
+
+@dataclass(frozen=True)
+class PresentationSettings(Settings):
+    """Settings of how results are written and drawn."""
+
+    digits_without_an_interval: int = setting(4, "")
+    """Largest number of significant digits of a value without interval, as many as instruments have."""
+
+    zeros_before_an_exponent: int = setting(4, "")
+    """Zeros before the decimal point above which a number gets an exponent, which is then shorter."""
+
+    decimals_before_an_exponent: int = setting(7, "")
+    """Decimals above which a number gets an exponent, which is then shorter."""
+
+    digits_of_an_exact_value: int = setting(15, "")
+    """Largest number of digits after the first one; a floating-point number has no more."""
+
+    plain_forces: tuple[float, float] = setting((1e-2, 1e4), "N")
+    """Range of forces, and of quantities per newton, without an SI prefix; they are compared with each other."""
+
+    misfit_at_the_top: float = setting(5.0, "")
+    """Upper end of the axis of a profile, in units of the misfit at the ends of the 95 % interval."""
+
+    ratio_of_a_logarithmic_axis: float = setting(8.0, "")
+    """Ratio of its ends above which a profile has a logarithmic axis."""
+
+    periods_of_a_force_record: float = setting(40.0, "")
+    """Length of the force record at the head of the page, in periods of the motion's bandwidth."""
+
+    points_of_a_record: int = setting(5000, "")
+    """Number of points drawn of a record of slow sliding; more make a page heavy and show nothing."""
+
+    points_of_a_curve: int = setting(200, "")
+    """Number of points drawn of the friction curve at steady velocities, which then looks smooth."""
+
+
 doubt_settings = DoubtSettings.live()
+witness_settings = WitnessSettings.live()
 identification_settings = IdentificationSettings.live()
 experiment_settings = ExperimentSettings.live()
+presentation_settings = PresentationSettings.live()

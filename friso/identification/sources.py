@@ -133,9 +133,7 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
     kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
     courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
     for name in KINDS if len(courses) > 1 else ():
-        claims = KINDS[name].claims_together
-        reason = claims(courses) if claims is not None else None
-        if reason is not None:
+        if (reason := KINDS[name].claims_together(courses)) is not None:
             return [
                 replace(file, kind=name, reason=reason) if number in kindless and isinstance(file.source, Log) else file
                 for number, file in enumerate(files)
@@ -262,12 +260,12 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     Raises InputError if no kind claims it, or several do.
     """
     course = Course(log)
-    reasons = {name: reason for name in KINDS if (reason := KINDS[name].claimed(course)) is not None}
+    reasons = {name: reason for name in KINDS if (reason := KINDS[name].claims(course)) is not None}
     replaced = {other for name in reasons for other in KINDS[name].instead_of}
     reasons = {name: reason for name, reason in reasons.items() if name not in replaced}
     if len(reasons) == 1:
         return next(iter(reasons.items()))
-    names = sorted(reasons or KINDS, key=lambda name: KINDS[name].around is None)
+    names = sorted(reasons or KINDS, key=lambda name: not KINDS[name].makes_stage)
     expected = f"the kind of experiment: {', '.join(names)}"
     likely = "standstill" if course.rests and not reasons else names[0]
     raise LogError("--as", course.words, expected, f"--as {likely}", str(path))

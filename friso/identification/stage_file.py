@@ -15,6 +15,7 @@ from friso.identification.inverse_model import InverseModel, moved_in
 from friso.identification.logs.log import Log
 from friso.identification.settings import identification_settings
 from friso.stage import Stage
+from friso.stage.contacts import usual_ranges, written
 
 NOT_IDENTIFIED = "not identified: all that is possible"
 
@@ -114,11 +115,16 @@ def origins(
     return {key: sources.get(key, CHOSEN if key in ours else "as given") for key in keys}
 
 
-def with_unknown(stage: Stage, origins: Mapping[str, str], left: Collection[str]) -> Stage:
-    """Return the stage with a list of the values that are unknown.
+def with_unknown(
+    stage: Stage, origins: Mapping[str, str], left: Collection[str], estimates: Iterable[Estimate] = ()
+) -> Stage:
+    """Return the stage with a list of the values that are unknown, and with the range of each that friction has.
 
-    They are those that friso chose, apart from the motion, those `left` open by the logs, and those that only moved
-    along with another key. By `origins`, keys have their origins in words. A value with an interval of its own is
+    Ranges are those of similar machines (`friso.stage.contacts`), cut by the finite ends of `estimates`. They hold the
+    value that the stage has.
+
+    They are those that friso chose, apart from the motion, keys and tables `left` open by the logs, and keys that only
+    moved along with another one. By `origins`, keys have their origins in words. A value with an interval of its own is
     known, and a controller that friso chose as a whole is listed as such.
     """
     numbers, uncertain = (
@@ -135,8 +141,17 @@ def with_unknown(stage: Stage, origins: Mapping[str, str], left: Collection[str]
     of_controller = {origin for key, origin in origins.items() if key.startswith("controller.")}
     if of_controller == {CHOSEN}:
         unknown = [*(key for key in unknown if not key.startswith("controller.")), "controller"]
+    tables = [name for name in left if "." not in name]
+    unknown = [*(key for key in unknown if key.partition(".")[0] not in tables), *tables]
     listed = dict.fromkeys([*stage.unknown_keys, *unknown])
-    return stage.replace({"unknown": ", ".join(listed)}) if listed else stage
+    bounds = {one.name: (one.low, one.high) for one in estimates if not one.determined}
+    wide = {key for key, interval in stage.uncertain().items() if interval.wide and origins.get(key) == NOT_IDENTIFIED}
+    open_keys = [*wide, *(key for key in listed if key not in uncertain)]
+    keys, flat, changes = stage.numeric_keys(), stage.flat(), {}
+    for key, ends in usual_ranges(stage, open_keys, bounds).items():
+        own = ends[0] if origins.get(key) == CHOSEN or key in wide else flat[key]
+        changes[key] = written((min(ends[0], own), max(ends[1], own)), keys[key].unit)
+    return stage.replace({**changes, **({"unknown": ", ".join(listed)} if listed else {})})
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:

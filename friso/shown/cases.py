@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from friso.axis import axis_shown
+from friso.axis import unit_shown
 from friso.hunting import Case
-from friso.hunting.measures import BANDS as SETTLING_BANDS
 from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
 from friso.stage import Stage
 
 COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
 LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
-BANDS = dict(zip(SETTLING_BANDS, ("1 µm", "10 µm"), strict=True))
 
 
 def band_text(band: float) -> str:
     """Write a settling band [m] in words, such as 10 µm."""
-    return axis_shown().text(BANDS[band])
+    return f"{1e6 * band:g} {unit_shown('µm')}"
 
 
 @dataclass(frozen=True)

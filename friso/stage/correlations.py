@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -53,10 +53,16 @@ class Correlations:
         if problem := _problem(self.matrix, len(self.keys)):
             raise StageError("matrix", problem, "a correlation matrix, one row and one column per key", _EXAMPLE)
 
-    def among(self, keys: Iterable[str]) -> Correlations:
+    def among(self, keys: Collection[str]) -> Correlations:
         """Select the correlations among some of the keys."""
-        places = [k for k, key in enumerate(self.keys) if key in [*keys]]
+        places = [k for k, key in enumerate(self.keys) if key in keys]
         return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
+
+    def with_others(self, other: Correlations) -> Correlations:
+        """Add the correlations of another object among the keys that this one does not have."""
+        more = other.among([key for key in other.keys if key not in self.keys])
+        corner = np.zeros((len(self.keys), len(more.keys)))
+        return Correlations((*self.keys, *more.keys), np.block([[self.matrix, corner], [corner.T, more.matrix]]))
 
     def over(self, keys: list[str]) -> np.ndarray:
         """Return the correlation matrix of `keys`, shape (keys, keys), in their order.
@@ -82,6 +88,24 @@ def _problem(matrix: np.ndarray, size: int) -> str:
     if size and np.linalg.eigvalsh(matrix).min() < -MATRIX_ROUNDING * size:
         return "not positive semidefinite: no quantities can be correlated like this"
     return ""
+
+
+GUESSED_TOGETHER = (("friction.static", "friction.coulomb"), ("friction.bristle_stiffness", "friction.bristle_damping"))
+"""Pairs of keys that grow together over machines: levels of friction, and stiffness and damping of bristles."""
+
+CORRELATION_OF_GUESSES = 0.97
+"""Correlation of the two keys of a pair. Independent draws would have ratios that no machine shows."""
+
+
+def guessed_together(stage: Stage) -> Correlations:
+    """Return the correlations of pairs of keys of which nobody knows either; none without such a pair.
+
+    A key whose range spans orders of magnitude counts as unknown, too.
+    """
+    guessed = {key for key, one in stage.uncertain().items() if one.wide or key in stage.unknown_keys}
+    keys = [key for pair in GUESSED_TOGETHER if {*pair} <= guessed for key in pair]
+    one = np.array([[1.0, CORRELATION_OF_GUESSES], [CORRELATION_OF_GUESSES, 1.0]])
+    return Correlations((*keys,), np.kron(np.eye(len(keys) // 2), one))
 
 
 def correlations_file(path: str | os.PathLike[str]) -> Path:

@@ -15,6 +15,7 @@ from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, as_toml, exactly, in_unit_of, quoted
+from friso.stage.contacts import with_guess
 from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLER,
@@ -135,7 +136,8 @@ class Stage(Section):
     )
 
     def __init__(self, /, **data: Any) -> None:
-        self._take(data, axis_written(data))
+        axis = axis_written(data)
+        self._take(with_guess(data, axis), axis)
 
     def __getstate__(self) -> dict[Any, Any]:
         """Return the state to be pickled: the tables, without cached results."""
@@ -248,9 +250,15 @@ class Stage(Section):
         return _split(self.unknown)
 
     @property
+    def assumed_keys(self) -> tuple[str, ...]:
+        """Return the unknown keys, and tables, for which the stage file has one value and no range."""
+        ranges = self.uncertain()
+        return tuple(key for key in self.unknown_keys if key not in ranges)
+
+    @property
     def doubt(self) -> str:
-        """Return why nothing is certain of a stage with unknown values; "" for another."""
-        keys = self.unknown_keys
+        """Return why nothing is certain of a stage with unknown values that have no range; "" for another."""
+        keys = self.assumed_keys
         return f"{' and '.join(keys)} {'is' if len(keys) == 1 else 'are'} listed as unknown" if keys else ""
 
     def _written(self, rule: Rule) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from friso.engine.arrays import ArrayColumns
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import at_bandwidth, bandwidth
 from friso.equations.structure import shared_structure
-from friso.hunting import Margin, find_attractors, judge_many, kernels_to_judge, loops_unstable, sketch_attractors
+from friso.hunting import can_hunt, find_attractors, judge_many, kernels_to_judge, loops_unstable, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, separation, share
@@ -80,59 +81,152 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
         if not all(parts.values()):
             raise
     by_variant = {name: Fates.joined(some) for name, some in parts.items()}
-    return {
-        name: by_variant[next(other for other, same in variants.items() if same == variant)]
-        for name, variant in stage.variants().items()
-    }
+    return {name: by_variant[same] for name, same in _same(stage).items()}
 
 
 @dataclass(frozen=True)
-class DrawnEdges:
-    """Edges of hunting of drawn stages: the bandwidths [Hz] below which they hunt, (count,).
+class DrawnBandwidths:
+    """At which bandwidths drawn stages hunt.
 
-    An edge lies between `low` and `high`. Both are NaN for a stage that hunts at none of the tried bandwidths, or up to
-    the last. They are also NaN if it is not certain at one of these whether the stage hunts.
+    `factors` multiply the stage's own bandwidth, in ascending order, (bandwidths,). `hunts` is 1 where a drawn stage
+    has an attractor, 0 where it surely has none, and NaN where that is not certain or its loop is unstable,
+    (draws, bandwidths). `own` is the stage's bandwidth [Hz]; None if its controller states none. Coarse return maps
+    tell which stages hunt, so an attractor with a narrow basin may be missed.
     """
 
-    low: np.ndarray
-    high: np.ndarray
+    factors: np.ndarray
+    hunts: np.ndarray
+    own: float | None
+
+    def at(self, factor: float) -> np.ndarray:
+        """Return which stages hunt at the bandwidth tried that is nearest to a factor, (draws,)."""
+        return self.hunts[:, np.argmin(abs(np.log(self.factors / factor)))]
+
+    @property
+    def quiet(self) -> np.ndarray:
+        """Tell at which bandwidths no drawn stage hunts, for certain, (bandwidths,)."""
+        return (self.hunts == 0).all(axis=0)
+
+    @property
+    def cure(self) -> tuple[float, float] | None:
+        """Return the first range of faster bandwidths at which no drawn stage hunts, as factors; None without one.
+
+        It reaches over a coarse step at least, so that the cure does not stand on an edge.
+        """
+        at = np.flatnonzero(self.factors > 1 + FINEST_STEP)
+        for first in at:
+            run = 0
+            while first + run < len(self.factors) and self.quiet[first + run]:
+                run += 1
+            low, high = self.factors[first], self.factors[first + run - 1]
+            if run and high >= low * settings.step_of_bandwidths * (1 - FINEST_STEP):
+                return float(low), float(high)
+        return None
+
+    @property
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the factors between which hunting of each drawn stage ends as the bandwidth grows, two of (draws,).
+
+        Both are NaN for a stage that hunts at none of the bandwidths, at the largest one, or not for certain beyond.
+        """
+        low, high = np.full((2, len(self.hunts)), np.nan)
+        for row, line in enumerate(self.hunts):
+            hunting = np.flatnonzero(line > 0)
+            if hunting.size and (last := hunting[-1]) + 1 < len(line) and line[last + 1] == 0:
+                low[row], high[row] = self.factors[last], self.factors[last + 1]
+        return low, high
 
 
-def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
-    """Find up to which bandwidth the first drawn stages hunt, near the stage's own `margin`.
+FINEST_STEP = 1e-6
+"""Relative difference below which two bandwidths are one."""
 
-    The margin is that from the stage to its edge of hunting. The last change between coarse steps of the bandwidth is
-    narrowed down by halving. Coarse return maps tell which stages hunt, so an attractor with a narrow basin may be
-    missed: the edges show their spread, not for certain where each lies. Returns None if there is no margin, or if the
-    controller has no bandwidth.
+
+def by_bandwidth(stage: Stage, sample: Sample) -> DrawnBandwidths | None:
+    """Find at which bandwidths the first drawn stages hunt: faster until none does, or slower until most do.
+
+    The number of stages follows from a fixed amount of work. Where none hunts any more, a survey of all attractors
+    confirms that. Returns None if the controller cannot be made faster, or if the stages cannot hunt.
     """
     own = bandwidth(stage.flat())
-    if margin is None or margin.crossover is None or own is None:
+    if (own is None and not (stage.controller and stage.controller.speeds_up)) or not can_hunt(stage.flat()):
         return None
-    count = min(sample.count, settings.draws_of_an_edge)
-    coarse = 1 << settings.halvings_of_an_edge
-    steps = coarse * settings.coarse_steps_of_an_edge
-    tried = margin.crossover * np.geomspace(1 / settings.reach_of_an_edge, settings.reach_of_an_edge, steps + 1)
+    trial = min(sample.count, settings.trial_draws)
+    with allowance() as spent:
+        ladder = _Ladder(stage, sample, trial, own)
+        ladder.hunts(0)
+    count = int(settings.work_of_bandwidths / settings.usual_bandwidths * trial / max(spent.used, 1.0))
+    if (count := min(sample.count, count, settings.draws_of_bandwidths)) > trial:
+        ladder = _Ladder(stage, sample, count, own)
+    if ladder.hunts(0).any():
+        ladder.climb()
+    if np.count_nonzero(ladder.hunts(0) == 1) < ladder.count / 2:
+        ladder.descend()
+    places = sorted(ladder.columns)
+    columns = np.stack([ladder.columns[one] for one in places], axis=1)
+    return DrawnBandwidths(np.array([*map(ladder.factor, places)]), columns, own)
 
-    def hunting(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return 1 where drawn stages hunt at bandwidths given by number, 0 where not, NaN where not certain."""
-        if not rows.size:
-            return np.zeros(0)
-        flat = laid_over(stage, {key: values[rows] for key, values in sample.keys.items()})
-        attracted = sketch_attractors(at_bandwidth(flat, tried[columns]), len(rows))
-        return np.where(attracted.certain, attracted.attracts, np.nan)
 
-    columns = np.arange(0, steps + 1, coarse)
-    hunts = hunting(np.repeat(np.arange(count), len(columns)), np.tile(columns, count)).reshape(count, -1)
-    rows = np.flatnonzero(np.isfinite(hunts).all(axis=1) & np.any(hunts > 0, axis=1) & (hunts[:, -1] == 0))
-    last = coarse * (len(columns) - 1 - hunts[rows, ::-1].argmax(axis=1))
-    for step in (coarse >> n for n in range(1, settings.halvings_of_an_edge + 1)):
-        farther = hunting(rows, last + step)
-        sure = np.isfinite(farther)
-        rows, last = rows[sure], last[sure] + step * farther[sure].astype(np.int64)
-    low, high = np.full((2, count), np.nan)
-    low[rows], high[rows] = tried[last], tried[last + 1]
-    return DrawnEdges(low, high)
+@dataclass(frozen=True)
+class _Ladder:
+    """The first `count` stages of a sample at bandwidths that are places on a ladder of even ratios.
+
+    Place 0 is the stage's bandwidth, `own` [Hz]. `columns` are results by place, as in `DrawnBandwidths`.
+    """
+
+    stage: Stage
+    sample: Sample
+    count: int
+    own: float | None
+    columns: dict[int, np.ndarray] = field(default_factory=dict)
+
+    coarse: ClassVar[int] = 1 << settings.halvings_of_bandwidths
+    """Places in a coarse step."""
+
+    def factor(self, place: int) -> float:
+        """Return the bandwidth at a place, as a factor on that of the stage."""
+        return float(settings.step_of_bandwidths ** (place / self.coarse))
+
+    def within(self, place: int) -> bool:
+        """Tell whether a place is within reach."""
+        return 1 / settings.reach_of_bandwidths <= self.factor(place) <= settings.reach_of_bandwidths
+
+    def hunts(self, place: int, thoroughly: bool = False) -> np.ndarray:
+        """Return which stages hunt at a place: 1, 0, or NaN where that is not certain or the loop unstable, (count,).
+
+        Coarse maps tell it, or `thoroughly` a survey, which replaces what a map has told.
+        """
+        if thoroughly or place not in self.columns:
+            keys = {key: values[: self.count] for key, values in self.sample.keys.items()}
+            flat = at_bandwidth(laid_over(self.stage, keys), self.factor(place) * (self.own or 1.0))
+            attracted = (find_attractors if thoroughly else sketch_attractors)(flat, self.count)
+            sure = attracted.certain & ~loops_unstable(flat, self.count)
+            self.columns[place] = np.where(sure, attracted.attracts, np.nan)
+        return self.columns[place]
+
+    def climb(self) -> None:
+        """Try faster controllers until no stage hunts over a coarse step, and find the first of these bandwidths."""
+        place, quiet = 0, 0
+        while quiet < 2 and self.within(place + self.coarse):
+            place += self.coarse
+            column = self.hunts(place)
+            quiet = 0 if np.any(column != 0) else quiet + 1
+            if np.isnan(column).mean() > settings.most_unstable_draws:
+                return
+        if quiet < 2:
+            return
+        low, high = place - 2 * self.coarse, place - self.coarse
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if np.any(self.hunts(middle) != 0) else (low, middle)
+        while np.any(self.hunts(high, thoroughly=True) != 0) and high < place:
+            high += 1
+
+    def descend(self) -> None:
+        """Try slower controllers until most stages hunt."""
+        place = 0
+        while self.within(place - self.coarse) and np.count_nonzero(self.hunts(place) == 1) < self.count / 2:
+            place -= self.coarse
+            self.hunts(place)
 
 
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
@@ -150,8 +244,8 @@ def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float)
 class Draws:
     """Stages drawn from an uncertain one with a seed, and verdicts on them by variant.
 
-    Variants are as in the file, locked and free. After an interruption there are fewer stages than were `asked` for,
-    and no `edges`.
+    Variants are as in the file, locked and free; `bandwidths` are by variant, too. After an interruption there are
+    fewer stages than were `asked` for, and no `bandwidths`.
     """
 
     stage: Stage
@@ -159,7 +253,7 @@ class Draws:
     seed: int
     fates: Mapping[str, Fates]
     asked: int
-    edges: DrawnEdges | None = None
+    bandwidths: Mapping[str, DrawnBandwidths] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -168,18 +262,25 @@ class Draws:
         sample: Sample,
         seed: int,
         rtol: float,
-        margin: Margin | None = None,
         progress: Progress = silent,
     ) -> Draws:
-        """Judge the stages of a sample, and find the edges of hunting of the first ones.
-
-        Edges are sought near the stage's `margin`, its distance from the edge. The function `fates` makes the verdicts.
-        """
+        """Judge the stages of a sample (see `fates`), and find at which bandwidths the first ones hunt."""
         judged = fates(stage, sample, rtol, progress)
         count = len(next(iter(judged.values())).verdicts)
         keys = {key: values[:count] for key, values in sample.keys.items()}
-        ends = edges(stage, sample, margin) if count == sample.count else None
-        return cls(stage, replace(sample, keys=keys, count=count), seed, judged, sample.count, ends)
+        bandwidths: dict[str, DrawnBandwidths] = {}
+        if count == sample.count:
+            tried = {name: by_bandwidth(variant, sample) for name, variant in different(stage).items()}
+            by_name = {name: tried[same] for name, same in _same(stage).items()}
+            bandwidths = {name: one for name, one in by_name.items() if one is not None}
+        return cls(stage, replace(sample, keys=keys, count=count), seed, judged, sample.count, bandwidths)
+
+    def split(self, name: str) -> bool:
+        """Tell whether the drawn stages of a variant differ in whether they hunt, or are not decided for certain."""
+        fates = self.fates[name]
+        attracted = np.isin(fates.verdicts, ATTRACTED)
+        open_ones = np.isin(fates.verdicts, UNDECIDED)
+        return bool(open_ones.mean() > settings.most_open_draws or len({*attracted[~open_ones].tolist()}) > 1)
 
     def unit(self, key: str) -> str:
         """Return the SI unit of a key."""
@@ -193,6 +294,14 @@ def different(stage: Stage) -> dict[str, Stage]:
         if variant not in variants.values():
             variants[name] = variant
     return variants
+
+
+def _same(stage: Stage) -> dict[str, str]:
+    """Return, for each variant of a stage, the name of the first variant that equals it."""
+    variants = stage.variants()
+    return {
+        name: next(other for other, one in variants.items() if one == variant) for name, variant in variants.items()
+    }
 
 
 def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally) -> Fates:

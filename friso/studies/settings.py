@@ -46,17 +46,29 @@ class StudySettings(Settings):
     """Work of a check without a requested number of draws (see `friso.engine.allowance`). It takes about 4 s on one
     core."""
 
-    draws_of_an_edge: int = setting(16, "")
-    """Draws whose edge of hunting is searched. Each takes as many searches as steps and halvings together."""
+    draws_of_bandwidths: int = setting(64, "")
+    """Most draws tried at other bandwidths. If none of 59 hunts, 95 % of all do not, with 95 % confidence."""
 
-    coarse_steps_of_an_edge: int = setting(4, "")
-    """Steps of the bandwidth at which an edge is looked for. Windows of hunting narrower than a step are missed."""
+    work_of_bandwidths: float = setting(3e8, "")
+    """Work of trying draws at other bandwidths, about as much as the verdicts on them."""
 
-    halvings_of_an_edge: int = setting(2, "")
-    """Halvings of the step that holds the edge. Fewer give a coarser edge."""
+    usual_bandwidths: int = setting(10, "")
+    """Bandwidths that are usually tried, among which the work is divided."""
 
-    reach_of_an_edge: float = setting(1.6, "")
-    """Factor about the stage's own edge of hunting over which bandwidths are tried."""
+    step_of_bandwidths: float = setting(1.26, "")
+    """Ratio of bandwidths that are tried, about three an octave. Windows of hunting narrower than a step are missed."""
+
+    halvings_of_bandwidths: int = setting(2, "")
+    """Halvings of the step in which hunting ends. Fewer advise more bandwidth than is needed."""
+
+    reach_of_bandwidths: float = setting(8.0, "")
+    """Largest factor up and down to which bandwidths are tried. Few machines can be made faster by more."""
+
+    most_unstable_draws: float = setting(0.5, "")
+    """Largest share of draws whose loop may be unstable at a bandwidth before no faster ones are tried."""
+
+    most_open_draws: float = setting(0.05, "")
+    """Largest share of draws without a certain verdict with which the others decide."""
 
     most_draws: int = setting(100_000, "")
     """Most draws. At the edge of hunting a draw takes 50 ms, so more take hours."""

@@ -5,6 +5,4 @@ tests/test_plug_in_packages.py installs it:
 resting = "friso_resting.resting"
 [project.entry-points."friso.rig_experiments"]
 at-rest = "friso_resting.at_rest"
-[project.entry-points."friso.rig_views"]
-at-rest = "friso_resting.at_rest"
 """

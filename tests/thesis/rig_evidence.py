@@ -81,7 +81,15 @@ def traces() -> RailTraces:
 
 def loop(tuned: float, *crossings: float) -> MeasuredLoop:
     line, none = np.array([tuned, 20 * tuned]), np.zeros(2)
-    response = FrequencyResponse(line, np.array([1.0, 0.1]) + 0j, none, none, none, none + 2, "multisine")
+    response = FrequencyResponse(
+        frequency=line,
+        response=np.array([1.0, 0.1]) + 0j,
+        deviation=none,
+        noise=none,
+        distortion=none,
+        degrees=none + 2,
+        kind="multisine",
+    )
     return MeasuredLoop(
         tuned, response, tuple(Estimate.normal("crossover", "Hz", crossing, 0.1, "") for crossing in crossings)
     )

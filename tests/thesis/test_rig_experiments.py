@@ -20,14 +20,14 @@ def test_what_has_no_joint() -> None:
     bare = RIG.replace({"joint": None, "parasitic": None})
     for experiment in (stroke_crossover, measured_cycles, in_position):
         with refused("joint"):
-            experiment.run_experiment(bare, 1, silent)
+            experiment.EXPERIMENT.run(bare, 1, silent)
 
 
 def test_the_stroke_of_a_free_joint_matters() -> None:
     """The result agrees with Fig. 26, and the page says so."""
     sizes = {"RELATIVE_CROSSOVERS": np.array([0.5, 1.0]), "RELATIVE_STROKES": np.array([0.02, 1.0])}
     with patched({stroke_crossover: {**sizes, "rails": lambda stage: rails(stage)[:2]}}):
-        outcome = stroke_crossover.run_experiment(RIG, 1, silent)
+        outcome = stroke_crossover.EXPERIMENT.run(RIG, 1, silent)
     assert outcome.result.share[1, 1] == 0
     assert outcome.result.share[0].max() > 0
     assert all(sentences(outcome))

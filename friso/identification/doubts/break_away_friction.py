@@ -32,7 +32,7 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     if more is not None:
         static, unit = case.determined["friction.static"].value, case.unit
         why = f"motions begin with {more:.3g} {unit} of friction, more than the {static:.3g} {unit} of the fit"
-        yield RaisedDoubt("", more - static, case.unit, refuses=dict.fromkeys(CURVE, why))
+        yield RaisedDoubt(words="", size=more - static, unit=case.unit, refuses=dict.fromkeys(CURVE, why))
 
 
 def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramps: Ramps) -> float | None:

@@ -57,7 +57,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     ):
         if changes.sure and size > doubt_settings.friction_share_of_a_change * case.inverse.value("coulomb"):
             words = f"{what} changes by {size:.2g} {case.unit} during the record ({cause})"
-            yield RaisedDoubt(f"{words}: intervals reach from its least to its largest", size, case.unit)
+            yield RaisedDoubt(
+                words=f"{words}: intervals reach from its least to its largest", size=size, unit=case.unit
+            )
 
 
 def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:

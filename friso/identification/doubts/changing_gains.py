@@ -20,7 +20,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     by speed of the reference, or by place. One linear controller has equal gains in all parts, whatever the machine
     does. With drifting clocks the phase of the law changes as well, but not its size.
     """
-    if "reference" not in case.log:
+    if "reference" not in case.log or case.commanded:
         return
     signals, stretch, course = control_law(case)
     fewest = doubt_settings.rows_for_each_gain * (signals.shape[1] - 1 + len(np.unique(stretch)))
@@ -48,7 +48,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         f"setting against friction acts there. One controller with fixed gains leaves {one_law:.2g} {case.unit} of the "
         f"force, two leave {two_laws:.2g} {case.unit}; a record with fixed gains and no such setting would decide it"
     )
-    yield RaisedDoubt(words, ratio)
+    yield RaisedDoubt(words=words, size=ratio)
 
 
 def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:

@@ -18,7 +18,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     if offset > max(coulomb, share * float(np.std(inverse.measured))):
         force = f"{inverse.value('offset'):.3g} {case.unit}"
         words = f"a constant force of {force} exceeds the friction: gravity, or an offset of the channel"
-        yield RaisedDoubt(words, offset, case.unit)
+        yield RaisedDoubt(words=words, size=offset, unit=case.unit)
 
 
 DOUBT = Doubt(

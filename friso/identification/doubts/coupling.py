@@ -32,7 +32,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         share = -float(np.expm1(-lighter))
         clear = case.leading is not None or explained.left <= doubt_settings.power_left_by_an_effect
         words = _sentence(share) if clear and case.may_name("coupling") else ""  # averaged motion looks like that, too
-        yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
+        yield RaisedDoubt(words=words, size=share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

@@ -30,7 +30,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
                 "delay of the drive or between the channels, which passes for damping and viscous friction; the "
                 "intervals allow for it"
             )
-        yield RaisedDoubt(words, late, "s", fit=case.reaching(explained.moved))
+        yield RaisedDoubt(words=words, size=late, unit="s", fit=case.reaching(explained.moved))
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

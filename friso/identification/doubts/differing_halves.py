@@ -41,7 +41,9 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
         values = f"{one.first:.4g} and {one.second:.4g} {unit}"
         words = f"The halves of the record differ in {WORDS[one.name]}: {values}; its interval holds both"
         reaches = {one.name: (one.low, one.high)}
-        yield RaisedDoubt("" if case.poor else words, abs(one.first - one.second), unit, reaches=reaches)
+        yield RaisedDoubt(
+            words="" if case.poor else words, size=abs(one.first - one.second), unit=unit, reaches=reaches
+        )
 
 
 def halves(inverse: InverseModel) -> list[Half]:

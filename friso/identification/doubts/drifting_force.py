@@ -20,7 +20,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         model = case.modelled(log, extra=time)
         rate = f"{model.value('drift'):.2g} {case.unit}/s"
         words = f"a force drifting by {rate} accounts for most of it"
-        yield RaisedDoubt(words, model.value("drift"), f"{case.unit}/s", model, spoils=True)
+        yield RaisedDoubt(words=words, size=model.value("drift"), unit=f"{case.unit}/s", without=model, spoils=True)
 
 
 DOUBT = Doubt(

@@ -20,7 +20,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
             model = case.modelled(case.log, extra=places)
             size = float(np.ptp([0.0, *(model.value(name) for name in places)]))
             words = f"a force that varies with position, by {size:.2g} {case.unit}, accounts for most of it"
-            yield RaisedDoubt(words, size, case.unit, model, spoils=True)
+            yield RaisedDoubt(words=words, size=size, unit=case.unit, without=model, spoils=True)
 
 
 def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:

@@ -49,7 +49,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         f"Friction differs between forward and backward motion by more than its level: either alone leaves "
         f"{less:.2g} {case.unit} unexplained, both together {both.left:.2g} {case.unit}"
     )
-    yield RaisedDoubt(words, less, case.unit, fit=reaching, spoils=True)
+    yield RaisedDoubt(words=words, size=less, unit=case.unit, fit=reaching, spoils=True)
 
 
 DOUBT = Doubt(

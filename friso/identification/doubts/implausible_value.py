@@ -18,7 +18,7 @@ def find(case: tuple[Stage, Sequence[Estimate]]) -> Iterator[RaisedDoubt]:
     keys = [estimate.name for estimate in estimates if estimate.determined]
     for sentence in plausible.implausible_values(stage):
         if sentence.partition(" ")[0] in keys:
-            yield RaisedDoubt(f"{sentence}: a wrong unit or --scale of a channel?")
+            yield RaisedDoubt(words=f"{sentence}: a wrong unit or --scale of a channel?")
 
 
 DOUBT = Doubt("stage", find, "values that no positioning stage has", "reported", "units and scales of the channels")

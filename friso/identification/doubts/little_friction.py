@@ -18,7 +18,7 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
     value, unit = case.inverse.value("coulomb"), case.unit
     least = doubt_settings.force_share_of_no_friction * float(np.std(case.inverse.measured))
     if value < least:
-        yield RaisedDoubt(_sentence(case, value, least), value, unit)
+        yield RaisedDoubt(words=_sentence(case, value, least), size=value, unit=unit)
 
 
 def _sentence(case: ValueCase, value: float, least: float) -> str:

@@ -30,7 +30,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         "preloaded screws does: no friction of the stage file does so, and the intervals allow for it; constant speeds "
         "with and without a load would show it"
     )
-    yield RaisedDoubt(words, share, fit=case.reaching(effect.explained.moved), explains=True)
+    yield RaisedDoubt(words=words, size=share, fit=case.reaching(effect.explained.moved), explains=True)
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

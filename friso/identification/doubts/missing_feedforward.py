@@ -24,7 +24,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
     The feedforward must improve the fit while the stage is fast, too.
     """
-    fed = fed_forward(case)
+    fed = None if case.commanded else fed_forward(case)
     if fed is None or not lacks_when_fast(case.inverse, fed[1]):
         return
     model, mass = fed[0], -fed[0].value(ACCELERATION)
@@ -35,7 +35,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         f"the force lacks {mass:.2g} {kg} times the acceleration of the reference{also}, which suggests that a "
         "feedforward is not part of it"
     )
-    yield RaisedDoubt(words, mass, kg, model, spoils=True)
+    yield RaisedDoubt(words=words, size=mass, unit=kg, without=model, spoils=True)
 
 
 def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:

@@ -29,7 +29,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         f"{percent(share)} of the power of the residual is near {rates[peak]:.3g} Hz: a mode in the band, or a force "
         "that repeats along the way, such as cogging"
     )
-    yield RaisedDoubt(words, float(share))
+    yield RaisedDoubt(words=words, size=float(share))
 
 
 DOUBT = Doubt(

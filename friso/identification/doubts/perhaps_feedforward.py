@@ -17,13 +17,13 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     is fast.
     """
     fed, share = missing_feedforward.fed_forward(case), doubt_settings.error_share_of_a_cause
-    if fed is None or fed[0].error >= share * case.inverse.error:
+    if case.commanded or fed is None or fed[0].error >= share * case.inverse.error:
         return
     if missing_feedforward.lacks_when_fast(case.inverse, fed[1]):
         return
     mass, kg = case.inverse.value("mass") - fed[0].value(missing_feedforward.ACCELERATION), unit_of("kg", case.log)
     words = f"if the force leaves out a feedforward, which this log does not tell, the mass is about {mass:.2g} {kg}"
-    yield RaisedDoubt(words, mass, kg)
+    yield RaisedDoubt(words=words, size=mass, unit=kg)
 
 
 DOUBT = Doubt(

@@ -18,8 +18,8 @@ def find(bench: Bench) -> Iterator[RaisedDoubt]:
         return
     force, motion = bench.driven.channels.input, bench.driven.channels.output
     yield RaisedDoubt(
-        f"The {motion} goes against the {force}, which no mass does: one of them has the wrong sign; the values are "
-        "those with the sign reversed"
+        words=f"The {motion} goes against the {force}, which no mass does: one of them has the wrong sign; the values "
+        "are those with the sign reversed"
     )
 
 

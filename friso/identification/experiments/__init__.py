@@ -1,1 +1,1 @@
-"""Kinds of experiment, one file each: the analysis of its logs, declared as `KIND`."""
+"""Kinds of experiment, one file and one class each, declared as `KIND`: how logs are analysed, and results shown."""

@@ -5,17 +5,23 @@ Thesis, Sec. 3.2.2 and 4.3.2, Fig. 24 to 27.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from friso.errors import InputError
 from friso.hunting import hunting
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, of_one
+from friso.identification.kind import TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel
 from friso.identification.settings import experiment_settings
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.palette import INK, VERMILLION
+from friso.shown.drawing.prefixes import with_unit
 
 
 @dataclass(frozen=True)
@@ -26,7 +32,7 @@ class PredictedCycle:
     period: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class HuntingLog:
     """Swings of a stage about its reference.
 
@@ -105,16 +111,69 @@ def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
     return side[last]
 
 
-def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> HuntingLog:
-    """Analyse a log of hunting, and predict the cycle of the stage, if a stage file is given."""
-    shown = swings_of(log)
-    if prior.stage is None or not prior.from_user:
-        return shown
-    cycle = next(iter(hunting(prior.stage).attracting), None)
-    if cycle is None:
-        warning = "The stage file does not hunt, whatever the move: its friction or its controller is another."
-        return replace(shown, warnings=(warning,))
-    return replace(shown, predicted=PredictedCycle(float(cycle.amplitude), float(cycle.period)))
+class HuntingKind(ExperimentKind[HuntingLog]):
+    """Hunting in a log, compared with the predicted cycle."""
+
+    title = "Hunting"
+    roles = ("position",)
+    longest = True
+
+    def analyse_log(self, log: Log, prior: Prior, settings: AnalysisSettings) -> HuntingLog:
+        """Analyse a log of hunting, and predict the cycle of the stage, if a stage file is given."""
+        shown = swings_of(log)
+        if prior.stage is None or not prior.from_user:
+            return shown
+        cycle = next(iter(hunting(prior.stage).attracting), None)
+        if cycle is None:
+            warning = "The stage file does not hunt, whatever the move: its friction or its controller is another."
+            return replace(shown, warnings=(warning,))
+        return replace(shown, predicted=PredictedCycle(float(cycle.amplitude), float(cycle.period)))
+
+    def facts(self, result: HuntingLog) -> Facts:
+        """List count, period, amplitude and symmetry of the cycles, and the predicted cycle."""
+        period = f"{result.period:.3g} s (standard deviation {result.period_deviation:.2g} s)"
+        scatter = with_unit(result.amplitude_deviation, "m")
+        amplitude = f"±{with_unit(result.amplitude, 'm')} (standard deviation {scatter})"
+        sides = f"{with_unit(result.above, 'm')} above the reference, {with_unit(result.below, 'm')} below"
+        facts = [
+            ("Whole cycles", str(result.count)),
+            ("Period", period),
+            ("Amplitude", amplitude),
+            ("Peaks", sides),
+        ]
+        if cycle := result.predicted:
+            slower, larger = result.period / cycle.period, result.amplitude / cycle.amplitude
+            facts.append(("Predicted cycle", f"±{with_unit(cycle.amplitude, 'm')} every {cycle.period:.3g} s"))
+            facts.append(
+                ("Measured over predicted", f"{slower:.3g} times the period, {larger:.3g} times the amplitude")
+            )
+        return tuple(facts)
+
+    def headline(self, result: HuntingLog) -> str:
+        """Say with which amplitude and period the stage hunts, and how many cycles were seen."""
+        return f"It hunts: ±{with_unit(result.amplitude, 'm')} every {result.period:.3g} s, {result.count} cycles."
+
+    def numbers(self, result: HuntingLog) -> dict[str, Any]:
+        """Return the cycles and the predicted one, for the document."""
+        numbers = entries(result, "period_s", "period_deviation_s", "amplitude_m", "amplitude_deviation_m", "warnings")
+        predicted = result.predicted and entries(result.predicted, "amplitude_m", "period_s")
+        return {**numbers, **entries(result, "above_m", "below_m"), "cycles": result.count, "predicted": predicted}
+
+    def figures(self, result: HuntingLog, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw the deviation over time with the peaks of the cycles, and the predicted amplitude."""
+        limits = ()
+        if result.predicted:
+            size = result.predicted.amplitude
+            limits = (Limit((-size, size), "predicted amplitude", VERMILLION, "dashed"),)
+        panel = Panel(
+            "",
+            TIME,
+            Axis("Position minus reference", "m"),
+            (Series(result.time, result.deviation, "as logged", INK, width=1.0),),
+            (Markers(result.time[result.peaks], result.deviation[result.peaks], "peaks", VERMILLION),),
+            limits,
+        )
+        return [Figure(f"{name}_record", "Hunting", "From the last change of the reference on.", (panel,))]
 
 
-KIND = ExperimentKind[HuntingLog](of_one(_analyse), roles=("position",))
+KIND = HuntingKind()

@@ -7,6 +7,7 @@ linear in all but q, once the motion is measured. Motion that is quick enough sh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -15,8 +16,19 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from friso.errors import InputError
+from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, by_rows, of_one
+from friso.identification.estimate_documents import estimates_document
+from friso.identification.estimate_words import with_interval
+from friso.identification.kind import (
+    TIME,
+    AnalysisSettings,
+    ExperimentKind,
+    Facts,
+    Prior,
+    Source,
+    by_rows,
+)
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import bends
 from friso.identification.readings import at_bearing as bearing
@@ -34,12 +46,19 @@ from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, ORANGE
 from friso.stage import Stage
 
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
+
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
+
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
+
 SLIDES = "the bearing slides, or noise is as large as the force"
+
 SPRING = "a spring to ground acts, such as a flexure or a cable, beside bristles or instead of them"
 
 VISCOUS = "friction.viscous"
@@ -287,15 +306,6 @@ def _equation(record: BearingRecord, between: Between, cutoff: float, mass: floa
     return _Equation(low_pass, body, low_pass(target), low_pass(inertia), tuple(map(low_pass, rest)))
 
 
-def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> Presliding:
-    """Analyse a log of small motion, and subtract viscous friction from the damping if known."""
-    between = bearing.believed_between(prior, log)
-    if VISCOUS in prior.estimates or prior.user_told(VISCOUS, log):
-        return bristles_from_presliding(log, between)
-    result = bristles_from_presliding(log, replace(between, viscous=(0.0, 0.0)))
-    return replace(result, damping=_at_most(result.damping))
-
-
 def _at_most(total: Estimate) -> Estimate:
     """Return the damping with an upper bound only: `total` includes unknown viscous friction."""
     if not total.determined:
@@ -304,30 +314,88 @@ def _at_most(total: Estimate) -> Estimate:
     return total.withheld(why, 0.0, total.high)
 
 
-def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return estimates of the bristles and, if the stage's masses add up to it, the total mass."""
-    masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
-    return (result.stiffness, result.damping, *masses)
+def presliding_caption(result: Presliding) -> str:
+    """Say how stiff and damped the bristles are, and how much of the friction stays unexplained."""
+    return (
+        f"The last tenth of the record. Stiffness of the bristles: {with_interval(result.stiffness)}; damping: "
+        f"{with_interval(result.damping)}. {percent(result.unexplained, 3)} of the friction remains unexplained."
+    )
 
 
-def _claims(course: Course) -> str | None:
-    """Return why a log holds motion before sliding, or None: moves, large or small, that bristles alone explain."""
-    if course.moves is None or not course.may_stick:
-        return None
-    try:
-        shown = bristles_from_presliding(course.log.per_unit_of_force())
-    except InputError:
-        return None
-    return "bristles explain the force, which stays below that of sliding" if shown.stiffness.determined else None
+def presliding_panels(result: Presliding) -> tuple[Panel, ...]:
+    """Draw force and model, and the motion, over the last tenth of the record."""
+    late = slice(-(len(result.time) // 10), None)
+    time, motion = result.time[late], result.position[late] - result.position[late].mean()
+    lines = (
+        Series(time, result.force[late], "force, low-passed", INK, width=1.6),
+        Series(time, result.model[late], "mass and bristles", ORANGE, "dashed", 1.2),
+    )
+    return (
+        Panel("", TIME, Axis("Force", "N"), lines),
+        Panel("", TIME, Axis("Position about its mean", "m"), (Series(time, motion, "", BLUE, width=1.0),)),
+    )
 
 
-KIND = ExperimentKind[Presliding](
-    of_one(_analyse),
-    _estimates,
-    lambda result, estimates: by_rows(result, estimates, lambda estimate: result.order(estimate.name)),
-    after=("constant-speed", "frequency", "moves"),
-    claims=_claims,
-    instead_of=("moves",),
-    foreign=("force",),
-    per_unit=True,
-)
+class PreslidingKind(ExperimentKind[Presliding]):
+    """Small motion before sliding, which shows the bristles."""
+
+    title = "Motion before sliding"
+    after = ("constant-speed", "frequency", "moves")
+    instead_of = ("moves",)
+    foreign = ("force",)
+    per_unit = True
+
+    def analyse_log(self, log: Log, prior: Prior, settings: AnalysisSettings) -> Presliding:
+        """Analyse a log of small motion, and subtract viscous friction from the damping if known."""
+        between = bearing.believed_between(prior, log)
+        if VISCOUS in prior.estimates or prior.user_told(VISCOUS, log):
+            return bristles_from_presliding(log, between)
+        result = bristles_from_presliding(log, replace(between, viscous=(0.0, 0.0)))
+        return replace(result, damping=_at_most(result.damping))
+
+    def estimates(self, result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
+        """Return estimates of the bristles and, if the stage's masses add up to it, the total mass."""
+        masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
+        return (result.stiffness, result.damping, *masses)
+
+    def claims(self, course: Course) -> str | None:
+        """Return why a log holds motion before sliding, or None: moves, large or small, that bristles alone explain."""
+        if course.moves is None or not course.may_stick:
+            return None
+        try:
+            shown = bristles_from_presliding(course.log.per_unit_of_force())
+        except InputError:
+            return None
+        return "bristles explain the force, which stays below that of sliding" if shown.stiffness.determined else None
+
+    def facts(self, result: Presliding) -> Facts:
+        """List stiffness and damping of the bristles, the moving mass, and friction not explained."""
+        facts = [
+            ("Stiffness of the bristles", with_interval(result.stiffness)),
+            ("Damping of the bristles", with_interval(result.damping)),
+            ("Moving mass", with_interval(result.mass)),
+        ]
+        if len(result.time):
+            facts += [("Residual friction", f"{percent(result.unexplained, 3)} of its standard deviation")]
+        return tuple(facts)
+
+    def numbers(self, result: Presliding) -> dict[str, Any]:
+        """Return the mass, and stiffness and damping of the bristles, for the document."""
+        estimates = estimates_document(result, "stiffness", "damping", "mass")
+        return estimates | entries(result, "unexplained", "warnings")
+
+    def figures(self, result: Presliding, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw force and model, and the motion, over the last tenth of the record.
+
+        The list is empty if no model was fitted.
+        """
+        if not len(result.model):
+            return []
+        return [Figure(f"{name}_force", "Motion before sliding", presliding_caption(result), presliding_panels(result))]
+
+    def correlated(self, result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
+        """Return the estimates with their correlation in the fit."""
+        return by_rows(result, estimates, lambda estimate: result.order(estimate.name))
+
+
+KIND = PreslidingKind()

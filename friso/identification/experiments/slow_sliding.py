@@ -9,27 +9,40 @@ bristles come from other experiments, see `presliding`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, by_rows, of_one
+from friso.identification.estimate_documents import estimate_document
+from friso.identification.estimate_words import with_interval
+from friso.identification.kind import TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source, by_rows
 from friso.identification.logs.log import Log
 from friso.identification.readings import at_bearing as bearing
 from friso.identification.readings.at_bearing import BearingRecord, Between, LowPass
 from friso.identification.readings.common import Mean, by_t, correlation_of, deflections, jackknife, stribeck_curve
 from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.settings import experiment_settings
+from friso.identification.settings import experiment_settings, presentation_settings
 from friso.quantities import percent
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK, ORANGE
+from friso.stage import Stage
 
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
+
 UNITS = ("N", "N", "m/s")
+
 METHOD = "LuGre in the motion of slow sliding"
+
 BRISTLES = "mass and bristles are needed: add a log of small motion before sliding, --as presliding"
+
 RIGID = "The structure is assumed rigid, as the stage file has no [parasitic]."
+
 DELAY = "the drive's delay is needed: give it in [drive] of the stage file, --stage"
 
 
@@ -253,11 +266,6 @@ def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.
     return estimates
 
 
-def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> SlowSliding:
-    """Analyse a log with mass and bristles from other experiments."""
-    return stribeck_from_slow_sliding(log, bearing.believed_between(prior, log), _bristles(prior, log))
-
-
 def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
     """Return mass and bristles from other experiments.
 
@@ -273,9 +281,81 @@ def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
     return MassOnBristles(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
 
 
-KIND = ExperimentKind[SlowSliding](
-    of_one(_analyse),
-    lambda result, stage: result.estimates,
-    lambda result, estimates: by_rows(result, estimates, result.estimates.index),
-    after=("constant-speed", "frequency", "moves", "presliding"),
-)
+def slow_sliding_caption(result: SlowSliding) -> str:
+    """Write Coulomb and static friction and Stribeck velocity, and how much stays unexplained."""
+    coulomb, static, stribeck = (with_interval(estimate) for estimate in result.estimates)
+    return (
+        "Force less inertia, and the friction of LuGre bristles in the measured motion. Coulomb "
+        f"friction: {coulomb}; static friction: {static}; Stribeck velocity: {stribeck}. "
+        f"{percent(result.unexplained, 3)} of "
+        "the friction remains unexplained."
+    )
+
+
+def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
+    """Draw measured and modelled friction over time and over velocity."""
+    friction = Axis("Friction, low-passed", "N")
+    thinned = slice(None, None, max(len(result.time) // presentation_settings.points_of_a_record, 1))
+
+    def both(x: np.ndarray) -> tuple[Series, ...]:
+        """Draw measured and modelled friction over a signal."""
+        return (
+            Series(x[thinned], result.friction[thinned], "force less inertia", INK, width=1.4),
+            Series(x[thinned], result.model[thinned], "LuGre's bristles", ORANGE, "dashed", 1.0),
+        )
+
+    over = Panel("", Axis("Velocity", "m/s"), friction, (*both(result.velocity), *_steady_friction(result)))
+    return Panel("", TIME, friction, both(result.time)), over
+
+
+def _steady_friction(result: SlowSliding) -> tuple[Series, ...]:
+    """Draw the friction at steady velocities without the viscous part, in both directions."""
+    coulomb, static, stribeck = (estimate.value for estimate in result.estimates)
+    if not all(estimate.determined for estimate in result.estimates):
+        return ()
+    speeds = np.linspace(0, float(np.abs(result.velocity).max()), presentation_settings.points_of_a_curve)
+    level = stribeck_curve(speeds, coulomb, static, stribeck, result.exponent)
+    velocities, forces = (np.concatenate([-values[::-1], [np.nan], values]) for values in (speeds, level))
+    return (Series(velocities, forces, "at steady velocity", BLUE, width=2.0),)
+
+
+class SlowSlidingKind(ExperimentKind[SlowSliding]):
+    """Slow sliding both ways, which shows how friction falls with speed."""
+
+    title = "Slow sliding"
+    after = ("constant-speed", "frequency", "moves", "presliding")
+
+    def analyse_log(self, log: Log, prior: Prior, settings: AnalysisSettings) -> SlowSliding:
+        """Analyse a log with mass and bristles from other experiments."""
+        return stribeck_from_slow_sliding(log, bearing.believed_between(prior, log), _bristles(prior, log))
+
+    def facts(self, result: SlowSliding) -> Facts:
+        """List Coulomb and static friction and Stribeck velocity, and how much stays unexplained."""
+        names = ("Coulomb friction", "Static friction", "Stribeck velocity")
+        facts = [(name, with_interval(estimate)) for name, estimate in zip(names, result.estimates, strict=True)]
+        if len(result.time):
+            facts += [("Residual friction", f"{percent(result.unexplained, 3)} of its standard deviation")]
+        return tuple(facts)
+
+    def numbers(self, result: SlowSliding) -> dict[str, Any]:
+        """Return Coulomb and static friction and the Stribeck velocity, for the document."""
+        named = {estimate.name.removeprefix("friction."): estimate_document(estimate) for estimate in result.estimates}
+        return named | entries(result, "unexplained", "warnings")
+
+    def figures(self, result: SlowSliding, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw measured and modelled friction, over velocity and over time; empty without a model."""
+        if not len(result.model):
+            return []
+        caption, panels = slow_sliding_caption(result), slow_sliding_panels(result)
+        return [Figure(f"{name}_friction", "Friction in slow sliding", caption, panels)]
+
+    def estimates(self, result: SlowSliding, stage: Stage | None) -> tuple[Estimate, ...]:
+        """Return the estimates of friction."""
+        return result.estimates
+
+    def correlated(self, result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
+        """Return the estimates with their correlation in the fit."""
+        return by_rows(result, estimates, result.estimates.index)
+
+
+KIND = SlowSlidingKind()

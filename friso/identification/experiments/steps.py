@@ -7,26 +7,35 @@ creeps.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.kind import ExperimentKind, of_one
+from friso.identification.estimate_documents import estimates_document
+from friso.identification.estimate_words import with_interval
+from friso.identification.kind import AREA, TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import Mean, block_mean, by_segment, by_t, cart, channel, deflection, low_pass
 from friso.identification.readings.course import Course
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import BLUE, INK
 from friso.stage import Stage
 
 SETTLED_SHARES = np.linspace(0.1, 0.7, 7)
 """Fractions of a plateau after which it may have settled, tried in turn."""
 
 KEY, UNIT = "joint.stiffness", "N/m"
+
 SOFT = "more deflection does not need more force: is the cart fixed?"
+
 METHOD = "differences of force over differences of deflection between settled position steps"
 
 
@@ -185,7 +194,8 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     method = METHOD + words
     count = int(chosen.sum())
     if count < 2:
-        reason = f"{count} step{'s' * (count != 1)}{words} between settled windows ({plateaus} plateaus): 2 are needed"
+        steps_seen = "1 step" if count == 1 else f"{count} steps"
+        reason = f"{steps_seen}{words} between settled windows ({plateaus} plateaus): 2 are needed"
         return Estimate.unknown(KEY, UNIT, method, reason)
     x, y = np.where(chosen, steps[:, 0], 0.0), np.where(chosen, steps[:, 1], 0.0)
     slope = float(x @ y / (x @ x))
@@ -234,21 +244,91 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
     return False, (f"{finding}; the deflection of the joint was measured nevertheless.",)
 
 
-def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return the estimate of the joint's stiffness; none for a stage without a joint."""
-    return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
+class StepsKind(ExperimentKind[StepStiffness]):
+    """Position steps with the cart fixed, which show the stiffness of the joint."""
+
+    title = "Position steps"
+
+    def estimates(self, result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
+        """Return the estimate of the joint's stiffness; none for a stage without a joint."""
+        return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
+
+    def claims(self, course: Course) -> str | None:
+        """Return why a log holds position steps against a joint, or None.
+
+        The position of such a log rests in several places, where the force rises with the position. No reference moves.
+        """
+        if course.reference_moves or not course.against_a_spring:
+            return None
+        return "the position rests here and there, and the force follows from the place, as against a spring"
+
+    def facts(self, result: StepStiffness) -> Facts:
+        """List the stiffness of all steps, up and down, and the hysteresis."""
+        return (
+            ("Joint stiffness", with_interval(result.stiffness)),
+            ("Steps up", with_interval(result.up)),
+            ("Steps down", with_interval(result.down)),
+            ("Hysteresis", with_interval(result.hysteresis)),
+            ("Settled windows", str(len(result.windows))),
+        )
+
+    def sentences(self, result: StepStiffness) -> tuple[str, ...]:
+        """Say whether the cart moved; empty if that was not measured."""
+        fixed = {True: "The cart stood still.", False: "The cart moved.", None: ""}[result.cart_fixed]
+        return (fixed,) if fixed else ()
+
+    def numbers(self, result: StepStiffness) -> dict[str, Any]:
+        """Return the stiffness, and the times at rest from which it follows, for the document."""
+        windows = [
+            {
+                **entries(window, "force_n"),
+                "start_s": window.start,
+                "end_s": window.end,
+                "deflection_m": window.position,
+            }
+            for window in result.windows
+        ]
+        estimates = estimates_document(result, "stiffness", "up", "down", "hysteresis")
+        return {**estimates, "windows": windows, **entries(result, "cart_fixed", "warnings")}
+
+    def figures(self, result: StepStiffness, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw deflection and force over time with the settled windows, and force over deflection."""
+        panels = []
+        for quantity, unit, values in (("Deflection", "m", result.position), ("Force", "N", result.force)):
+            low, high = float(values.min()), float(values.max())
+            room = 0.06 * (high - low)
+            bands = tuple(
+                Band(
+                    np.array([w.start, w.end]),
+                    np.full(2, low - room),
+                    np.full(2, high + room),
+                    "settled" if i == 0 else "",
+                    AREA,
+                )
+                for i, w in enumerate(result.windows)
+            )
+            line = Series(
+                result.time, values, quantity.lower() + ("" if unit == "m" else ", low-passed"), INK, width=1.0
+            )
+            panels.append(Panel("", TIME, Axis(quantity, unit, (low - room, high + room)), (line,), bands=bands))
+        caption = "Shaded: settled windows, of which the means are used."
+        figures = [Figure(f"{name}_record", "Steps of the position", caption, tuple(panels))]
+        if len(result.windows) < 2:
+            return figures
+        x, y = np.array([[w.position, w.force] for w in result.windows]).T
+        lines = ()
+        if result.stiffness.determined:
+            ends = np.array([x.min(), x.max()])
+            line = y.mean() + result.stiffness.value * (ends - x.mean())
+            lines = (Series(ends, line, f"stiffness {with_interval(result.stiffness)}", BLUE),)
+        points = Markers(x, y, "settled windows", INK)
+        panel = Panel("", Axis("Deflection", "m"), Axis("Force", "N"), lines, (points,))
+        caption = f"Means of the settled windows. Hysteresis: {with_interval(result.hysteresis)}."
+        return [*figures, Figure(f"{name}_stiffness", "Force over deflection", caption, (panel,))]
+
+    def analyse_log(self, log: Log, prior: Prior, settings: AnalysisSettings) -> StepStiffness:
+        """Analyse a log of steps."""
+        return stiffness_from_steps(log)
 
 
-def _claims(course: Course) -> str | None:
-    """Return why a log holds position steps against a joint, or None.
-
-    The position of such a log rests in several places, where the force rises with the position. No reference moves.
-    """
-    if course.reference_moves or not course.against_a_spring:
-        return None
-    return "the position rests here and there, and the force follows from the place, as against a spring"
-
-
-KIND = ExperimentKind[StepStiffness](
-    of_one(lambda log, prior, settings: stiffness_from_steps(log)), _estimates, claims=_claims
-)
+KIND = StepsKind()

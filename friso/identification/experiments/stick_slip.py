@@ -6,13 +6,17 @@ peak the cart breaks away, and its velocity shows a spike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, of_one
+from friso.identification.estimate_documents import estimates_document
+from friso.identification.estimate_words import with_interval
+from friso.identification.kind import TIME, WAYS, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import (
     Mean,
@@ -32,6 +36,10 @@ from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.readings.slips import Slip, slips
 from friso.identification.settings import experiment_settings
 from friso.intervals import NORMAL_COVERAGE
+from friso.shown.documents import entries
+from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.palette import GREY, INK
+from friso.shown.drawing.prefixes import range_with_unit
 from friso.stage import Stage
 
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
@@ -42,7 +50,7 @@ LOADED = "joint.stiffness", "N/m", "force over deflection while the cart sticks"
 """Key, unit and method of the joint's stiffness from a log of slips."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StickSlip:
     """Static friction from slow motion that sticks and slips.
 
@@ -262,24 +270,24 @@ def _answer(
     low, high = np.percentile(forces, [5, 95]) if len(forces) else (np.nan, np.nan)
     offset = _offset(means["forward"], means["backward"])
     return StickSlip(
-        every,
-        forward,
-        backward,
-        means["forward"],
-        means["backward"],
-        (float(low), float(high)),
-        offset,
-        stiffness,
-        times,
-        places,
-        directions,
-        deflections,
-        forces,
-        rates,
-        speeds,
-        pull,
-        velocity,
-        _notes(len(forces), offset),
+        static=every,
+        forward=forward,
+        backward=backward,
+        break_away_forward=means["forward"],
+        break_away_backward=means["backward"],
+        spread=(float(low), float(high)),
+        offset=offset,
+        stiffness=stiffness,
+        times=times,
+        places=places,
+        directions=directions,
+        deflections=deflections,
+        forces=forces,
+        rates=rates,
+        speeds=speeds,
+        pull=pull,
+        cart_velocity=velocity,
+        warnings=_notes(len(forces), offset),
     )
 
 
@@ -343,21 +351,6 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
     return Estimate(name, "N", middle, middle - half, middle + half, method)
 
 
-def _analyse(log: Log, prior: Prior, settings: AnalysisSettings) -> StickSlip:
-    """Analyse a stick-slip log, with the joint's stiffness from the best available source."""
-    flat, (_, mass) = prior.flat(log), prior.masses(log)
-    stroke, stiffness = flat.get("joint.stroke", np.inf), prior.estimates.get("joint.stiffness")
-    result = static_from_stick_slip(log, stiffness or flat.get("joint.stiffness"), mass, stroke)
-    if stiffness is None and result.stiffness.determined:
-        return static_from_stick_slip(log, result.stiffness, mass, stroke)
-    return result
-
-
-def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return static friction, and the stiffness if it is that of the stage's joint."""
-    return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
-
-
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
     """Tell whether a stiffness is the joint's, not that of a limiter that holds it."""
     if stage is None or stage.joint is None or not stiffness.determined:
@@ -366,6 +359,79 @@ def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
     return bool(stiffness.value < experiment_settings.stiffness_share_of_a_limiter * limiter)
 
 
-KIND = ExperimentKind[StickSlip](
-    of_one(_analyse), _estimates, after=("frequency", "moves", "steps"), roles=("relative_position|position", "force")
-)
+def _broken(values: np.ndarray, log: Log) -> np.ndarray:
+    """Break the line of a signal of shape (n,) at the gaps of a log.
+
+    The last sample before each gap becomes NaN.
+    """
+    broken = values.astype(float)
+    broken[[part.stop - 1 for part in log.segments[:-1]]] = np.nan
+    return broken
+
+
+class StickSlipKind(ExperimentKind[StickSlip]):
+    """Slow motion that sticks and slips, which shows static friction."""
+
+    title = "Stick-slip"
+    after = ("frequency", "moves", "steps")
+    roles = ("relative_position|position", "force")
+
+    def analyse_log(self, log: Log, prior: Prior, settings: AnalysisSettings) -> StickSlip:
+        """Analyse a stick-slip log, with the joint's stiffness from the best available source."""
+        flat, (_, mass) = prior.flat(log), prior.masses(log)
+        stroke, stiffness = flat.get("joint.stroke", np.inf), prior.estimates.get("joint.stiffness")
+        result = static_from_stick_slip(log, stiffness or flat.get("joint.stiffness"), mass, stroke)
+        if stiffness is None and result.stiffness.determined:
+            return static_from_stick_slip(log, result.stiffness, mass, stroke)
+        return result
+
+    def estimates(self, result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
+        """Return static friction, and the stiffness if it is that of the stage's joint."""
+        return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
+
+    def facts(self, result: StickSlip) -> Facts:
+        """List static friction, break-away forces and the joint's stiffness."""
+        facts = [
+            ("Static friction", with_interval(result.static)),
+            ("Forward", with_interval(result.forward)),
+            ("Backward", with_interval(result.backward)),
+            ("Break-away force as measured, forward", with_interval(result.break_away_forward)),
+            ("Break-away force as measured, backward", with_interval(result.break_away_backward)),
+            ("Force common to both directions", with_interval(result.offset)),
+            ("Stiffness of the joint", with_interval(result.stiffness)),
+            ("Slips", str(len(result.times))),
+        ]
+        if len(result.times):
+            facts.append(("Break-away forces, 5 % to 95 % of the slips", range_with_unit(*result.spread, "N")))
+        return tuple(facts)
+
+    def numbers(self, result: StickSlip) -> dict[str, Any]:
+        """Return static friction with all slips, for the document."""
+        sides = estimates_document(result, "forward", "backward", "break_away_forward", "break_away_backward")
+        estimates = estimates_document(result, "static", "offset", "stiffness")
+        return {**sides, **estimates, "slips": len(result.times), **entries(result, "spread_n", "warnings")}
+
+    def figures(self, result: StickSlip, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw the force on the cart with its peaks, and the cart's speed, over time."""
+        (log,) = logs
+        assert isinstance(log, Log)
+        pull = Series(log.time, _broken(result.pull, log), "force on the cart", GREY, width=1.0)
+        peaks = tuple(
+            Markers(result.times[chosen], sign * result.forces[chosen], f"break-away, {word}", WAYS[word], "triangle")
+            for word, sign, chosen in (("forward", 1, result.directions > 0), ("backward", -1, result.directions < 0))
+            if chosen.any()
+        )
+        speed = Series(log.time, _broken(result.cart_velocity, log), "", INK, width=0.9)
+        time = replace(TIME, limits=(float(log.time[0]), float(log.time[-1])))
+        panels = (
+            Panel("", time, Axis("Force on the cart", "N"), (pull,), peaks),
+            Panel("", time, Axis("Velocity of the cart", "m/s"), (speed,)),
+        )
+        caption = (
+            "While the cart sticks, the force on it grows; at the peak it breaks away, and its velocity shows a spike. "
+            f"Static friction: {with_interval(result.static)}."
+        )
+        return [Figure(f"{name}_slips", "Stick-slip", caption, panels)]
+
+
+KIND = StickSlipKind()

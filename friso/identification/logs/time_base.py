@@ -110,7 +110,7 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
     """
     finite = np.isfinite(time) & np.isfinite(values)
     if finite.size < 2:
-        raise LogError(name, f"{finite.size} sample{'s' * (finite.size != 1)}", "a record over time", "")
+        raise LogError(name, f"{finite.size} sample{'' if finite.size == 1 else 's'}", "a record over time", "")
     if finite.sum() < max(2, 0.5 * finite.size):
         actual = f"{finite.size - finite.sum()} of {finite.size} samples that are not numbers (NaN)"
         raise LogError(name, actual, "at least half of the samples", "")

@@ -31,18 +31,17 @@ from friso.identification.response.departure import (
 )
 from friso.identification.response.estimators import local_polynomial, multisine
 from friso.identification.response.mass_line import KINDS, StraightLine, mass_lines, straight_lines
+from friso.identification.response.masses import TwoMass, fit_two_mass, needs_two, widened
 from friso.identification.response.modes import Modes, fit_modes
-from friso.identification.response.one_mass import needs_two
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
 from friso.identification.response.response import Channels, FrequencyResponse
 from friso.identification.response.settings import settings
-from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
 
 FrequencyRange = tuple[float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Bench:
     """Results from the frequency responses of one machine.
 
@@ -141,11 +140,20 @@ def analyse(
     modes = _attempt(warnings, "modes", fit_modes, upper)
     warnings += model.warnings if model else ()
     return Bench(
-        tuple(logs), driven, other, used,
-        _attempt(warnings, "mass lines", mass_lines, upper) or (), modes, model,
-        _attempt(warnings, "limit cases", visible, upper, modes), departs, drag, explanation,
-        _left_out(warnings, runs, used), tuple(dict.fromkeys([*driven.warnings, *warnings])),
-    )  # fmt: skip
+        logs=tuple(logs),
+        driven=driven,
+        other=other,
+        band=used,
+        lines=_attempt(warnings, "mass lines", mass_lines, upper) or (),
+        modes=modes,
+        two_masses=model,
+        seen=_attempt(warnings, "limit cases", visible, upper, modes),
+        departs=departs,
+        drag=drag,
+        explanation=explanation,
+        aside=_left_out(warnings, runs, used),
+        warnings=tuple(dict.fromkeys([*driven.warnings, *warnings])),
+    )
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:

@@ -46,9 +46,18 @@ def multisine(
     warnings = dict.fromkeys([*remarks, *(text for realisation in spectra_of_records for text in realisation.warnings)])
     if not distortion_known:
         warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
-    lines = (spectra_of_records[0].frequency[excited], response, deviation, noise, distortion, degrees)
-    origin = {"channels": channels or Channels(), "warnings": tuple(warnings), "sample_time": records[0].sample_time}
-    return FrequencyResponse(*lines, "multisine", **origin)
+    return FrequencyResponse(
+        frequency=spectra_of_records[0].frequency[excited],
+        response=response,
+        deviation=deviation,
+        noise=noise,
+        distortion=distortion,
+        degrees=degrees,
+        kind="multisine",
+        channels=channels or Channels(),
+        warnings=tuple(warnings),
+        sample_time=records[0].sample_time,
+    )
 
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:

@@ -32,7 +32,7 @@ class ResponseBand:
     phase_high: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FrequencyResponse:
     """A response at the spectral lines `frequency` [Hz]; all arrays have the shape (lines,).
 
@@ -68,7 +68,8 @@ class FrequencyResponse:
         """
         unknown = np.full(len(frequency), np.nan)
         freedom = np.full(len(frequency), degrees)
-        return cls(frequency, response, deviation, unknown, unknown, freedom, **further)
+        lines = {"frequency": frequency, "response": response, "deviation": deviation, "degrees": freedom}
+        return cls(**lines, noise=unknown, distortion=unknown, **further)
 
     def band(self) -> ResponseBand:
         """Return the 95 % intervals of magnitude and phase.

@@ -7,5 +7,6 @@ QUESTION = Question(
     50,
     WHY,
     'bode examples/thesis_rig.toml --frequencies "0.1 Hz..1 kHz" --out bode',
+    details=True,
     during="analysing all states",
 )

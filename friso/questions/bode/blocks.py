@@ -12,7 +12,7 @@ from friso.frequency.members import Members
 from friso.questions.bode.figures import bode_figures
 from friso.questions.bode.numbers import rows
 from friso.questions.bode.states import has_limiter, shown_states, side
-from friso.questions.bode.words import sentences, stability
+from friso.questions.bode.words import details, sentences
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.palette import GREEN, VERMILLION
@@ -36,6 +36,7 @@ def blocks(bode: Bode) -> list[AnswerBlock]:
         colours=[GREEN if bode.settled[1].stable else VERMILLION],
         columns=states,
         rows=rows(states),
+        details=details(bode),
         draw=partial(bode_figures, bode),
         numbers=partial(bode_document, bode),
     )
@@ -51,7 +52,7 @@ def bode_document(bode: Bode) -> dict[str, Any]:
     state = "given" if joint is None else ("locked" if joint.locked else "free")
     crossover = bode.stage.controller.bandwidth_key is not None
     document = {
-        "conclusion": stability(bode)[0],
+        "conclusion": sentences(bode)[0],
         "stage": bode.stage.name,
         "cases": {name: _margins(case.margins) for name, case in bode.cases.items()},
         "cascade_loops": {

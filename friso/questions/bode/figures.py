@@ -17,17 +17,12 @@ from friso.questions.bode.states import SERIES, colour, dash, has_family, has_li
 from friso.shown.drawing.colours import ramp
 from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Markers, Panel, Series
 from friso.shown.drawing.palette import INK, LIGHT
+from friso.shown.drawing.phases import phases
 from friso.shown.drawing.prefixes import pretty, with_unit
 from friso.stage.tables import moving_mass
 
 QUARTER_TURN = 90.0
 """Distance of ticks on phase axes [deg]: a quarter of a turn."""
-
-FIRST_TURN_FROM = -315.0
-"""Lower end [deg] of the turn in which the first phase is plotted.
-
-The end lies between the phases of whole numbers of integrations.
-"""
 
 LEAST_PHASE = -720.0
 """Lower end of phase axes [deg]; the delay at high frequencies would extend them without end."""
@@ -77,20 +72,6 @@ class ResponseCurve:
     colour: str
     dash: Dash = "solid"
     width: float = 1.4
-
-
-def phases(responses: Sequence[np.ndarray]) -> list[Array]:
-    """Return phases [deg] of complex responses (k,) without jumps of 360 degrees.
-
-    The first phase begins between -315 and 45 degrees. The others are shifted by whole turns until they agree with the
-    first at high frequencies, where all loops behave alike.
-    """
-    angles = [np.angle(response) for response in responses]
-    lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag
-    first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
-    first = first - 360 * np.floor((first[0] - FIRST_TURN_FROM) / 360)
-    high = slice(len(first) // 2, None)
-    return [first, *(phase + 360 * np.round(np.median(first[high] - phase[high]) / 360) for phase in others)]
 
 
 def magnitude(response: np.ndarray) -> Array:

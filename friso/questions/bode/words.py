@@ -15,147 +15,86 @@ from friso.frequency.members import Members
 from friso.questions.bode.numbers import growth
 from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place
 from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
-
-SETTLED = "the limit cases, and stuck under any bias force"
-
-
-BACKLASH = (
-    "All this is for a load that stays on one flank of the backlash; friso check says whether the loop, however stable "
-    "there, swings across it."
-)
-
-
-TARGET = (
-    "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself crosses "
-    "0 dB where the table says, since friction, joint, sampling and delay are in it."
-)
+from friso.shown.says import Alternatives, Words, always, say, say_all
 
 
 def sentences(bode: Bode) -> list[str]:
-    """Return all sentences: stability, how fast the controller may be, and caveats."""
-    limits = [crossover_heading(bode), *crossovers(bode).values()]
-    return [*stability(bode), *limits, *crossover_meaning(bode), *caveats(bode)]
+    """Say whether the loop is stable, why not, and how fast the controller may be."""
+    return say(bode, _SAYS, _WORDS)
 
 
-def stability(bode: Bode) -> list[str]:
-    """Say whether the loop is stable in the settled states, and with which margin.
-
-    Settled states are the limit cases, and all states stuck under a bias force. Further sentences say whether the loop
-    is stable in all other states, and why not.
-    """
-    if len(bode.scan.members) == 1:
-        margins = bode.settled[1]
-        state = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
-        return [f"The loop is {state}."]
-    member, margins = bode.settled
-    states = f"all settled states ({SETTLED})" if has_friction(bode) else "all limit cases"
-    worst = f"Worst: {place(member, bode)}, {_margin(margins) if margins.stable else growth(margins)}."
-    but = f", but not {'; '.join(_where(bode))}" if margins.stable and not bode.stable else ""
-    sentence = f"{_tuned(bode)}, this controller is {'' if margins.stable else 'not '}stable in {states}{but}. {worst}"
-    if bode.stable:
-        anywhere, least = bode.worst
-        where = f"{place(anywhere, bode)}, {_margin(least)}"
-        return [sentence, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
-    elsewhere = [] if but else [f"Unstable: {'; '.join(_where(bode))}."]
-    return [sentence, *elsewhere, *_why(bode)]
-
-
-def _tuned(bode: Bode) -> str:
-    """Say at which crossover or bandwidth the controller is tuned."""
-    crossover = bandwidth(bode.stage.flat())
-    return "As given" if crossover is None else f"At {with_unit(crossover, 'Hz')}"
-
-
-def _margin(margins: Margins) -> str:
-    """Write the modulus margin with the frequency at which the loop is closest to -1."""
-    margin = f"modulus margin {margins.modulus_margin:.3g} (peak sensitivity {margins.peak_sensitivity:.3g})"
-    return f"{margin} at {with_unit(margins.closest, 'Hz')}"
-
-
-def crossover_heading(bode: Bode) -> str:
-    """Return the heading of the sentences on how fast the controller can be."""
-    if len(bode.scan.members) == 1:
-        return f"How fast this controller can be, {_subject(bode)}:"
-    settled = "settled states" if has_friction(bode) else "limit cases"
-    return f"How fast this controller can be, {_subject(bode)} at which all {settled} are stable:"
-
-
-def crossovers(bode: Bode) -> dict[str, str]:
-    """Say, for each state of the joint, at which crossovers the loop is stable and robust.
-
-    A controller given by gains has bandwidths in place of crossovers.
-    """
-    joint = bode.stage.joint
-    as_given = "" if joint is None else ("locked" if joint.locked else "free")
-    labels = {name: f"{name.capitalize()}{' (as given)' if name == as_given else ''}" for name in bode.limits}
-    labels |= {"given": "As given"}
-    return {name: f"{labels[name]}: {_limits(bode, name)}" for name in bode.limits}
-
-
-def crossover_meaning(bode: Bode) -> list[str]:
-    """Say that the crossover of a stage file is not where the loop crosses 0 dB."""
-    return [TARGET] if _crossing(bode) and bode.stage.controller.bandwidth_name == "crossover" else []
-
-
-def caveats(bode: Bode) -> list[str]:
-    """Return the limits of the analysis in sentences.
-
-    The loop is analysed on one flank of a backlash. If the search found no upper limit, effects that the stage file
-    leaves out will set one.
-    """
-    ends = {limits.searched[1] for limits in bode.limits.values() if limits.open_ended}
-    flanks = [BACKLASH] if structure(bode.stage.flat()).plays else []
-    if not ends:
-        return flanks
-    drive = bode.stage.drive
-    timed = drive is not None and drive.sample_time is not None
-    causes = [] if timed else ["sampling (drive.sample_time)"]
-    causes += [] if drive is not None and drive.delay is not None else ["delay (drive.delay)"]
-    half = ", half the sampling frequency" if timed and _crossing(bode) else ""
-    end, causes = with_unit(max(ends), _unit(bode)), listed([*causes, "modes"], "and")
-    return [
-        *flanks,
-        f"The loop is still stable at {end}{half}, where the search ended; on the real machine {causes}, which the "
-        "stage file leaves out, set a lower limit.",
+def details(bode: Bode) -> list[str]:
+    """Say which state is worst, how fast the controller may be in other states of the joint, and what that means."""
+    others = [
+        f"Joint {name}: {_fast(bode, name)}{_ends(bode.limits[name], name, bode)}."
+        for name in bode.limits
+        if name != "given"
     ]
+    return [*say_all(bode, _MORE, _WORDS), *others]
 
 
-def _crossing(bode: Bode) -> bool:
+def _alone(bode: Bode) -> bool:
+    """Tell whether the loop has a single state, as without friction and limiter."""
+    return len(bode.scan.members) == 1
+
+
+def _settled_stable(bode: Bode) -> bool:
+    """Tell whether the loop is stable in all settled states: the limit cases, and stuck under any bias force."""
+    return bode.settled[1].stable
+
+
+def _of_tuning(bode: Bode) -> bool:
+    """Tell whether the loop is unstable in a limit case or a stuck state, where friction does not fall with speed."""
+    settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
+    return not (settled and bode.scan.stable[bode.scan.members.stuck].all())
+
+
+def _by_crossover(bode: Bode) -> bool:
     """Tell whether a key of the controller sets its bandwidth."""
     return bode.stage.controller.bandwidth_key is not None
 
 
-def _subject(bode: Bode) -> str:
-    """Say in what the bandwidth is given: in crossovers, or multiples of the present bandwidth."""
-    return f"in {bode.stage.controller.bandwidth_name}s" if _crossing(bode) else "in multiples of its bandwidth"
+def _left_out(bode: Bode) -> list[str]:
+    """List what limits the bandwidth of a real machine and is not in the stage file."""
+    drive = bode.stage.drive
+    causes = [] if drive is not None and drive.sample_time is not None else ["sampling (drive.sample_time)"]
+    causes += [] if drive is not None and drive.delay is not None else ["delay (drive.delay)"]
+    return [*causes, "modes" if bode.stage.parasitic is None else "modes beyond the one in [parasitic]"]
 
 
 def _unit(bode: Bode) -> str:
     """Return the unit of the bandwidth: hertz, or multiples of the present bandwidth."""
-    return "Hz" if _crossing(bode) else "times this bandwidth"
+    return "Hz" if _by_crossover(bode) else "times this one"
+
+
+def _margin(margins: Margins) -> str:
+    """Write the modulus margin with the frequency at which the loop is closest to -1."""
+    return f"modulus margin {margins.modulus_margin:.3g} at {with_unit(margins.closest, 'Hz')}"
+
+
+def _worst(bode: Bode, member: Members, margins: Margins) -> str:
+    """Write a state of the loop, and its margin or how fast a deviation grows in it."""
+    return f"{place(member, bode)}, {_margin(margins) if margins.stable else f'where a deviation {growth(margins)}'}"
 
 
 def _states_checked(bode: Bode) -> str:
-    """Describe which states of friction were checked."""
+    """Write which states of friction were checked."""
     members = bode.scan.members
-    parts = []
-    if has_friction(bode):
-        speeds, biases = members.speed[~members.stuck], np.abs(members.bias)
-        parts += [f"stuck under bias forces of up to {with_unit(biases.max(), 'N')}"] if biases.any() else []
-        parts.append(f"sliding at {range_with_unit(speeds.min(), speeds.max(), 'm/s')}")
-    if has_limiter(bode):
-        parts.append("limiter free and touched")
+    speeds, biases = members.speed[~members.stuck], np.abs(members.bias)
+    parts = [f"stuck under bias forces of up to {with_unit(biases.max(), 'N')}"] if biases.any() else []
+    parts += [f"sliding at {range_with_unit(speeds.min(), speeds.max(), 'm/s')}"] if has_friction(bode) else []
+    parts += ["limiter free and touched"] if has_limiter(bode) else []
     return f"{', '.join(parts)} ({len(members)} states)"
 
 
-def _where(bode: Bode) -> list[str]:
+def _where(bode: Bode) -> str:
     """List the unstable states: stuck ones by bias force, sliding ones by range of speed."""
     members, stable = bode.scan.members, bode.scan.stable
     states = []
     for touched in np.unique(members.touched[members.stuck & ~stable]).tolist():
         rest = members.stuck & (members.touched == touched)
         states.append(in_words(_stuck(members.bias[rest & ~stable], bode), touched, has_limiter(bode)))
-    return states + [_speeds(speeds, bode) for speeds in bode.unstable]
+    return "; ".join([*states, *(_speeds(speeds, bode) for speeds in bode.unstable)])
 
 
 def _stuck(unstable: np.ndarray, bode: Bode) -> str:
@@ -168,59 +107,116 @@ def _stuck(unstable: np.ndarray, bode: Bode) -> str:
     return f"stuck under a bias force of {with_unit(low, 'N') if low == high else range_with_unit(low, high, 'N')}"
 
 
-def _speeds(unstable: Unstable, bode: Bode) -> str:
+def _speeds(speeds: Unstable, bode: Bode) -> str:
     """Name a range of sliding speeds in which the loop is unstable."""
-    speeds = bode.scan.members.speed[~bode.scan.members.stuck]
-    window = window_with_unit(unstable.low, unstable.high, (float(speeds.min()), float(speeds.max())), "m/s")
-    return in_words(f"sliding{'' if unstable.forward else ' backwards'}, {window}", unstable.touched, has_limiter(bode))
+    searched = bode.scan.members.speed[~bode.scan.members.stuck]
+    window = window_with_unit(speeds.low, speeds.high, (float(searched.min()), float(searched.max())), "m/s")
+    way, whole = "sliding" if speeds.forward else "sliding backwards", window.startswith("all")
+    at = "any speed" if whole else window if window[0].isdigit() else f"speeds {window}"
+    return in_words(f"{way} at {at}", speeds.touched, has_limiter(bode))
 
 
-def _why(bode: Bode) -> list[str]:
-    """Say why states are unstable: by friction that falls with speed, or by tuning.
-
-    The list is empty if neither explains all unstable states.
-    """
-    settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
-    if not (settled and bode.scan.stable[bode.scan.members.stuck].all()):
-        even = ": not even all settled states (listed below) are stable" if has_friction(bode) else ""
-        return [f"This is a matter of tuning{even}."]
-    if not all(speeds.falling for speeds in bode.unstable):
-        return []
-    return [
-        "Friction falls with speed there (Stribeck effect), so the stage sticks and slips; a higher crossover may "
-        "shrink the range. The settled states are stable; friso check determines whether the stage hunts."
-    ]
+def _own(bode: Bode) -> str:
+    """Return the name of the limits of the stage as given: by the state of its joint, if it has one."""
+    joint = bode.stage.joint
+    return "given" if joint is None else "locked" if joint.locked else "free"
 
 
-def _limits(bode: Bode, name: str) -> str:
-    """Say over which crossovers the loop is stable, and over which its modulus margin is good.
+def _fast(bode: Bode, name: str) -> str:
+    """Say at which bandwidths the modulus margin is good, and at which the loop is stable; `name` is the joint's state.
 
-    `name` is the state of the joint.
+    Only settled states count: the limit cases, and stuck under any bias force.
     """
     limits = bode.limits[name]
-    stable = _remark(bode, name, limits.highest_stable, "lost first", limits.first_lost)
-    calm = _remark(bode, name, limits.highest_comfortable, "closest to −1", limits.closest)
+    if not limits.stable:
+        return f"the loop is stable {_at((), limits, bode)}"
+    if limits.comfortable == limits.stable:
+        where = _at(limits.stable, limits, bode)
+        return f"the loop is stable, with a modulus margin above {COMFORTABLE_MARGIN:g}, {where}"
     return (
-        f"stable: {_windows(limits.stable, limits, bode)}{stable}; modulus margin above {COMFORTABLE_MARGIN:g}: "
-        f"{_windows(limits.comfortable, limits, bode)}{calm}."
+        f"the modulus margin is above {COMFORTABLE_MARGIN:g} {_at(limits.comfortable, limits, bode)}, and the loop is "
+        f"stable {_at(limits.stable, limits, bode)}"
     )
 
 
-def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
-    """Name in brackets the state that is unstable first, or closest to -1, as bandwidth rises.
-
-    `member` is this state; with None the text is empty. `meaning` says in words why the state is named. The remark
-    holds above the bandwidth `end` or, with None, for the stage as in the file. `name` is the state of the joint.
-    """
-    if member is None or len(bode.scan.members) == 1:
-        return ""
-    where = f"above {with_unit(end, _unit(bode))}" if end else "as given"
-    state = in_words(cart(member, bode), bool(member.touched[0]), name == "free")
-    return f" ({where}, {meaning}: {state})"
+def _at(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
+    """Write ranges of the bandwidth, as "at crossovers of 2.00 to 14.1 Hz"."""
+    name, unit = bode.stage.controller.bandwidth_name if _by_crossover(bode) else "bandwidth", _unit(bode)
+    if not ranges:
+        return f"at no {name} from {range_with_unit(*limits.searched, unit)}"
+    if [*ranges] == [limits.searched]:
+        return f"at every {name} from {range_with_unit(*limits.searched, unit)}"
+    return f"at a {name} {listed([window_with_unit(*window, limits.searched, unit) for window in ranges], 'and')}"
 
 
-def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
-    """Write ranges of the bandwidth in words; without any, say in which range none was found."""
-    unit = _unit(bode)
-    windows = [window_with_unit(*window, limits.searched, unit) for window in ranges]
-    return listed(windows, "and") or f"none from {range_with_unit(*limits.searched, unit)}"
+def _ends(limits: Limits, name: str, bode: Bode) -> str:
+    """Name in brackets the states that come closest to -1, and become unstable first, as the bandwidth rises."""
+    ends = ((limits.closest, "closest to −1"), (limits.first_lost, "lost first"))
+    states = [
+        f"{meaning}: {in_words(cart(member, bode), bool(member.touched[0]), name == 'free')}"
+        for member, meaning in ends
+        if member is not None and not _alone(bode)
+    ]
+    return f" ({'; '.join(states)})" if states else ""
+
+
+def _ends_open(bode: Bode) -> bool:
+    """Tell whether the loop of the stage as given is still stable at the end of the search."""
+    return bode.limits[_own(bode)].open_ended
+
+
+_WORDS: Words[Bode] = {
+    "at": lambda of: (
+        "as given," if bandwidth(of.stage.flat()) is None else f"at {with_unit(bandwidth(of.stage.flat()), 'Hz')}"
+    ),
+    "margin": lambda of: _margin(of.settled[1]),
+    "growth": lambda of: growth(of.settled[1]),
+    "settled": lambda of: "at rest and sliding fast" if has_friction(of) else "in all limit cases",
+    "where": _where,
+    "worst": lambda of: _worst(of, *of.worst),
+    "worst_settled": lambda of: _worst(of, *of.settled),
+    "fast": lambda of: _fast(of, _own(of)),
+    "left_out": lambda of: listed(_left_out(of), "and"),
+    "states": _states_checked,
+}
+
+_SAYS: Sequence[Alternatives[Bode]] = (
+    (
+        (lambda of: _alone(of) and _settled_stable(of), "{at} the loop is stable, {margin}."),
+        (_alone, "{at} the loop is unstable: a deviation {growth}."),
+        (lambda of: of.stable, "{at} the loop is stable in every state; the worst is {worst}."),
+        (_settled_stable, "{at} the loop is stable {settled}, but not {where}."),
+        (always, "{at} the loop is unstable; the worst state is {worst_settled}."),
+    ),
+    (
+        (lambda of: of.stable or _alone(of), ""),
+        (_of_tuning, "This is a matter of tuning, not of friction."),
+        (
+            lambda of: all(speeds.falling for speeds in of.unstable),
+            "Friction falls with speed there (Stribeck effect), so the stage sticks and slips; friso check says "
+            "whether it hunts.",
+        ),
+    ),
+    (
+        (_ends_open, "{fast}; what limits it on the real machine, {left_out}, is not in the stage file."),
+        (always, "{fast}."),
+    ),
+)
+"""Sentences on the stability of the loop, why it is unstable, and how fast the controller may be."""
+
+_MORE: Alternatives[Bode] = (
+    (lambda of: not (_alone(of) or of.stable), "Unstable states: {where}."),
+    (lambda of: not _alone(of), "Worst settled state: {worst_settled}."),
+    (lambda of: not _alone(of), "States checked: {states}."),
+    (
+        lambda of: _by_crossover(of) and of.stage.controller.bandwidth_name == "crossover",
+        "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself "
+        "crosses 0 dB where the table says, since friction, joint, sampling and delay are in it.",
+    ),
+    (
+        lambda of: structure(of.stage.flat()).plays,
+        "All this is for a load that stays on one flank of the backlash; friso check says whether the loop, however "
+        "stable there, swings across it.",
+    ),
+)
+"""Details: the worst settled state, what was checked, and what the crossover and a backlash mean for the analysis."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.hunting import Diagram, Meeting, Plane
-from friso.questions.boundary.words import ShownKey, conclusion, sentences
+from friso.questions.boundary.words import ShownKey, answer, conclusion, details
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
 from friso.studies import boundary
@@ -20,28 +20,28 @@ if TYPE_CHECKING:
     from friso.shown.drawing.figure import Figure
 
 
-def blocks(answer: BoundaryAnswer) -> list[AnswerBlock]:
+def blocks(boundaries: BoundaryAnswer) -> list[AnswerBlock]:
     """Return the blocks: where hunting ends, and every point, branch or curve."""
-    traced, keys = answer.result, answer.keys
+    traced, keys = boundaries.result, boundaries.keys
     return [
         AnswerBlock(
-            title=answer.stage.name,
-            sentences=[conclusion(traced, keys)],
-            draw=lambda: [_figure(answer)],
+            title=boundaries.stage.name,
+            sentences=answer(traced, keys),
+            draw=lambda: [_figure(boundaries)],
             numbers=lambda: boundary_document(traced, keys),
         ),
-        AnswerBlock(title="Points and curves", details=sentences(traced, keys)[1:]),
+        AnswerBlock(title="Points and curves", details=details(traced, keys)),
     ]
 
 
-def _figure(answer: BoundaryAnswer) -> Figure:
+def _figure(boundaries: BoundaryAnswer) -> Figure:
     """Draw the branches of cycles, or the curves on which hunting ends with the place of the stage between them."""
     from friso.questions.boundary.figures import boundary_figure  # 0.9 s to import
     from friso.questions.map.places import SHOWN, with_places
 
-    figure = boundary_figure(answer.result, answer.keys, answer.stage.name, answer.condition)
-    if isinstance(answer.result, Plane):
-        return with_places(figure, [(SHOWN, answer.stage)], [key.key for key in answer.keys])
+    figure = boundary_figure(boundaries.result, boundaries.keys, boundaries.stage.name, boundaries.condition)
+    if isinstance(boundaries.result, Plane):
+        return with_places(figure, [(SHOWN, boundaries.stage)], [key.key for key in boundaries.keys])
     return figure
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -25,11 +26,13 @@ if TYPE_CHECKING:
 class BoundaryAnswer(Answer):
     """The values at which hunting ends, over one key or two.
 
-    `result` is a `Diagram` over one key or a `Plane` of two. `texts` holds the ranges as the user gave them.
+    `result` is a `Diagram` over one key or a `Plane` of two. `texts` holds the ranges
+    as the user gave them, and `links` the keys that are tied to others.
     """
 
     stage: Stage
     texts: Sequence[str]
+    links: Mapping[str, str]
     name: str
 
     @property
@@ -41,7 +44,8 @@ class BoundaryAnswer(Answer):
     def keys(self) -> tuple[ShownKey, ...]:
         """Return the keys in the units in which their ranges were given."""
         ranges = zip(self.result.space.ranges, self.texts, strict=True)
-        return tuple(_in_its_unit(swept, text, self.axis_kind) for swept, text in ranges)
+        varied = frozenset([*self.varied, *self.links])
+        return tuple(replace(_in_its_unit(swept, text, self.axis_kind), varied=varied) for swept, text in ranges)
 
     @property
     def subject(self) -> BoundaryAnswer:
@@ -113,7 +117,7 @@ def boundary(
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 
     traced = traced_boundary(chosen, ranges, links, tolerance, log, begins, progress)
-    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], name=inputs.stem_of(stage))
+    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], links=links, name=inputs.stem_of(stage))
 
 
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:

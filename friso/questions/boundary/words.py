@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Meeting, Plane, Space
+from friso.questions.map.words import friction_held
 from friso.shown.drawing.figure import Array
 from friso.shown.drawing.prefixes import listed, plus_minus, pretty, with_unit
 from friso.studies import boundary
@@ -42,11 +43,22 @@ PLAIN_ERROR = 1e-5
 
 @dataclass(frozen=True)
 class ShownKey:
-    """A key and the unit in which its values are printed; `factor` is the SI value of the unit."""
+    """A key and the unit in which its values are printed; `factor` is the SI value of the unit.
+
+    `varied` are all keys that vary, with those that links tie to others.
+    """
 
     key: str
     unit: str = ""
     factor: float = 1.0
+    varied: frozenset[str] = frozenset()
+
+    @property
+    def named(self) -> str:
+        """Return the key, and which friction it means if it is one of friction."""
+        if self.key == "friction":
+            return "friction (all of it scaled)"
+        return f"{self.key}{friction_held(self.key, self.varied)}"
 
     def number(self, value: float) -> float:
         """Convert a value [SI] to the unit shown."""
@@ -82,22 +94,32 @@ END_DIGITS = 3
 """Significant digits of the ends of a curve in the answer."""
 
 
-SHOWN_CURVES = 3
-"""Largest numbers of curves, and of places where curves meet, in the answer; figure and details have all."""
+MOST_SENTENCES = 3
+"""Largest number of sentences in the answer; figure and details have all curves and meetings."""
 
 
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Return all sentences in order, the answer first."""
-    details = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
-    return [conclusion(traced, keys), *details]
+    return [conclusion(traced, keys), *details(traced, keys)]
 
 
 def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
-    """Say where hunting is possible and where it ends.
+    """Return the answer as one text."""
+    return " ".join(answer(traced, keys))
+
+
+def answer(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """Say in at most three sentences where hunting is possible and where it ends.
 
     The first sentence says where the loop is unstable even without friction.
     """
-    return " ".join([*_unstable(traced, keys), _where(traced, keys)])
+    where = _edges(traced, keys[0]) if isinstance(traced, Diagram) else _in_plane(traced, keys)
+    return [*_unstable(traced, keys), *where][:MOST_SENTENCES]
+
+
+def details(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """Describe every branch or curve, with its flips, folds and other special points."""
+    return _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
 
 
 def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -117,22 +139,19 @@ def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     ]
 
 
-def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
-    """Say where hunting begins and ends over one key, or along which curves over two."""
-    if isinstance(traced, Diagram):
-        return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
+def _in_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """Say where in the plane of two keys hunting is possible, and along which curves it begins or ends."""
     if edge := boundary.plane_edge(traced):
-        return " ".join([_along_one(edge, keys), *_first_meetings(traced, keys)])
-    verdicts = [verdict for _, _, verdict in boundary.corner_verdicts(traced)]
-    if curves := boundary.lines(traced):
-        longest = sorted(range(len(curves)), key=lambda number: -len(curves[number].at))[:SHOWN_CURVES]
-        more = [f"There are {len(curves) - len(longest)} more curves."] if len(curves) > len(longest) else []
-        courses = [f"{_course(traced, number, keys, END_DIGITS)}." for number in longest]
-        answer = [_hunting_corners(traced, keys), *courses, *more, *_beyond_curves(traced)]
-        return " ".join([*answer, *_first_meetings(traced, keys)])
-    if traced.gaps or UNKNOWN in verdicts:
-        return f"{_hunting_corners(traced, keys)} No curve could be followed."
-    return f"{_hunting_corners(traced, keys)} {_no_boundary(traced.space, keys)}"
+        return [_along_one(edge, keys)]
+    corners, curves = _hunting_corners(traced, keys), boundary.lines(traced)
+    if curves:
+        longest = max(range(len(curves)), key=lambda number: len(curves[number].at))
+        more = len(curves) - 1
+        rest = [f"There {'are' if more > 1 else 'is'} {more} more curve{'s' if more > 1 else ''}."] if more else []
+        return [corners, f"{_course(traced, longest, keys, END_DIGITS)}.", *(_beyond_curves(traced) or rest)]
+    if traced.gaps or UNKNOWN in [verdict for _, _, verdict in boundary.corner_verdicts(traced)]:
+        return [corners, "No curve could be followed."]
+    return [corners, _no_boundary(traced.space, keys)]
 
 
 def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
@@ -152,7 +171,7 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
         """Write the value of the other key at point `k` along the edge."""
         return f"{across.key} = {across.text(float(edge.across[k]), END_DIGITS)}"
 
-    answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
+    answer = f"Hunting is possible {side} {along.named} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
     farther = [int(np.argmin(edge.low)), int(np.argmax(edge.high))]
     beyond = [f"{ends(k)} at {at(k)}" for k in dict.fromkeys(farther) if ends(k) not in (ends(0), ends(-1))]
     between = f", {side} {listed(beyond, 'and')} in between" if beyond else ""
@@ -196,14 +215,6 @@ def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int 
     return f"{name} from {start}, where {ENDS[first]}, to {stop}, where {ENDS[last]}"
 
 
-def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Return the first sentences about meetings of curves, and how many more there are."""
-    texts = meeting_sentences(traced, keys)
-    more = len(texts) - SHOWN_CURVES
-    rest = [f"Curves meet at {more} more {'places' if more > 1 else 'place'}."] if more > 0 else []
-    return [*texts[:SHOWN_CURVES], *rest]
-
-
 def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Say for each meeting of two curves where they meet, and whether both change one cycle."""
     return [_meeting(meeting, boundary.lines(traced), keys) for meeting in boundary.curve_meetings(traced)]
@@ -234,22 +245,22 @@ ENDS = {
 """Ways in which a curve of the plane ends, in words."""
 
 
-def _edges(traced: Diagram, key: ShownKey) -> str:
-    """Say where hunting begins and ends over the range, and how many values were tried."""
+def _edges(traced: Diagram, key: ShownKey) -> list[str]:
+    """Say where hunting begins and ends over the range, and between which values tried it attracts as well."""
     changes, verdicts = boundary.stability_changes(traced), boundary.place_verdicts(traced)
-    values_tried = f"{len(verdicts)} values were tried"
-    unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
+    unknown = f"; unknown at {verdicts.count(UNKNOWN)} of {len(verdicts)} values tried" if UNKNOWN in verdicts else ""
     at = {change.low for change in changes}
     errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in boundary.lines(traced) for k in line.special}
-    others = [(value, begins) for value, begins in boundary.followed_changes(traced) if value not in at]
-    answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
-    if changes:
-        places = [
-            f"{'begins' if change.begins else 'ends'} {_between(change, key, errors)}{_if_unstable(traced, change)}"
-            for change in changes
-        ]
-        answer = f"Hunting {listed(places, 'and')} ({values_tried}{unknown})."
-    return " ".join([answer, *_also_attracting(others, key, errors)])
+    others = _also_attracting(
+        [(value, begins) for value, begins in boundary.followed_changes(traced) if value not in at], key, errors
+    )
+    if not changes:
+        return [f"{_no_boundary(traced.space, (key,))[:-1]}{unknown}.", end_sentence(traced, key), *others]
+    places = [
+        f"{'begins' if change.begins else 'ends'} {_between(change, key, errors)}{_if_unstable(traced, change)}"
+        for change in changes
+    ]
+    return [f"Hunting {listed(places, 'and')}{unknown}.", *others]
 
 
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
@@ -281,8 +292,8 @@ def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, floa
     `errors` holds errors [SI] by the values of flips, folds and other special points.
     """
     if change.low == change.high:
-        return f"at {key.key} = {key.as_known(change.low, errors[change.low])}"
-    return f"between {key.key} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"
+        return f"at {key.named} = {key.as_known(change.low, errors[change.low])}"
+    return f"between {key.named} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
@@ -330,7 +341,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Describe each curve in the plane of two keys, their meetings, and the corners."""
     curves = boundary.lines(traced)
     text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
-    text += meeting_sentences(traced, keys) or ["No two of the curves meet."] * (len(curves) > 1)
+    text += meeting_sentences(traced, keys) or (["No two of the curves meet."] if len(curves) > 1 else [])
     text += [
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]
@@ -373,7 +384,7 @@ def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6)
 def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
     """Say that hunting neither begins nor ends in the range."""
     between = (
-        f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
+        f"{key.named} {key.text(swept.low)} to {key.text(swept.high)}"
         for key, swept in zip(keys, space.ranges, strict=True)
     )
     return f"No beginning or end of hunting was found for {', '.join(between)}."

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from friso.hunting.criteria import PEAK_RULE
 from friso.questions.check.cases import case_document, rows, rows_behind
-from friso.questions.check.draws import draws_document, draws_figure, draws_rows, draws_sentences
+from friso.questions.check.draws import draws_details, draws_document, draws_figure, draws_rows, draws_sentences
 from friso.questions.check.isolator_words import isolator_document, isolator_sentence
 from friso.questions.check.laws import laws_columns, laws_document, laws_rows, laws_sentences
 from friso.questions.check.margin_words import joint_sentences
@@ -36,30 +37,32 @@ def basis(check: CheckAnswer) -> str:
 
 
 def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
-    """Yield the blocks: first how probable hunting is, where machines were drawn, and then the verdicts."""
-    stage, cases = check.stage, shown_cases(check.result)
-    if check.draws:
-        yield AnswerBlock(sentences=draws_sentences(check.draws))
-    elif check.cut:
-        yield AnswerBlock(sentences=["Interrupted: no stages were drawn yet."])
-    notes = filter(None, [stage.controller.note(stage.flat()), stage.note])
+    """Yield the blocks: first the verdicts, over all machines drawn where there are any, else on the stage as it is."""
+    stage, cases, draws = check.stage, shown_cases(check.result), check.draws
     omitted = left_out(stage)
-    yield AnswerBlock(
-        title=stage.name,
-        sentences=[*answer(check.result), *motion_sentences(stage), *notes],
-        colours=[item.colour for item in cases],
+    at_centre = AnswerBlock(
+        title=f"{stage.name}, at the centre of its ranges".removeprefix(", ") if draws else stage.name,
         columns=cases,
         rows=rows(cases),
-        details=[*details_of(check.result), *([f"{omitted}."] if omitted else [])],
+        details=[*_over_ranges(check), *details_of(check.result), *([f"{omitted}."] if omitted else [])],
         draw=partial(_figures, check),
         numbers=partial(_cases_document, check),
     )
+    notes = filter(None, [stage.controller.note(stage.flat()), stage.note])
+    says, colours = [*_verdicts(check), *motion_sentences(stage), *notes], [item.colour for item in cases]
+    if draws:
+        yield AnswerBlock(sentences=says, colours=[] if check.cut else colours)
+        yield at_centre
+    else:
+        if check.cut:
+            yield AnswerBlock(sentences=["Interrupted: no stages were drawn yet."])
+        yield replace(at_centre, sentences=says, colours=colours)
     if suggested := check.isolator:
         yield AnswerBlock(
             sentences=[isolator_sentence(suggested)],
             numbers=lambda: {"isolator": plain_json(isolator_document(suggested))},
         )
-    if draws := check.draws:
+    if draws:
         yield AnswerBlock(
             title=f"{draws.sample.count} stages drawn from the uncertain keys, seed {draws.seed}",
             columns=[*case_labels(draws.stage).values()],
@@ -90,6 +93,18 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
     )
 
 
+def _verdicts(check: CheckAnswer) -> list[str]:
+    """Say for each case whether the machines drawn hunt, or the stage itself where none were drawn."""
+    return draws_sentences(check.draws) if check.draws else answer(check.result)
+
+
+def _over_ranges(check: CheckAnswer) -> list[str]:
+    """Say what the stage at the centre of its ranges does, and what would narrow them; nothing without draws."""
+    if not check.draws:
+        return []
+    return [*(f"At the centre of the ranges: {text}" for text in answer(check.result)), *draws_details(check.draws)]
+
+
 def _figures(check: CheckAnswer) -> Sequence[Figure]:
     """Draw motion and hunting cycles of all cases."""
     from friso.questions.check.figures import check_figures  # 0.7 s to import
@@ -98,10 +113,10 @@ def _figures(check: CheckAnswer) -> Sequence[Figure]:
 
 
 def _cases_document(check: CheckAnswer) -> dict[str, Any]:
-    """Return the verdicts as given, with the joint locked and free."""
+    """Return the conclusion, and all results as given, with the joint locked and free."""
     return plain_json(
         {
-            "conclusion": " ".join(answer(check.result)),
+            "conclusion": " ".join(_verdicts(check)),
             "stage": check.stage.name,
             "friction_passive_where": passive_where(check.stage.flat()) or None,
             "cases": {name: case_document(case) for name, case in check.result.items()},

@@ -13,10 +13,11 @@ from friso import hunting
 from friso.axis import axis_shown
 from friso.hunting import MORE_WORK, Case, CheckPart, Cycle, Kick, Tracking
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
+from friso.hunting.measures import BANDS
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
 from friso.questions.check.words import at_the_end, edge_text, moves_tried
-from friso.shown.cases import BANDS, ShownCase
+from friso.shown.cases import ShownCase, band_text
 from friso.shown.documents import dwells_document, entries, plain_json, tracking_document, unit_suffix
 from friso.shown.drawing.prefixes import (
     NOTHING,
@@ -54,7 +55,12 @@ def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...
     `columns` has, by the name of a row, the function that writes a text about a case. Rows in which no case has an
     entry are left out.
     """
-    texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in columns.items()]
+    effort = axis_shown().effort
+    fine, coarse = map(band_text, BANDS)
+    texts = [
+        (name.format(effort=effort, fine=fine, coarse=coarse), [text(item.case) for item in cases])
+        for name, text in columns.items()
+    ]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
 
 
@@ -181,13 +187,16 @@ def _moves_tried(case: Case) -> str:
 def _peaks(case: Case) -> str:
     """Write the peak count, and why it may contradict the verdict.
 
-    A run that ends too early has no peak count.
+    A run that ends too early has none, nor has a rotary axis, as the thesis counts peaks by their height in mm.
     """
     duration = case.stage.flat()["motion.duration"]
-    if duration <= COUNTED_AFTER:
-        return f"{NOTHING} (counted from {COUNTED_AFTER:g} s on, and the run ends at {duration:.4g} s)"
+    if duration <= COUNTED_AFTER or not axis_shown().plain:
+        return NOTHING
     remarks = {
-        ("hunts", False): f" (counted from {COUNTED_AFTER:g} s on, if higher than {with_unit(COUNTED_ABOVE, 'm')})",
+        (
+            "hunts",
+            False,
+        ): f" (the thesis counts peaks from {COUNTED_AFTER:g} s on, if higher than {with_unit(COUNTED_ABOVE, 'm')})",
         ("bistable", False): " (another motion hunts)",
         ("bistable", True): " (a long transient)",
         ("transient", True): " (a long transient)",
@@ -238,8 +247,9 @@ _NUMBERS: dict[str, Callable[[Case], str]] = {
     "Period, last quarter": lambda case: with_unit(case.period, "s"),
     "Largest error on the way": _tracked(lambda tracking: tracking.largest),
     "Error on the way, RMS": _tracked(lambda tracking: tracking.rms),
-    **{f"Settling time into {text}": _settled_within(band) for band, text in BANDS.items()},
-    "Largest actuator force": lambda case: with_unit(case.largest_force, "N"),
+    "Settling time into {fine}": _settled_within(BANDS[0]),
+    "Settling time into {coarse}": _settled_within(BANDS[1]),
+    "Largest actuator {effort}": lambda case: with_unit(case.largest_force, "N"),
 }
 
 _BEHIND: dict[str, Callable[[Case], str]] = {

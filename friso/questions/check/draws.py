@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS
 from friso.identification.ways import ways_to_show
+from friso.quantities import plain_factor
 from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import Axis, Band, Figure, Panel
 from friso.shown.drawing.palette import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION
-from friso.shown.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval
+from friso.shown.drawing.prefixes import (
+    NOTHING,
+    percentage,
+    range_with_unit,
+    rounded_up,
+    share_with_interval,
+    with_unit,
+)
 from friso.shown.unknown import if_so
-from friso.studies.draws import Draws, Fates
+from friso.stage import Stage
+from friso.studies.draws import DrawnBandwidths, Draws, Fates
 from friso.studies.settings import settings
 
 COLOURS = {
@@ -25,12 +35,6 @@ COLOURS = {
     "undecided": MAUVE,
     "failed": GREY,
 }
-
-OPEN = {
-    "undecided": "undecided (what attracts them, or how their motion ends, is not certain)",
-    "failed": "failed (their motion was not simulated to its end)",
-}
-"""What is said of draws with an open verdict."""
 
 HISTOGRAM_BARS = 24
 """Number of bars in the histogram."""
@@ -64,21 +68,60 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 
 
 def draws_sentences(draws: Draws) -> list[str]:
-    """Say what the machines drawn do, with the joint as given, locked and free.
-
-    If invalid draws were left out, the last sentence says how many and why.
-    """
-    sample = draws.sample
-    cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
+    """Say what the machines drawn do, with the joint as given, locked and free, and what cures those that hunt."""
+    cut = f"Interrupted: {draws.sample.count} of {draws.asked} stages were drawn so far."
     cases = case_labels(draws.stage).items()
-    over = f"{if_so(draws.stage)}, over the uncertain values"
-    sentences = [*cut, *(f"{label}{over}: {_sentence(name, draws)}" for name, label in cases)]
-    sentences += [text for text in [_narrowed(draws)] if text]
+    so = if_so(draws.stage)
+    says = [f"{label}{so}: {_verdict(name, draws)}{_at_other_bandwidths(name, draws)}" for name, label in cases]
+    return [*([cut] if draws.sample.count < draws.asked else []), *says]
+
+
+def draws_details(draws: Draws) -> list[str]:
+    """Say what would narrow the ranges, and which draws were left out because they are no valid machines."""
+    sample = draws.sample
+    says = [text for text in [_narrowed(draws)] if text]
     if sample.left_out:
         reasons = [f"{count}: {why}" for why, count in sample.broken.items()]
         beyond = [f"{sample.beyond}: a key beyond its bounds"] if sample.beyond else []
-        sentences.append(f"{sample.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
-    return sentences
+        says.append(f"{sample.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
+    return says
+
+
+def _verdict(name: str, draws: Draws) -> str:
+    """Say in one sentence whether the machines drawn hunt, and on which key that hangs.
+
+    `name` is the case: "given", "locked" or "free".
+    """
+    fates, count = draws.fates[name], draws.sample.count
+    attracted, after_this = fates.share(ATTRACTED), fates.share(("hunts",))
+    lost, open_ones = int(np.count_nonzero(fates.unstable)), sum(fates.counts[word] for word in UNDECIDED)
+    loop = f"the loop of {lost} of {count} machines drawn is unstable, whatever the friction; " if lost else ""
+    doubt = f", {open_ones} of them not for certain" if open_ones else ""
+    if open_ones == count:
+        return f"{loop}what {count} machines drawn do is not certain."
+    if draws.split(name):
+        does = f"may hunt: {share_with_interval(attracted)} of {count} machines drawn do{_swings(fates)}{doubt}"
+        return f"{loop}{does}.{_hangs_on(fates, draws)}"
+    if not attracted.probability:
+        rare = f"at most {percentage(attracted.high)} of all such machines do"
+        return f"{loop}does not hunt: none of {count} machines drawn does ({rare}{doubt})."
+    always = after_this.probability == attracted.probability
+    does = "hunts" if always else f"can hunt, and {share_with_interval(after_this)} of the machines do after this move"
+    return f"{loop}{does}{_swings(fates)} (all of {count} machines drawn{doubt})."
+
+
+def _hangs_on(fates: Fates, draws: Draws) -> str:
+    """Say which key decides most whether a machine hunts, whether it is unknown, and what would show it; "" if none."""
+    keys = fates.separations(draws.sample.keys)
+    if not keys:
+        return ""
+    key, strength = next(iter(keys.items()))
+    side = "larger" if strength > 0 else "smaller"
+    if key not in draws.stage.unknown_keys and not getattr(draws.stage.uncertain().get(key), "wide", False):
+        return f" That depends most on {key}: {side} values hunt."
+    ways = ways_to_show(key)
+    shown = f" What shows it: {ways}." if ways else ""
+    return f" That depends most on {key}, which nobody measured: {side} values hunt.{shown}"
 
 
 def _swings(fates: Fates) -> str:
@@ -90,18 +133,61 @@ def _swings(fates: Fates) -> str:
         range_with_unit(float(values.min()), float(values.max()), unit)
         for values, unit in ((amplitudes, "m"), (periods, "s"))
     )
-    return f": by ± {far}, every {slow}"
+    return f", by ± {far} every {slow}"
 
 
-def _edge(draws: Draws) -> str:
-    """Write in which range of bandwidths hunting of the machines drawn ends; "" if not known."""
-    drawn_edges = draws.edges
-    if drawn_edges is None or not np.isfinite(drawn_edges.low).any():
-        return ""
-    span = range_with_unit(float(np.nanmin(drawn_edges.low)), float(np.nanmax(drawn_edges.high)), "Hz")
-    beyond = int(np.isnan(drawn_edges.low).sum())
-    out = f" ({beyond} of {len(drawn_edges.low)} have it farther away, nowhere or not for certain)" if beyond else ""
-    return f"; the edge of hunting roughly at {span}{out}"
+def _at_other_bandwidths(name: str, draws: Draws) -> str:
+    """Say which bandwidth keeps all machines drawn from hunting, or below which they hunt; "" if it is not known."""
+    tried = draws.bandwidths.get(name)
+    if tried is None:
+        return _freed(name, draws, " Cure: free the joint.")
+    count, edge = len(tried.hunts), _ends_of_hunting(tried)
+    bandwidth = partial(_bandwidth, tried)
+    if np.any(tried.at(1.0) != 0):
+        if tried.cure is None:
+            top = bandwidth(float(tried.factors[-1]))
+            freed = _freed(name, draws, " Cure: free the joint.")
+            return f" No bandwidth up to {top} keeps all of {count} machines from hunting.{freed}"
+        low, high = tried.cure
+        freed = _freed(name, draws, ", or free the joint")
+        seen = f"none of {count} machines hunts there, nor at {bandwidth(high)}"
+        return f" Cure: {_faster(draws.stage, tried, low)} or more ({seen}){freed}."
+    if edge is None:
+        return f" None of {count} hunts at {bandwidth(float(tried.factors[0]))} either."
+    never = int(np.isnan(tried.edges[0]).sum())
+    beyond = f" ({never} of {count} at none tried, or not for certain)" if never else ""
+    return f" Hunting begins below {bandwidth(edge[0])} to {bandwidth(edge[1])}{beyond}."
+
+
+def _freed(name: str, draws: Draws, text: str) -> str:
+    """Return a text that advises to free the joint, for a locked joint which no machine drawn needs; "" otherwise."""
+    locked = name == "locked" or (name == "given" and draws.stage.joint and draws.stage.joint.locked)
+    free = draws.fates.get("free")
+    helps = locked and free is not None and not draws.split("free") and not np.isin(free.verdicts, ATTRACTED).any()
+    return text if helps else ""
+
+
+def _bandwidth(tried: DrawnBandwidths, factor: float) -> str:
+    """Write a bandwidth by its factor: in Hz, or as a multiple if the controller states none."""
+    return f"{plain_factor(factor)} times yours" if tried.own is None else with_unit(factor * tried.own, "Hz", 3)
+
+
+def _faster(stage: Stage, tried: DrawnBandwidths, factor: float) -> str:
+    """Name a faster controller by its bandwidth, or by its gains if it states none."""
+    controller = stage.controller
+    if tried.own is not None:
+        name = controller.bandwidth_name if controller.bandwidth_name == "crossover" else controller.bandwidth_key
+        return f"{name} {with_unit(rounded_up(factor * tried.own), 'Hz')}"
+    factor = rounded_up(factor)
+    powers = controller.speeds_up.items()
+    gains = [f"{gain} × {factor**power:.3g}" for gain, power in powers if getattr(controller, gain)]
+    return f"a controller {plain_factor(factor)} times as fast ({', '.join(gains)})"
+
+
+def _ends_of_hunting(tried: DrawnBandwidths) -> tuple[float, float] | None:
+    """Return the factors between which hunting of all machines ends; None if that is known of none."""
+    low, high = tried.edges
+    return (float(np.nanmin(low)), float(np.nanmax(high))) if np.isfinite(low).any() else None
 
 
 def _narrowed(draws: Draws) -> str:
@@ -121,41 +207,6 @@ def _narrowed(draws: Draws) -> str:
     key = max(follows, key=lambda name: follows[name])
     ways = ways_to_show(key)
     return f"To narrow these ranges, measure {key}, which the amplitude follows most{f': {ways}' if ways else ''}."
-
-
-def _sentence(name: str, draws: Draws) -> str:
-    """Say how probable hunting is, with its amplitude and period, and which key matters most.
-
-    `name` is the case: "given", "locked" or "free". For the stage as given, the edge of hunting is added.
-    """
-    fates = draws.fates[name]
-    open_ones = {word: fates.counts[word] for word in UNDECIDED if fates.counts[word]}
-    keys = fates.separations(draws.sample.keys)
-    lost = int(np.count_nonzero(fates.unstable))
-    sentences = (
-        [f"the loop of {lost} of {draws.sample.count} draws is unstable, whatever the friction;"] if lost else []
-    )
-    hunting, attracted = (share_with_interval(fates.share(words)) for words in (("hunts",), ATTRACTED))
-    none = "none hunts, and none has a cycle that attracts (fewer than {} % of all, with 95 % confidence)"
-    probable, variants = fates.share(ATTRACTED), draws.stage.variants()
-    edge = _edge(draws) if variants[name] == variants["given"] else ""
-    sentences += [
-        f"what {draws.sample.count} draws do is not certain."
-        if sum(open_ones.values()) == draws.sample.count
-        else f"of {draws.sample.count} draws, hunts with a probability of {hunting}, has a cycle that attracts with "
-        f"{attracted}{_swings(fates)}{edge}."
-        if probable.probability
-        else f"of {draws.sample.count} draws, {none.format(percentage(probable.high))}{edge}."
-    ]
-    if open_ones:
-        counts = listed([f"{count} {OPEN[word]}" for word, count in open_ones.items()], "and")
-        sentences.append(f"{counts}; the intervals cover both outcomes for these.")
-    if keys:
-        key, separation = next(iter(keys.items()))
-        sentences.append(
-            f"{key} matters most ({separation:+.2f}): {'larger' if separation > 0 else 'smaller'} values hunt."
-        )
-    return " ".join(sentences)
 
 
 def draws_figure(draws: Draws) -> Figure:
@@ -206,7 +257,22 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "separation": fates.separations(draws.sample.keys),
         "amplitude_m": _ends(fates.amplitudes),
         "period_s": _ends(fates.periods),
-        "edge_hz": _ends(np.r_[draws.edges.low, draws.edges.high]) if draws.edges and case == "given" else None,
+        "split": draws.split(case),
+        **_bandwidths(draws.bandwidths.get(case)),
+    }
+
+
+def _bandwidths(tried: DrawnBandwidths | None) -> dict[str, Any]:
+    """Return where hunting of the machines drawn ends, and at which faster bandwidths none of them hunts."""
+    edges = _ends(np.r_[tried.edges]) if tried else None
+    cure = list(tried.cure) if tried and tried.cure else None
+    own = tried.own if tried else None
+    return {
+        "tried_at_bandwidths": len(tried.hunts) if tried else 0,
+        "edge_factor": edges,
+        "edge_hz": [own * end for end in edges] if own and edges else None,
+        "cure_factor": cure,
+        "cure_hz": [own * end for end in cure] if own and cure else None,
     }
 
 

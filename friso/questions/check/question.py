@@ -33,6 +33,10 @@ UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with whi
 """Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
 
 
+MACHINES_DIFFER = "machines drawn from the uncertain keys differ"
+"""Reason for an uncertain verdict at the centre of ranges over which the verdict changes."""
+
+
 class CheckAnswer(Answer):
     """The verdict on a stage.
 
@@ -197,7 +201,8 @@ def checked_stage(
 
         answers_interrupts()  # from here on, an interruption still leaves an answer
         try:
-            drawn = Draws.of(chosen, sample, seed, loose, cases["given"].judgement.margin, progress)
+            drawn = Draws.of(chosen, sample, seed, loose, progress)
+            cases = {name: _as_drawn(case, drawn, name) for name, case in cases.items()}
             cut = drawn.asked > drawn.sample.count
         except KeyboardInterrupt:
             cut = True
@@ -224,6 +229,14 @@ def _as_built(case: Case) -> Case:
         return case
     hunting = replace(case.judgement.hunting, certain=False, reason=UNSTABLE_AS_BUILT)
     return replace(case, unstable_as_built=where, judgement=replace(case.judgement, hunting=hunting))
+
+
+def _as_drawn(case: Case, draws: Draws, name: str) -> Case:
+    """Return a case of the check whose verdict is not certain if the machines drawn differ in it."""
+    if not draws.split(name):
+        return case
+    hunting = replace(case.judgement.hunting, certain=False, reason=MACHINES_DIFFER)
+    return replace(case, judgement=replace(case.judgement, hunting=hunting))
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:

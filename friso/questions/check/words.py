@@ -20,9 +20,10 @@ from friso.hunting import (
     MoveShare,
 )
 from friso.hunting.criteria import ATTRACTED, Verdict
+from friso.hunting.measures import BANDS
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
-from friso.shown.cases import BANDS, ShownCase, band_text, shown_cases
+from friso.shown.cases import ShownCase, band_text, shown_cases
 from friso.shown.drawing.prefixes import (
     digits_that_differ,
     length_at_rest,
@@ -330,6 +331,8 @@ def _settling_sentence(case: Case) -> str:
     stuck = _stuck(case)
     if fine == 0 and stuck:
         return f"settles: it ends within {band_text(_MICRON)} of its reference{stuck}."
+    if fine == 0:
+        return f"stays within {band_text(_MICRON)} of its reference from the end of the motion on."
     if fine is not None:
         return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}{stuck}."
     if coarse is not None:

@@ -46,7 +46,7 @@ def blocks(comparison: Comparison) -> list[AnswerBlock]:
         AnswerBlock(
             title=comparison.stage.name,
             sentences=words.answer(comparison),
-            columns=words.COLUMNS,
+            columns=axis_shown().named(words.COLUMNS),
             rows=words.table_rows(comparison),
             draw=partial(compare_figures, comparison),
             numbers=partial(compare_document, comparison),
@@ -56,7 +56,9 @@ def blocks(comparison: Comparison) -> list[AnswerBlock]:
         ),
         AnswerBlock(title="What the numbers are", caption=meanings, details=words.details(comparison)),
         AnswerBlock(
-            title="Compared with a, machine by machine", columns=words.PAIRED, rows=words.paired_rows(comparison)
+            title="Compared with a, machine by machine",
+            columns=axis_shown().named(words.PAIRED),
+            rows=words.paired_rows(comparison),
         ),
         AnswerBlock(
             title="The machines",

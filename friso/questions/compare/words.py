@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.evidence import value
 from friso.frequency.crossover import COMFORTABLE_MARGIN
@@ -21,6 +22,7 @@ from friso.shown.drawing.prefixes import (
     with_unit,
 )
 from friso.shown.machine_words import spread_sentences
+from friso.shown.says import Alternatives, Words, always, say
 from friso.stage import ControllerSection
 from friso.stage.controllers import AgainstFriction
 from friso.stage.section import numeric_fields
@@ -31,7 +33,6 @@ from friso.studies.compare.study import (
     FOLLOWED_MACHINES,
     LONGER_FACTOR,
     Comparison,
-    NeededBandwidth,
     OptionResult,
 )
 
@@ -42,7 +43,7 @@ COLUMNS = (
     "In position in the longer run",
     "Settling time",
     "In-position RMS",
-    "Force RMS",
+    "RMS of the {effort}",
     "Modulus margin",
 )
 
@@ -52,7 +53,7 @@ PAIRED = (
     "In position later",
     "No difference",
     "In-position RMS, ratio",
-    "Force RMS, ratio",
+    "RMS of the {effort}, ratio",
 )
 
 UNSHAKEN = "no [floor]"
@@ -190,89 +191,21 @@ def sentences(comparison: Comparison) -> list[str]:
 
 
 def answer(comparison: Comparison) -> list[str]:
-    """Say whether to buy a joint, then which options bring the machines to rest, at what cost."""
-    says = [*_recommendation(comparison), conclusion(comparison), *_turning(comparison)]
-    return [*_unstable(comparison), *_interrupted(comparison), *says]
-
-
-def _interrupted(comparison: Comparison) -> Iterator[str]:
-    """Yield which options were not run because of an interruption, unless all were run."""
-    letters = listed([option.letter for option in comparison.not_run], "and")
-    if letters:
-        yield (f"Interrupted: this is the answer so far. It is that of the options which were run; {letters} were not.")
-
-
-def _turning(comparison: Comparison) -> list[str]:
-    """Say from which bandwidth on a faster controller alone brings the machines to rest.
-
-    The list is empty if this was not computed, or if they come to rest as they are.
-    """
-    needed, base = comparison.needed, comparison.results[0]
-    if needed is None or base.rests:
-        return []
-    enough, last = f"{percent(ENOUGH_SHARE)} of the machines", len(needed.shares) - 1
-    least, hertz = comparison.turning, [with_unit(float(value), "Hz") for value in needed.bandwidths]
-    if least is None:
-        share = _share_at(needed, last)
-        return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
-    turn = with_unit(least, "Hz")
-    fewer = np.flatnonzero((needed.bandwidths < least) & (needed.shares < ENOUGH_SHARE))
-    if not fewer.size:
-        return []
-    at, below = needed.turning(ENOUGH_SHARE), int(fewer[-1])
-    only_there = at is None or needed.bandwidths[at] > least
-    where = f"at a bandwidth of {turn}" if only_there else f"from a bandwidth of {turn} on"
-    others = [result for result in _resting(comparison) if result.option.factor == 1.0]
-    return [
-        f"A faster controller alone brings {enough} to rest in the end {where}, the last frequency at which the loop "
-        f"crosses 0 dB (at {hertz[below]}: {_share_at(needed, below)}). A drive limited to less needs "
-        f"{_names(others) if others else 'something else'}."
-    ]
-
-
-def _share_at(needed: NeededBandwidth, number: int) -> str:
-    """Write the fraction of machines that come to rest at bandwidth `number` of those tried."""
-    return percent(float(needed.shares[number]), 3)
-
-
-def _unstable(comparison: Comparison) -> Iterator[str]:
-    """Yield on how many machines the loop is unstable as it is, whatever the friction.
-
-    Nothing is yielded if there are no such machines.
-    """
-    base, count = comparison.results[0], comparison.machines.count
-    if base.unstable:
-        yield (
-            f"As it is, the loop is unstable on {base.unstable} of {count} machines, whatever the friction: retune the "
-            "controller (friso bode)."
-        )
+    """Say in at most three sentences whether to buy a joint, what the best option brings, and from which bandwidth."""
+    return say(comparison, _SAYS, _WORDS)[:3]
 
 
 def details(comparison: Comparison) -> list[str]:
-    """Say how well each option does, and what is not compared."""
-    return [*_performance(comparison), *_failing(comparison), *_standstill(comparison)]
+    """Say which options bring the machines to rest and at what cost, how the others do, and what is not compared."""
+    further = [*brought(comparison), *_performance(comparison), *_failing(comparison), *_standstill(comparison)]
+    return [*say(comparison, _SAYS, _WORDS)[3:], *further]
 
 
-def conclusion(comparison: Comparison) -> str:
-    """Say which options bring the machines to rest, how many of them, and at what cost."""
-    resting, base = _resting(comparison), comparison.results[0]
-    within, count = with_unit(comparison.within, "m"), comparison.machines.count
-    if not resting:
-        best = max(comparison.results, key=lambda result: result.in_position_count)
-        none = "None of these options" if comparison.not_run else "No option"
-        return (
-            f"{none} brings {percent(ENOUGH_SHARE)} of the {count} machines to rest within {within}. The best is "
-            f"{in_prose(best)}, with {best.in_position_count} in position at the end. {_as_is(comparison)}"
-        )
-    first, *further = resting
-    brought = [
-        f"{in_prose(first)} {'brings' if first is not base else 'already brings'} {_number(first, count)} machines to "
-        f"rest within {within}{_cost(first, comparison)}",
-        *(f"{in_prose(result)} {_number(result, count)}{_cost(result, comparison)}" for result in further),
-    ]
-    text = "; ".join(brought)
-    sentences = (f"{text[0].upper()}{text[1:]}.", _too_late(resting), _as_is(comparison))
-    return " ".join(filter(None, sentences))
+def brought(comparison: Comparison) -> list[str]:
+    """Say for every option that brings the machines to rest how many it brings there, and at what cost."""
+    resting, count = _resting(comparison), comparison.machines.count
+    says = [f"{in_prose(result)}: {_number(result, count)} at rest{_cost(result, comparison)}" for result in resting]
+    return [f"{text[:1].upper()}{text[1:]}." for text in says] + [text for text in [_too_late(resting)] if text]
 
 
 def _too_late(resting: Sequence[OptionResult]) -> str:
@@ -300,37 +233,124 @@ def _cost(result: OptionResult, comparison: Comparison) -> str:
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
     if result.unstable:
         loops = f"the linear loop is unstable on {result.unstable} of {comparison.machines.count}"
-    return f" ({plain_factor(comparison.paired(result).force.value)} times the force RMS of a; {loops})"
+    return f" ({plain_factor(comparison.paired(result).force.value)} times the {axis_shown().effort} RMS of a; {loops})"
 
 
-def _as_is(comparison: Comparison) -> str:
-    """Say what the machines do as they are, in option a; empty if enough of them come to rest."""
-    base, count = comparison.results[0], comparison.machines.count
-    if base.rests:
-        return ""
-    swinging = int(np.count_nonzero(base.measures.swings))
-    return f"As is (a), {swinging} of {count} swing at the end, modulus margin {base.margin.value:.2f}."
+def _resting(comparison: Comparison) -> list[OptionResult]:
+    """Return the options that bring enough machines to rest."""
+    return [result for result in comparison.results if result.rests]
 
 
-def _recommendation(comparison: Comparison) -> list[str]:
-    """Say whether to buy a joint; empty if no option brings the machines to rest, or if not all were run."""
-    resting = [] if comparison.not_run else _resting(comparison)
-    joint = [result for result in resting if result.option.kind.joint]
-    settings = [result for result in resting if not result.option.kind.joint]
-    if any(result is comparison.results[0] for result in settings):
-        in_the_end = "" if np.isfinite(comparison.results[0].settling.value) else " to come to rest in the end"
-        return [f"These machines need neither a joint nor other settings{in_the_end}."]
-    if joint and settings:
-        return [
-            f"On these machines controller settings do what a joint does: with {_names(settings)} no joint is needed. "
-            "Buy one only if the controller cannot be set that way."
-        ]
-    if joint:
-        return [f"Only a joint brings these machines to rest: {_names(joint)}. No setting does so alone."]
-    if settings:
-        with_joint = any(result.option.kind.joint for result in comparison.results)
-        return [f"Controller settings suffice ({_names(settings)}){'; a joint does not' if with_joint else ''}."]
-    return []
+def _joints(comparison: Comparison) -> list[OptionResult]:
+    """Return the options with a joint that bring the machines to rest."""
+    return [result for result in _resting(comparison) if result.option.kind.joint]
+
+
+def _settings(comparison: Comparison) -> list[OptionResult]:
+    """Return the options without a joint that bring the machines to rest."""
+    return [result for result in _resting(comparison) if not result.option.kind.joint]
+
+
+def _first(comparison: Comparison) -> OptionResult:
+    """Return the option that the answer describes: the first that brings the machines to rest, or else the best."""
+    best = max(comparison.results, key=lambda result: result.in_position_count)
+    preferred = _settings(comparison) or _resting(comparison) or [best]
+    return preferred[0]
+
+
+def _others(comparison: Comparison) -> list[OptionResult]:
+    """Return the options that bring the machines to rest at their present bandwidth."""
+    return [result for result in _resting(comparison) if result.option.factor == 1.0]
+
+
+def _at_one_bandwidth(comparison: Comparison) -> bool:
+    """Tell whether a faster controller brings the machines to rest at a bandwidth, and fails again at a higher one."""
+    needed, least = comparison.needed, comparison.turning
+    if needed is None or least is None:
+        return False
+    at = needed.turning(ENOUGH_SHARE)
+    return at is None or bool(needed.bandwidths[at] > least)
+
+
+_WORDS: Words[Comparison] = {
+    "letters": lambda of: listed([option.letter for option in of.not_run], "and"),
+    "unstable": lambda of: str(of.results[0].unstable),
+    "count": lambda of: str(of.machines.count),
+    "none": lambda of: "none of these options" if of.not_run else "no option",
+    "share": lambda of: percent(ENOUGH_SHARE),
+    "within": lambda of: with_unit(of.within, "m"),
+    "settings": lambda of: _names(_settings(of)),
+    "joints": lambda of: _names(_joints(of)),
+    "option": lambda of: in_prose(_first(of)),
+    "number": lambda of: _number(_first(of), of.machines.count),
+    "force": lambda of: plain_factor(of.paired(_first(of)).force.value),
+    "effort": lambda of: axis_shown().effort,
+    "margin": lambda of: f"{_first(of).margin.value:.2f}",
+    "swinging": lambda of: str(int(np.count_nonzero(of.results[0].measures.swings))),
+    "in_the_end": lambda of: "" if np.isfinite(of.results[0].settling.value) else " to come to rest in the end",
+    "turning": lambda of: with_unit(of.turning, "Hz"),
+    "highest": lambda of: with_unit(float(of.needed.bandwidths[-1]), "Hz") if of.needed else "",
+    "others": lambda of: _names(_others(of)) or "something else",
+}
+
+_SAYS: Sequence[Alternatives[Comparison]] = (
+    (
+        (
+            lambda of: of.not_run,
+            "Interrupted: this is the answer of the options that were run; {letters} were not.",
+        ),
+        (
+            lambda of: of.results[0].unstable,
+            "As it is, the loop is unstable on {unstable} of {count} machines, whatever the friction: retune the "
+            "controller (friso bode).",
+        ),
+    ),
+    (
+        (
+            lambda of: not _resting(of),
+            "{none} brings {share} of the {count} machines to rest within {within}; the best is {option}, with "
+            "{number} in position at the end, and as is (a) {swinging} swing.",
+        ),
+        (lambda of: of.not_run, ""),
+        (lambda of: of.results[0].rests, "These machines need neither a joint nor other settings{in_the_end}."),
+        (
+            lambda of: _joints(of) and _settings(of),
+            "Controller settings do here what a joint does: with {settings} no joint is needed.",
+        ),
+        (_joints, "Only a joint brings these machines to rest: {joints}. No setting does so alone."),
+        (
+            lambda of: any(result.option.kind.joint for result in of.results),
+            "Controller settings suffice ({settings}); a joint does not.",
+        ),
+        (always, "Controller settings suffice ({settings})."),
+    ),
+    (
+        (lambda of: of.results[0].rests, ""),
+        (
+            _resting,
+            "As is (a), {swinging} of {count} machines swing at the end; {option} brings {number} to rest within "
+            "{within}, at {force} times the {effort} RMS and with a modulus margin of {margin}.",
+        ),
+    ),
+    (
+        (lambda of: of.needed is None or of.results[0].rests, ""),
+        (
+            _at_one_bandwidth,
+            "A faster controller alone brings them to rest at a bandwidth of {turning}, where the loop last crosses 0 "
+            "dB, but not at all higher ones; a drive limited to less needs {others}.",
+        ),
+        (
+            lambda of: of.turning is not None,
+            "A faster controller alone brings them to rest from a bandwidth of {turning} on, where the loop last "
+            "crosses 0 dB; a drive limited to less needs {others}.",
+        ),
+        (
+            always,
+            "The controller alone does not bring {share} of the machines to rest at any bandwidth up to {highest}.",
+        ),
+    ),
+)
+"""Sentences on what to choose, what it brings and costs, and from which bandwidth on a faster controller is enough."""
 
 
 def _performance(comparison: Comparison) -> list[str]:
@@ -354,27 +374,17 @@ def _performance(comparison: Comparison) -> list[str]:
 
 def _still(result: OptionResult, comparison: Comparison) -> str:
     """Write how still machines stand, as an RMS [m], if the floor shakes; empty otherwise."""
-    return f", stands still to {with_unit(result.in_position.value, 'm')} RMS" if comparison.shaken else ""
+    return f", stands still to {length_at_rest(result.in_position.value)} RMS" if comparison.shaken else ""
 
 
 def _failing(comparison: Comparison) -> list[str]:
     """Say what the machines finally do with the options that fail."""
     return [
         f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
-        f"{share_with_interval(result.settled)} are in position{_in_the_longer_run(result)}."
+        f"{share_with_interval(result.settled)} are in position."
         for result in comparison.results
         if not result.rests
     ]
-
-
-def _in_the_longer_run(result: OptionResult) -> str:
-    """Say how many machines stay in position in a longer run; empty if there was no such run."""
-    if not result.later.done.size:
-        return ""
-    return (
-        f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER_FACTOR} times as "
-        "long"
-    )
 
 
 def _standstill(comparison: Comparison) -> list[str]:
@@ -393,11 +403,6 @@ def _standstill(comparison: Comparison) -> list[str]:
 def _names(results: Sequence[OptionResult]) -> str:
     """Join the names of options by "or"."""
     return listed([in_prose(result) for result in results], "or")
-
-
-def _resting(comparison: Comparison) -> list[OptionResult]:
-    """Return the options that bring enough machines to rest."""
-    return [result for result in comparison.results if result.rests]
 
 
 def population(comparison: Comparison) -> list[str]:

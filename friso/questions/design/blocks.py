@@ -32,6 +32,9 @@ from friso.stage import Stage
 LEAVES_STEP = 2
 """Number of the step that shows the drawing and the requirements."""
 
+MOST_SENTENCES = 3
+"""Number of verdicts in the answer; those on friction laws behind them are details."""
+
 NOT_VERIFIED = "design-not-verified.toml"
 """Name of the stage file of an unfinished design."""
 
@@ -41,8 +44,10 @@ def blocks(design: Design | UnfinishedDesign) -> list[AnswerBlock]:
     numbers = partial(design_document, design)
     if isinstance(design, UnfinishedDesign):
         return [AnswerBlock(sentences=so_far(design), numbers=numbers)]
-    colours, sentences = zip(*headline(design), strict=True)
-    details = [f"{number}. {step.title}: {' '.join(step.sentences)}" for number, step in enumerate(steps(design), 1)]
+    colours, sentences = zip(*headline(design)[:MOST_SENTENCES], strict=True)
+    laws = [sentence for _, sentence in headline(design)[MOST_SENTENCES:]]
+    titled = [f"{step.title}: {' '.join(step.sentences)}" for step in steps(design)]
+    details = [*laws, *(f"{number}. {text}" for number, text in enumerate(titled, 1))]
     draw = partial(design_figures, design)
     return [AnswerBlock(sentences=sentences, colours=colours, details=details, draw=draw, numbers=numbers)]
 
@@ -51,6 +56,7 @@ def page_values(design: Design) -> dict[str, Any]:
     """Return the steps that the page shows, with the drawing and how much of each requirement is used."""
     return {
         "spec": design.spec,
+        "laws": headline(design)[MOST_SENTENCES:],
         "steps": steps(design),
         "leaves": LEAVES_STEP,
         "drawing": Markup(_drawing(design)),

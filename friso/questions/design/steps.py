@@ -21,9 +21,6 @@ from friso.questions.flexure.numbers import megapascals, newtons_per
 from friso.questions.flexure.words import assumptions
 from friso.shown.drawing.prefixes import listed
 
-LEAST_FRICTION_GAP = 1.0
-"""Least difference [N] of static and Coulomb friction for hunting, as found in the thesis (Sec. 4.3.1)."""
-
 
 def steps(design: Design) -> tuple[DesignStep, ...]:
     """Return all steps of the design method in order, each with its result and reasons."""
@@ -33,18 +30,13 @@ def steps(design: Design) -> tuple[DesignStep, ...]:
 def isolator_step(design: Design) -> DesignStep:
     """Return the step that decides whether an isolator is needed."""
     corners, flat = design.without, design.original.flat()
-    sentences = [f"Without an isolator the machine {words.edge(corners)}.", *_worst(corners, design), *_gap(design)]
+    sentences = [f"Without an isolator the machine {words.edge(corners)}.", *_worst(corners, design)]
     if not design.needed:
         sentences.append(words.brings(design))
-    facts = [
-        ("Corners of friction and masses", str(corners.population.count)),
-        ("Edge of hunting without isolator", _edge(corners)),
-        ("The same with the safety factor", _edge(corners, design.spec.safety.hunting)),
-        ("Machine's limit", hertz(design.spec.limit)),
-        ("Crossovers searched", " to ".join(map(hertz, corners.searched))),
-    ]
     losses = words.gaps(corners, flat)
-    facts += [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
+    lost = [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
+    searched = ("Crossovers searched", " to ".join(map(hertz, corners.searched)))
+    facts = [("Corners of friction and masses", str(corners.population.count)), searched, *lost]
     answer = "yes" if design.needed else "no"
     return DesignStep(f"Is an isolator needed: {answer}", tuple(sentences), tuple(facts), ())
 
@@ -67,31 +59,14 @@ def joint_step(design: Design) -> DesignStep:
     ]
     joint = design.stage.flat()
     facts = (
-        ("Drive stiffness", stiffness),
-        ("Stroke to each side", f"{size(task.stroke)} mm"),
         ("Deviation from linear over the stroke", f"{percent(beams.nonlinearity)}"),
-        ("Force at full stroke", force),
-        ("Least static friction", trimmed(task.friction, "N")),
         (
             "Limiter, beside the joint when touched",
             f"{trimmed(joint['joint.limiter_stiffness'], 'N/m')}, "
             f"{trimmed(joint['joint.limiter_damping'], 'N*s/m')} (as given)",
         ),
-        ("Edge of hunting with isolator", _edge(design.edges)),
     )
     return DesignStep(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(sentences), facts, ("design_map",))
-
-
-def _edge(corners: Corners, factor: float = 1.0) -> str:
-    """Write the highest edge of hunting among the corners, times a factor, as a frequency [Hz].
-
-    If some corner hunts at all crossovers searched, the text gives the end of the search. If none hunts, it is "none
-    found".
-    """
-    if not corners.hunts:
-        return "none found"
-    beyond = f"beyond {hertz(corners.searched[1])}"
-    return hertz(factor * corners.highest) if math.isfinite(corners.highest) else beyond
 
 
 def _stroke(design: Design) -> str:
@@ -125,30 +100,6 @@ def _worst(corners: Corners, design: Design) -> list[str]:
     return sentences
 
 
-def _gap(design: Design) -> list[str]:
-    """Compare the friction lost at break-away with what hunting needs according to the thesis.
-
-    The list is empty for a friction law that has no static and Coulomb friction.
-    """
-    losses = words.gaps(design.without, design.original.flat())
-    if losses is None:
-        return []
-    small = design.without.edges[losses < LEAST_FRICTION_GAP]
-    text = f"When it breaks away, the cart loses {losses.min():.3g} to {losses.max():.3g} N of its friction."
-    if not small.size:
-        return [f"{text} That is more than the {LEAST_FRICTION_GAP:g} N that hunting needs according to the thesis."]
-    hunting = small[small > 0]
-    if not hunting.size:
-        return [f"{text} Corners with less than {LEAST_FRICTION_GAP:g} N do not hunt, as the thesis found."]
-    top = hunting.max()
-    about = "" if top == design.without.highest else "about "
-    reach = f"up to {about}{hertz(float(top))}" if top < design.without.searched[1] else "at all crossovers searched"
-    return [
-        f"{text} According to the thesis hunting needs about {LEAST_FRICTION_GAP:g} N; here corners with less also "
-        f"hunt, {reach}."
-    ]
-
-
 BINDING_SHARE = 0.95
 """Fraction of a requirement's bound from which the requirement is called binding."""
 
@@ -157,7 +108,7 @@ def leaves_step(design: Design) -> DesignStep:
     """Return the step that chooses the leaf springs, with reasons."""
     sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
     figures = ("design_front", "design_modes")
-    return DesignStep(f"Leaf springs: {words.leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
+    return DesignStep(f"Leaf springs: {words.leaves(design)}", sentences, _numbers(design), figures)
 
 
 def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
@@ -182,33 +133,13 @@ def _keys(requirement: Requirement, text: Callable[[RelaxableKey], str]) -> str:
     return ", ".join(map(text, requirement.keys))
 
 
-def _sizes(design: Design) -> tuple[tuple[str, str], ...]:
-    """Return the dimensions of the leaf springs by name."""
-    geometry = design.fitted.choice.geometry
-    return (
-        ("Leaves", f"{geometry.sheet.leaves:g} of {geometry.sheet.material}"),
-        (
-            "Length, width, thickness",
-            f"{size(geometry.length)}, {size(geometry.width)}, {size(geometry.sheet.thickness)} mm",
-        ),
-        ("Spacing", f"{size(geometry.spacing)} mm"),
-    )
-
-
 def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
-    """Return stiffness, frequency, stress and margins of the leaf springs by name."""
-    choice, beams = design.fitted.choice, design.fitted.choice.beams
+    """Return load, support stiffness and shortening of the leaf springs by name."""
+    beams = design.fitted.choice.beams
+    support = f"{newtons_per(beams.support_x[-1], 'µm')}, {newtons_per(beams.support_y[-1], 'µm')}"
     return (
-        ("Drive stiffness, by beams", newtons_per(beams.drive[0], "mm")),
-        ("First interfering frequency, by beams", hertz(choice.frequency)),
-        ("Stress at the clamps at full stroke", megapascals(beams.clamp_stress)),
-        ("Margin to yield, to fatigue", f"{plain_factor(beams.yield_margin)} times, {_factor(beams.fatigue_margin)}"),
-        ("Buckling load", trimmed(beams.buckling, "N")),
         ("Load along the leaves, weight included", f"{design.fitted.task.load:.3g} N"),
-        (
-            "Support stiffness at full stroke, x and y",
-            f"{newtons_per(beams.support_x[-1], 'µm')}, {newtons_per(beams.support_y[-1], 'µm')}",
-        ),
+        ("Support stiffness at full stroke, x and y", support),
         ("Shortening at full stroke", trimmed(beams.shortening, "m")),
     )
 
@@ -228,17 +159,33 @@ def _interfering(design: Design) -> str:
 def _strength(design: Design) -> str:
     """Write stress, strength margins and buckling load, with what is required."""
     beams, load, safety = design.fitted.choice.beams, design.fitted.task.load, design.spec.safety
-    fatigue = "" if math.isnan(beams.fatigue_margin) else f" and {_factor(beams.fatigue_margin)} below fatigue"
-    required = "" if math.isnan(beams.fatigue_margin) else f" and {safety.fatigue:g}"
     margin = beams.buckling / load
-    forms = ", met by the closed forms" if margin < safety.buckling else ""
-    return (
-        f"With the stroke alone, the stress at the clamps is {megapascals(beams.clamp_stress)}, "
-        f"{beams.yield_margin:.3g} "
-        f"times below yield{fatigue} ({safety.strength:g}{required} required). The leaves buckle at "
-        f"{trimmed(beams.buckling, 'N')}, {plain_factor(margin)} times the {load:.3g} N that they carry "
-        f"({safety.buckling:g} required{forms})."
-    )
+    numbers = {
+        "stress": megapascals(beams.clamp_stress),
+        "yield": f"{beams.yield_margin:.3g}",
+        "strength": f"{safety.strength:g}",
+        "fatigue": _factor(beams.fatigue_margin),
+        "endurance": f"{safety.fatigue:g}",
+        "load": trimmed(beams.buckling, "N"),
+        "margin": plain_factor(margin),
+        "carried": f"{load:.3g}",
+        "buckling": f"{safety.buckling:g}{', met by the closed forms' if margin < safety.buckling else ''}",
+    }
+    return _STRENGTH[math.isnan(beams.fatigue_margin)].format_map(numbers)
+
+
+_BUCKLE = " The leaves buckle at {load}, {margin} times the {carried} N that they carry ({buckling} required)."
+_STRENGTH = {
+    True: (
+        "With the stroke alone, the stress at the clamps is {stress}, {yield} times below yield ({strength} required)."
+        f"{_BUCKLE}"
+    ),
+    False: (
+        "With the stroke alone, the stress at the clamps is {stress}, {yield} times below yield and {fatigue} below "
+        f"fatigue ({{strength}} and {{endurance}} required).{_BUCKLE}"
+    ),
+}
+"""Sentences on the strength of the leaves: is their fatigue unknown?"""
 
 
 def _why(design: Design) -> str:
@@ -256,25 +203,11 @@ def _why(design: Design) -> str:
 
 
 def _confirmed(design: Design) -> str:
-    """Say how many leaf springs the beam model confirms, and how close the closed forms are."""
-    tried = design.confirmed
-    failed = sum(bool(confirmation.failure) for confirmation in tried)
-    confirmed = [confirmation for confirmation in tried if not confirmation.failure]
-    off = [abs(confirmation.stiffness / confirmation.candidate.stiffness - 1) for confirmation in confirmed]
-    off += [
-        abs(confirmation.frequency / confirmation.candidate.frequency - 1)
-        for confirmation in confirmed
-        if math.isfinite(confirmation.frequency)
-    ]
-    apart = f", within {percent(max(off))} of the closed forms" if off else ""
-    broken = f"; {failed} could not be computed" if failed else ""
+    """Say how many leaf springs the beam model confirms, and how many softer ones it rules out."""
+    confirmed = sum(not confirmation.failure for confirmation in design.confirmed)
     passed = len(design.fitted.choice.passed_over)
-    over = f" {passed} softer ones failed in the beam model and were skipped." if passed else ""
-    return (
-        f"Of the {len(design.candidates)} geometries on the front the beam model confirms {len(confirmed)} of "
-        f"{len(tried)} "
-        f"tried{apart}{broken}.{over}"
-    )
+    text = f"The beam model confirms {confirmed} of {len(design.confirmed)} geometries tried on the front"
+    return f"{text}; {passed} softer ones failed in it and were skipped." if passed else f"{text}."
 
 
 def _factor(value: float) -> str:
@@ -294,7 +227,7 @@ def controller_step(design: Design) -> DesignStep:
     controller = design.controller
     gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)}."
     faster = [_faster(design)] if design.damped else []
-    sentences = (_not_higher(design), *faster, _not_lower(design), gains, _margin(design), _damping(design))
+    sentences = (_not_higher(design), *faster, _not_lower(design), gains, _damping(design))
     figures = ("design_window", "design_damping")
     return DesignStep(f"Controller: crossover {hertz(controller.crossover)}", sentences, _gains(design), figures)
 
@@ -304,11 +237,9 @@ def _gains(design: Design) -> tuple[tuple[str, str], ...]:
     controller, gains, flat = design.controller, design.controller.gains, design.stage.flat()
     window = " to ".join(map(hertz, comfortable(design)))
     return (
-        ("Crossover", hertz(controller.crossover)),
         ("Tuned for", f"{trimmed(flat[TUNED_MASS], 'kg')}, α = {flat[ALPHA]:g}, β = {flat[BETA]:g}"),
         ("k_p", trimmed(gains.k_p, "N/m")),
         ("τ_z, τ_i, τ_p", ", ".join(trimmed(time, "s") for time in (gains.tau_z, gains.tau_i, gains.tau_p))),
-        ("As gains of a PID: kp, ki, kd", _parallel(design)),
         ("Least modulus margin, as designed", f"{controller.margin:.3g}"),
         ("The same over the corners", f"{controller.corners.min():.3g}"),
         (f"Modulus margin above {COMFORTABLE_MARGIN:g}", window),
@@ -357,15 +288,6 @@ def _bounds(bounds: list[CrossoverBound]) -> str:
     return listed([f"{hertz(bound.value)} ({bound.reason})" for bound in bounds], "and")
 
 
-def _margin(design: Design) -> str:
-    """Write the least modulus margin, as designed and at the extremes of friction and masses."""
-    controller = design.controller
-    return (
-        f"The smallest modulus margin of the settled states is {controller.margin:.3g} as designed and "
-        f"{controller.corners.min():.3g} over the corners ({COMFORTABLE_MARGIN:g} is required)."
-    )
-
-
 def _damping(design: Design) -> str:
     """Say whether damping is worth adding in the joint, to raise the least modulus margin."""
     damping = design.controller.damping
@@ -388,8 +310,7 @@ def moves_step(design: Design) -> DesignStep:
     sentences = [
         f"Of {free.tried} moves over all ranges and tolerances {words.restless(free)}: {words.probability(free)}."
     ]
-    other = words.settling(locked)
-    held = f"{other[0].lower()}{other[1:]}, and {words.restless(locked)}"
+    held = f"{words.lower_first(words.settling(locked))}, and {words.restless(locked)}"
     sentences.append(f"{words.settling(free)}. Of {locked.tried} with the joint locked: {held}.")
     broken = len(free.completed) - free.tried
     if broken:

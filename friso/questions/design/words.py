@@ -148,20 +148,36 @@ def leaf_words(geometry: Geometry) -> str:
 
 
 def _verified(design: Design) -> tuple[str, str]:
-    """Say how many simulated moves come to rest; return the text and the colour of the verdict."""
+    """Say how many simulated moves come to rest, and how fast; return the text and the colour of the verdict."""
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
-    held = f" With the joint locked, {restless(locked, among=True)}." if locked.missed else ""
-    if design.needed and not locked.missed:
-        held = (
-            f" With the joint locked, all {locked.tried} tried do as well: it does not hunt in this sample, but lies "
-            f"closer to the edge of hunting than the safety factor of {design.spec.safety.hunting:g} allows."
+    met = limit is None or free.slower_than(0.05) <= limit
+    says = _says_of_moves(design).format_map(
+        {
+            "tried": str(free.tried),
+            "rest": restless(free),
+            "settling": lower_first(settling(free)),
+            "met": "" if limit is None else f" ({'as' if met else 'not as'} specified: {seconds(float(limit))})",
+            "locked": restless(locked, among=True),
+        }
+    )
+    return (VERMILLION if free.missed or not met else GREEN), says
+
+
+def _says_of_moves(design: Design) -> str:
+    """Return the template on simulated moves, which names the locked joint where it makes a difference."""
+    if design.verification.locked.missed:
+        return "Of {tried} simulated moves {rest}; {settling}{met}; with the joint locked, {locked}."
+    if design.needed:
+        return (
+            "Of {tried} simulated moves {rest}; {settling}{met}; so they do with the joint locked, but closer to the "
+            "edge of hunting than the safety factor allows."
         )
-    text = f"Of {free.tried} simulated moves {restless(free)}: {probability(free)}. {settling(free)}"
-    if limit is None:
-        return (VERMILLION if free.missed else GREEN), f"{text}.{held}"
-    met = free.slower_than(0.05) <= limit
-    colour = VERMILLION if free.missed or not met else GREEN
-    return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))}).{held}"
+    return "Of {tried} simulated moves {rest}; {settling}{met}."
+
+
+def lower_first(text: str) -> str:
+    """Return a text with a small first letter."""
+    return f"{text[:1].lower()}{text[1:]}"
 
 
 def restless(outcome: MachineOutcomes, among: bool = False) -> str:

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.axis import axis_shown, unit_shown
+from friso.identification.estimate_documents import key_document
 from friso.identification.kind import Source
+from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import Experiment, Identification, Prediction
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import with_origins
 from friso.questions.identify import words
-from friso.questions.identify.estimates import key_document
 from friso.questions.identify.figures import identify_figures
-from friso.questions.identify.kind_view import view_of
-from friso.questions.identify.words import headline, prediction_view
+from friso.questions.identify.words import headline
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
 from friso.shown.files import Content
@@ -61,7 +61,7 @@ def page_values(answer: IdentifyAnswer) -> dict[str, Any]:
         "parts": words.summaries(identification),
         "predicted": [words.prediction_line(prediction) for prediction in answer.predictions],
         "warnings": [axis_shown().text(warning) for warning in identification.warnings],
-        "opening": [f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several],
+        "opening": [f"identify_{label}_{KINDS[experiment.kind].opening}" for experiment, label in several],
     }
 
 
@@ -93,7 +93,7 @@ def identify_document(
         "estimates": [key_document(estimate) for estimate in identification.estimates],
         "experiments": [_experiment(experiment) for experiment in identification.experiments],
         "predictions": [
-            {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}
+            {"log": prediction.log.name, **KINDS[prediction.kind].prediction_numbers(prediction.result)}
             for prediction in predictions
         ],
         "failed": identification.failed,
@@ -131,6 +131,6 @@ def _experiment(experiment: Experiment) -> dict[str, Any]:
     return {
         "kind": experiment.kind,
         "logs": [log.name for log in experiment.logs],
-        **view_of(experiment.kind).numbers(experiment.result),
+        **KINDS[experiment.kind].numbers(experiment.result),
         "estimates": [key_document(estimate) for estimate in experiment.estimates],
     }

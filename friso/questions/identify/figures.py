@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from friso.identification.kinds import KINDS
 from friso.identification.method import Identification, Prediction
-from friso.questions.identify.kind_view import view_of
-from friso.questions.identify.words import labels, ordered, prediction_view
+from friso.questions.identify.words import labels, ordered
 from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series, Symbol
 from friso.shown.drawing.palette import BLUE, ORANGE
 
@@ -34,9 +34,9 @@ def identify_figures(identification: Identification, predictions: Sequence[Predi
     """Return all figures, in the order in which they are read."""
     figures, subject = _intervals(identification), identification.stage.name if identification.stage else ""
     for experiment, label in zip(identification.experiments, labels(identification), strict=True):
-        figures += view_of(experiment.kind).figures(experiment.result, experiment.logs, f"identify_{label}")
+        figures += KINDS[experiment.kind].figures(experiment.result, experiment.logs, f"identify_{label}")
     for number, prediction in enumerate(predictions, 1):
-        figures += prediction_view(prediction).figures(prediction.log, prediction.result, number)
+        figures += KINDS[prediction.kind].prediction_figures(prediction.log, prediction.result, number)
     return [replace(figure, subject=subject) for figure in figures]
 
 

@@ -271,7 +271,7 @@ def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:
 
     The message goes to the logger "friso", at the level INFO. Nothing is logged if no estimate has a value.
     """
-    from friso.questions.identify.numbers import with_interval
+    from friso.identification.estimate_words import with_interval
 
     shown = [f"{one.name} {with_interval(one)}" for one in estimates if one.determined and one.name != "offset"]
     if shown:

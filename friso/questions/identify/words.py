@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.axis import KINDS as AXES
 from friso.axis import axis_shown, unit_shown
+from friso.identification.estimate_words import interval_text, name_of, value_text, with_interval, within
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import nothing_learnt
 from friso.identification.ways import ways_to_show
-from friso.questions.identify.kind_view import Facts, PredictionView, view_of
-from friso.questions.identify.numbers import interval_text, name_of, value_text, with_interval, within
 from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
 
 if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
-    from friso.identification.kind import Source
+    from friso.identification.kind import Facts, Source
     from friso.identification.method import Experiment, Identification, Prediction
     from friso.identification.sources import LogFile
 
@@ -80,7 +79,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
     effects = [estimate for estimate in visible if not estimate.low <= 0 <= estimate.high]
-    headlines = [view_of(experiment.kind).headline(experiment.result) for experiment in identification.experiments]
+    headlines = [KINDS[experiment.kind].headline(experiment.result) for experiment in identification.experiments]
     headlines = [sentence for sentence in headlines if sentence]
     bounded = [one for one in estimates if not one.determined and 0 < one.low < one.high < np.inf]
     doubts = [(VERMILLION if identification.failed else ORANGE, f"{doubt}.") for doubt in identification.doubts]
@@ -118,7 +117,7 @@ def _why_no_stage(identification: Identification) -> str:
         newtons = AXES[shown.name].force
         return f'{NO_NEWTONS.format(newtons)} --scale force="NUMBER {newtons}/{shown.force}" tells it.'
     logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
-    around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
+    around = any(KINDS[experiment.kind].makes_stage for experiment in identification.experiments)
     if around and any("force" in log.units for log in logs):
         return NO_NEWTONS.format(unit_shown("N"))
     speeds = {experiment.kind for experiment in identification.experiments} == {"constant-speed"}
@@ -151,18 +150,11 @@ def missing(estimates: Sequence[Estimate]) -> str:
     return "; ".join(f"{', '.join(group)} ({reason})" for reason, group in names.items())
 
 
-def prediction_view(prediction: Prediction) -> PredictionView[Any]:
-    """Return how to show a prediction, as its kind of experiment declares."""
-    view = view_of(prediction.kind).prediction
-    assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
-    return view
-
-
 def prediction_line(prediction: Prediction) -> tuple[str, str]:
     """Say how well another log is predicted, with the colour of the sentence."""
-    view = prediction_view(prediction)
-    colour = GREEN if view.worst(prediction.result) < POOR_PREDICTION else VERMILLION
-    return colour, f"Prediction of {prediction.log.name}: {view.sentence(prediction.result)}"
+    kind, result = KINDS[prediction.kind], prediction.result
+    colour = GREEN if kind.prediction_error(result) < POOR_PREDICTION else VERMILLION
+    return colour, f"Prediction of {prediction.log.name}: {kind.prediction_sentence(result)}"
 
 
 def estimate_rows(identification: Identification) -> list[EstimateRow]:
@@ -192,14 +184,14 @@ def summaries(identification: Identification) -> list[ExperimentSummary]:
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
     """Write an experiment in words, with the `label` from which its figures are named."""
-    view, result, axis = view_of(experiment.kind), experiment.result, axis_shown()
-    facts = tuple((name, axis.text(fact)) for name, fact in view.facts(result))
+    kind, result, axis = KINDS[experiment.kind], experiment.result, axis_shown()
+    facts = tuple((name, axis.text(fact)) for name, fact in kind.facts(result))
     return ExperimentSummary(
         label,
-        f"{view.title}: {', '.join(log.name for log in experiment.logs)}",
-        tuple(map(axis.text, view.sentences(result))),
-        (*facts, *(_used(experiment.logs) if view.longest else ())),
-        tuple(map(axis.text, view.warnings(result))),
+        f"{kind.title}: {', '.join(log.name for log in experiment.logs)}",
+        tuple(map(axis.text, kind.sentences(result))),
+        (*facts, *(_used(experiment.logs) if kind.longest else ())),
+        tuple(map(axis.text, kind.warnings(result))),
     )
 
 

@@ -9,6 +9,7 @@ QUESTION = Question(
     'map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"\n'
     "To resume an interrupted study: friso map thesis_rig_map.zarr",
     function_name="sweep",
+    details=True,
     metavars={"stage": "STAGE.toml|STORE", "out": "STORE"},
     choices=Choices.of_registry("Metrics (--metric)", "friso.studies.metric:METRICS"),
     runner="friso.cli.runs.map",

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
 from friso.axis import axis_shown
+from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria import ATTRACTED, CREEPS, RESTS, SWINGS
 from friso.questions.map import words as map_words
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.questions.map.places import machine_of
 from friso.questions.map.words import failures, grouped
-from friso.shown.drawing.prefixes import listed
+from friso.shown.drawing.prefixes import listed, range_with_unit
 from friso.shown.loop_words import unstable_loop
 from friso.stage import Stage
 from friso.studies.axes import SCALINGS
@@ -22,26 +26,33 @@ _NO_RESULT = {"failed": "the run was not completed", "invalid": "these values ar
 
 _QUIET = ("transient", "settles")
 
+MOST_SENTENCES = 3
+"""Number of sentences above the files of a map."""
+
 
 def headline(runs: xr.Dataset, name: str) -> str:
-    """Return the first statement on a map, such as in which fraction of it stages hunt.
+    """Return all statements on a map as one text, such as in which fraction of it stages hunt."""
+    return " ".join(statements(runs, name))
 
-    The metric declares what is stated (`Metric.findings`). Doubts follow. The result is empty if the runs have no
-    outcome.
+
+def statements(runs: xr.Dataset, name: str) -> list[str]:
+    """Return what is stated on a map, such as in which fraction of it stages hunt, and doubts.
+
+    The metric declares what is stated (`Metric.findings`). The result is empty if the runs have no outcome.
     """
     every = metrics()
     asked = name if name in runs and name in every and every[name].findings else ""
     asked = asked or (every[name].answered_by if name in every else "outcome")
     asked = asked if asked in runs else "outcome"
     if asked not in runs:
-        return ""
+        return []
     counts = {} if every[asked].counts else map_words.text_counts(runs, asked)
     findings = [one for one in every[asked].findings if not one.if_any or any(map(counts.get, one.words))]
     word, sentence = every[asked].doubt or ("", "")
     doubts = []
     if word and (cells := counts.get(word, 0)):
         doubts = [sentence.format(count=grouped(cells), share=_percent(cells, runs[asked].size))]
-    return " ".join([*(_answer(runs, asked, finding) for finding in findings), *doubts])
+    return [*(_answer(runs, asked, finding) for finding in findings), *doubts]
 
 
 def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
@@ -61,7 +72,7 @@ def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
         dim = dims_of(runs).index(SAMPLE) if SAMPLE in runs.dims else k
         line = np.asarray(holds.any(axis=tuple(other for other in range(holds.ndim) if other != dim)))
         box = _box(axis, line[axis.places])
-        where += [_range(axis, box)] if not box.all() else []
+        where += [_range(in_its_unit(axis, runs), box)] if not box.all() else []
         along = np.zeros(len(line), bool)
         along[axis.places] = box
         inside &= along.reshape([-1 if other == dim else 1 for other in range(holds.ndim)])
@@ -110,7 +121,7 @@ def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
 
 def _range(axis: CellAxis, box: np.ndarray) -> str:
     """Write in words the range of an axis that is marked in `box`."""
-    name, inside = map_words.in_sentence(axis.key), axis.positions[box]
+    name, inside = axis.quantity, axis.positions[box]
     if axis.words:
         return f"{name} {listed([axis.words[int(k)] for k in np.unique(inside)], 'or')}"
     low, high = (axis.value(int(np.flatnonzero(axis.positions == end)[0])) for end in (inside.min(), inside.max()))
@@ -178,16 +189,23 @@ def _extent(runs: xr.Dataset) -> str:
 
 
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
-    """Return all sentences for the terminal.
+    """Say in at most three sentences where on a map stages swing or hunt, and where your own stage is."""
+    return _all_sentences(runs, study, metric)[:MOST_SENTENCES]
 
-    An unstable loop comes first, then the fraction of the map that swings or hunts.
-    """
+
+def details(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+    """Return further statements on a map, the number of cells with every word, and why cells have no result."""
     words = "; ".join(filter(None, (map_words.tally(runs, name) for name in map_words.tallied())))
     size = " x ".join(map(str, study.shape))
-    reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
-    extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
-    answer = [*loop_first(study.stage), headline(runs, metric)]
-    return [*answer, *own_place(runs, metric), extent, *caveats(runs, metric), *reasons]
+    extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}."
+    further = _all_sentences(runs, study, metric)[MOST_SENTENCES:]
+    return [*statements(runs, metric)[1:], *further, extent, *caveats(runs, metric)]
+
+
+def _all_sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+    """Return the sentences on a map, the most important first."""
+    reasons = [f"{count} cells have no result: {reason}." for reason, count in failures(runs).items()]
+    return [*loop_first(study.stage), *statements(runs, metric)[:1], *own_place(runs, metric), *reasons]
 
 
 def own_place(runs: xr.Dataset, metric: str) -> list[str]:
@@ -214,7 +232,10 @@ def own_place(runs: xr.Dataset, metric: str) -> list[str]:
     if words[at] not in (*ATTRACTED, *_QUIET):
         return []
     lines = [words[(*at[:k], slice(None), *at[k + 1 :])] for k in range(len(axes))]
-    ways = [way for axis, line, own_cell in zip(axes, lines, at, strict=True) for way in _changes(axis, line, own_cell)]
+    shown = [in_its_unit(axis, runs) for axis in axes]
+    ways = [
+        way for axis, line, own_cell in zip(shown, lines, at, strict=True) for way in _changes(axis, line, own_cell)
+    ]
     exact = all(np.isclose(axis.positions[k], value, rtol=1e-3) for axis, value, k in zip(axes, own, at, strict=True))
     subject = "Your stage" if exact else "The cell nearest to your stage"
     verb = words[at] if words[at] in ("hunts", "settles") else f"is {words[at]}"
@@ -231,7 +252,7 @@ def _spans(axis: CellAxis, value: float) -> bool:
 
 
 def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
-    """Return between which cells along an axis hunting begins or ends, next to the cell `at`.
+    """Say between which cells along an axis hunting begins or ends, next to the cell `at`.
 
     `words` are the verdicts of the cells, shape (n,). A side gives no text if a cell without a verdict comes first
     there.
@@ -240,8 +261,25 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))
     ends = [(k, k + 1) for k in differ[differ < at][-1:] if words[k] in (*ATTRACTED, *_QUIET)]
     ends += [(k - 1, k) for k in differ[differ > at][:1] if words[k] in (*ATTRACTED, *_QUIET)]
-    name, sides = map_words.in_sentence(axis.key), ("above", "below")
-    return [f"{name} {axis.value(low)} to {axis.value(high)} ({sides[int(low < at)]} yours)" for low, high in ends]
+    values = axis.positions.tolist()
+    return [f"{axis.quantity} {range_with_unit(values[low], values[high], axis.unit, 4)}" for low, high in ends]
+
+
+def in_its_unit(axis: CellAxis, runs: xr.Dataset) -> CellAxis:
+    """Return an axis as sentences name it: factors as values in Hz and N, and which friction an axis of friction is."""
+    machine, links = machine_of(runs), json.loads(runs.attrs.get("links", "{}"))
+    held = map_words.friction_held(axis.key, {*map(str, runs.coords), *links})
+    if machine is None or axis.key not in SCALINGS:
+        return replace(axis, quantity=f"{map_words.in_sentence(axis.key)}{held}")
+    flat, name = machine.flat(), machine.controller.bandwidth_name
+    fields = {
+        "speed": ("controller speed", name, bandwidth(flat), "Hz"),
+        "friction": ("all friction", "static friction (all friction scaled)", flat.get(map_words.STATIC), "N"),
+    }
+    factor, value, own, unit = fields[axis.key]
+    if own is None:
+        return replace(axis, quantity=factor, unit="times yours")
+    return replace(axis, quantity=value, unit=unit, positions=own * axis.positions)
 
 
 def loop_first(stage: Stage) -> list[str]:

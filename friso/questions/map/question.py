@@ -96,7 +96,7 @@ class SweepAnswer(Answer):
         """Return which share of the map swings or hunts, and where; with the map, unless it has too many cells."""
         from friso.questions.map.document import map_document
         from friso.questions.map.figures import map_figure
-        from friso.questions.map.findings import sentences
+        from friso.questions.map.findings import details, sentences
         from friso.shown.blocks import AnswerBlock
 
         def draw() -> list[Figure]:
@@ -106,7 +106,8 @@ class SweepAnswer(Answer):
 
         says = [*sentences(self.result, self.study, self.metric), *([f"store: {self.store}"] if self.store else [])]
         numbers = partial(map_document, self.result, self.study, self.store, self.metric)
-        return [AnswerBlock(sentences=says, draw=draw, numbers=numbers)]
+        more = partial(details, self.result, self.study, self.metric)
+        return [AnswerBlock(sentences=says, long_details=more, draw=draw, numbers=numbers)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that runs the cell with the largest swing at its end.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterable
+from collections.abc import Collection, Hashable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,8 +11,7 @@ import numpy as np
 from friso.axis import axis_shown
 from friso.shown.drawing.figure import Category
 from friso.shown.drawing.palette import GREY, INK, MAUVE, ORANGE, PINK, VERMILLION
-from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
-from friso.stage.tables import friction_laws
+from friso.shown.key_words import key_in_words
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import metrics, worded
 
@@ -22,14 +21,6 @@ if TYPE_CHECKING:
 AT_ONCE = 1_000_000
 """Number of texts counted in one batch."""
 
-_QUANTITIES = {
-    FORCE_LIMIT: "Force limit",
-    "joint.limiter_damping": "Limiter damping",
-    "joint.limiter_stiffness": "Limiter stiffness",
-    "joint.locked": "Joint",
-    "masses.cart": "Cart mass",
-    "masses.stage": "Stage mass",
-}
 QUIET = "#d3e6f3"  # colour of rest: a pale blue, far from the colours of swings and from white and grey
 INVALID = Category("invalid", "#b4b4b4")
 FAILED = Category("failed", INK)
@@ -41,17 +32,19 @@ PALETTE = {"vermillion": VERMILLION, "orange": ORANGE, "pink": PINK, "mauve": MA
 
 
 def quantity(key: Hashable) -> str:
-    """Return a key in words: "joint.stroke" is "Joint stroke"; a free name stays as it is."""
+    """Return a key or a scaling in words: "joint.stroke" is "Joint stroke"; a free name stays as it is."""
     name = str(key)
-    of_laws = {f"friction.{key}": word for law in friction_laws().values() for key, word in law.words.items()}
-    scalings = {name: scaling.words for name, scaling in SCALINGS.items()}
-    quantities = _QUANTITIES | of_laws | CONTROLLERS.words | scalings
-    if name in quantities:
-        return quantities[name]
-    for table in (f"{CONTROLLER}.", "friction.", "motion."):
-        name = name.removeprefix(table)
-    words = name.replace("_", " ").replace(".", " ")
-    return words[:1].upper() + words[1:]
+    return SCALINGS[name].words if name in SCALINGS else key_in_words(name)
+
+
+STATIC, COULOMB = "friction.static", "friction.coulomb"
+
+
+def friction_held(key: str, varied: Collection[Hashable]) -> str:
+    """Say in brackets which friction stays as it is when one key of friction varies; empty for other keys."""
+    held = {STATIC: (COULOMB, "Coulomb"), COULOMB: (STATIC, "static")}
+    other, name = held.get(key, ("", ""))
+    return f" ({name} friction {'varies, too' if other in varied else 'held'})" if other else ""
 
 
 def in_sentence(key: Hashable) -> str:

@@ -41,8 +41,8 @@ def blocks(outcome: Outcome) -> list[AnswerBlock]:
 
 def basis(outcome: Outcome) -> str:
     """Say on what the experiment ran, and how many logs it wrote."""
-    logs = f"{len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}"
-    return f" on a drive as built, seed {outcome.seed}; {logs}"
+    counted = "1 log" if len(outcome.logs) == 1 else f"{len(outcome.logs)} logs"
+    return f" on a drive as built, seed {outcome.seed}; {counted}"
 
 
 def further_files(outcome: Outcome) -> dict[str, Content]:

@@ -66,12 +66,12 @@ def rig(
     >>> import friso
     >>> friso.rig("stiffness", friso.example("thesis_drive"))  # doctest: +SKIP
     """
-    run = RIG_EXPERIMENTS[RIG_EXPERIMENTS.checked(experiment, "EXPERIMENT", "friso rig {} rig.toml")]
+    chosen_experiment = RIG_EXPERIMENTS[RIG_EXPERIMENTS.checked(experiment, "EXPERIMENT", "friso rig {} rig.toml")]
     chosen = inputs.stage_of(stage, set)
     speak_of(chosen.axis_kind)
     _announce(chosen)
     inputs.mention_unstable_loop(chosen)
-    return RigAnswer(run(chosen, seed, progress))
+    return RigAnswer(chosen_experiment.run(chosen, seed, progress))
 
 
 def _announce(stage: Stage) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from friso.questions.rig.outcome_view import view_of
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.figure import Figure
+from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.outcome import Outcome
 
 
@@ -15,7 +15,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
     Logs that stopped early are reported before.
     """
-    return [*_failures(outcome), *view_of(outcome.experiment).sentences(outcome)]
+    return [*_failures(outcome), *RIG_EXPERIMENTS[outcome.experiment].sentences(outcome)]
 
 
 def _failures(outcome: Outcome) -> list[str]:
@@ -40,11 +40,11 @@ def rig_document(outcome: Outcome) -> dict[str, Any]:
             "stage": outcome.stage.name,
             **entries(outcome, "experiment", "seed", "notes"),
             "logs": logs,
-            "results": view_of(outcome.experiment).numbers(outcome),
+            "results": RIG_EXPERIMENTS[outcome.experiment].numbers(outcome),
         }
     )
 
 
 def rig_figures(outcome: Outcome) -> list[Figure]:
     """Return the figures of an experiment, arranged as in the thesis."""
-    return view_of(outcome.experiment).figures(outcome)
+    return RIG_EXPERIMENTS[outcome.experiment].figures(outcome)

@@ -7,10 +7,21 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from friso.axis import axis_shown
 from friso.questions.tune.figures import tune_figures
 from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.sensitivity_words import sensitivity_sentences
-from friso.questions.tune.words import COLUMNS, answer, assumptions, changes, failing, rows, unsure_why, why_unmet
+from friso.questions.tune.words import (
+    COLUMNS,
+    answer,
+    assumptions,
+    changes,
+    explained,
+    failing,
+    rows,
+    unsure_why,
+    why_unmet,
+)
 from friso.remedies.method import Advice
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.shown.blocks import AnswerBlock
@@ -32,7 +43,7 @@ def basis(tuning: Advice) -> str:
 
 
 def blocks(tuning: Advice) -> list[AnswerBlock]:
-    """Return the blocks: what to change, what does not work, and everything behind that."""
+    """Return the blocks: what to change, what that brings, what does not work, and everything behind that."""
     behind = {
         "The numbers to type in, in the terms of drives (friso export gains)": gain_lines(tuning),
         "What matters for the edge of hunting": sensitivity_sentences(tuning),
@@ -42,12 +53,13 @@ def blocks(tuning: Advice) -> list[AnswerBlock]:
         AnswerBlock(
             title=tuning.stage.name,
             sentences=answer(tuning),
-            columns=COLUMNS,
+            columns=axis_shown().named(COLUMNS),
             rows=rows(tuning),
             draw=partial(tune_figures, tuning),
             numbers=partial(tune_document, tuning),
         ),
-        AnswerBlock(title="What does not work, and why", sentences=failing(tuning)),
+        AnswerBlock(title="What the changes bring and cost", details=explained(tuning)),
+        AnswerBlock(title="What does not work, and why", details=failing(tuning)),
         *(AnswerBlock(title=title, details=texts, behind=True) for title, texts in behind.items()),
     ]
 
@@ -88,7 +100,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
     return plain_json(
         {
             "conclusion": first,
-            "details": [*further, *failing(tuning)],
+            "details": [*further, *explained(tuning), *failing(tuning)],
             "stage": tuning.stage.name,
             **entries(tuning, "interrupted", "needed", "seed"),
             "least_change": tuning.least.remedy.name if tuning.least else None,
@@ -118,7 +130,7 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
         "keys_changed": tuning.size(outcome).keys,
         "factor": tuning.size(outcome).factor,
         "verdict": confirmation.verdict if confirmation else None,
-        "certain": bool(confirmation and confirmation.certain and not outcome.stage.unknown_keys),
+        "certain": bool(confirmation and confirmation.certain and not outcome.stage.assumed_keys),
         **_performance(outcome.measured, tuning),
     }
 

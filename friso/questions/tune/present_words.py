@@ -39,7 +39,7 @@ def as_it_is(tuning: Advice) -> str:
     """Say whether the stage as it is hunts, and on how many machines it misses which goal."""
     verdict, certain = tuning.case.verdict, tuning.case.judgement.hunting.certain
     if verdict in ("hunts", "bistable"):
-        own = f"a limit cycle{' after other moves than its own' * (verdict == 'bistable')}, and"
+        own = "a limit cycle, and" if verdict == "hunts" else "a limit cycle after other moves than its own, and"
     else:
         surely_none = certain and verdict != "failed" and "verdict" not in tuning.unmet
         own = f"{'no' if surely_none else 'perhaps a'} limit cycle, but"

@@ -6,23 +6,21 @@ The sentences say what to change, what the change brings and costs, and which re
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from friso.axis import axis_shown
 from friso.design_method.geometry import Geometry
-from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
-from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at
+from friso.frequency.crossover import loop_bandwidth
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
-from friso.remedies.catalogue import BANDWIDTH
-from friso.remedies.least import ChangeSize
 from friso.remedies.machines import Goal
 from friso.remedies.method import Advice
 from friso.remedies.search import TriedPoints
@@ -35,8 +33,9 @@ from friso.shown.drawing.prefixes import (
     share_with_interval,
     with_unit,
 )
-from friso.shown.loop_words import unstable_loop
+from friso.shown.loop_words import unstable_where
 from friso.shown.machine_words import spread_sentences
+from friso.shown.says import Alternatives, Words, always, say, say_all
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.tables import leading_friction
@@ -47,7 +46,7 @@ COLUMNS = (
     "For moves of",
     "95 % settle within",
     "Median",
-    "Largest force",
+    "Largest {effort}",
     "Modulus margin",
     "Stiffness under load",
 )
@@ -111,69 +110,141 @@ def number(value: float, unit: str) -> str:
 
 
 def answer(tuning: Advice) -> list[str]:
-    """Write the answer: the least change that works, its benefits and costs, and the next best."""
-    lines = [*unstable_loop(tuning.case.unstable), *_interrupted(tuning)]
-    if not tuning.needed:
-        return [
-            *lines,
-            f"The stage meets the goal as it is: {goal_words(tuning.goal)}. {_brings(tuning.present, tuning)}.",
-        ]
-    if not tuning.working:
-        return [*lines, *_nothing(tuning), as_it_is(tuning)]
-    least, *others = tuning.recommended
-    lines += _in_short(tuning)
-    so_far = " so far" if tuning.interrupted else ""
-    lines += _works(least, tuning, f"The least of the changes that work{_for_all(tuning)}{so_far}")
-    for other in others:
-        lines += _works(other, tuning, "What settles soonest" if other is tuning.fastest else "The next best")
-    goal = f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}"
-    return [*lines, as_it_is(tuning), goal, *unknown(tuning)]
+    """Say in at most three sentences what to change, what the change brings and costs, and what remains open."""
+    return say(tuning, _SAYS, _WORDS)[:3]
 
 
-def _in_short(tuning: Advice) -> Iterator[str]:
-    """Yield one line on the least change and the fastest remedy, with their settling times.
-
-    Nothing is yielded if both are the same remedy, or if one of them is missing or was not measured.
-    """
-    least, fastest = tuning.least, tuning.fastest
-    if least is None or fastest is None or least is fastest:
-        return
-    times = [slowest_time(outcome.measured, tuning.goal) for outcome in (least, fastest) if outcome.measured]
-    if len(times) == 2:
-        yield (
-            f"Least change{_for_all(tuning)}: {least.remedy.name}, in position after {times[0]}. "
-            f"Soonest: {fastest.remedy.name}, after {times[1]}."
-        )
+def explained(tuning: Advice) -> list[str]:
+    """Say in full what the recommended changes are, bring and cost, what the goal is, and what is not known."""
+    works = [text for outcome in tuning.recommended for text in _works(outcome, tuning, outcome.remedy.name)]
+    return [*works, *say_all(tuning, _EXPLAINED, _WORDS)]
 
 
-def _for_all(tuning: Advice) -> str:
-    """Write " for all moves" if that is true of the least change, but not of every remedy."""
+def _rest(tuning: Advice) -> str:
+    """Say what the remedies for large moves bring, and which remedies might work and why that is not sure."""
+    large = [text for outcome in tuning.for_large_moves for text in _works(outcome, tuning, outcome.remedy.name)]
+    return " ".join(
+        [*large, *(f"{outcome.remedy.name} might work, but {unsure_why(outcome)}." for outcome in _unsure(tuning))]
+    )
+
+
+def _unsure(tuning: Advice) -> list[RemedyOutcome]:
+    """Return the remedies with settings that are not sure to work."""
+    return [outcome for outcome in tuning.outcomes if outcome.certainty == "unsure" and outcome.stage is not None]
+
+
+def _some_moves_alone(tuning: Advice) -> bool:
+    """Tell whether the least change works for all moves, but not every remedy does."""
     least = tuning.least
-    every = least is not None and tuning.for_all_moves(least)
-    return " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))
+    return least is not None and tuning.for_all_moves(least) and not all(map(tuning.for_all_moves, tuning.working))
 
 
-def _of_the_drive(tuning: Advice) -> str:
-    """Say that timing in the table [drive] counts for the margin alone; empty without timing."""
-    has = {"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())}
-    return " The [drive] of the file counts for the margin alone, not for moves and hunting." if has else ""
+def _modes_unknown(tuning: Advice) -> bool:
+    """Tell whether neither the stage file nor the goal says what the modes of the machine allow."""
+    return tuning.stage.parasitic is None and not tuning.stage.flexure and tuning.goal.bandwidth_limit is None
 
 
-def unknown(tuning: Advice) -> list[str]:
-    """Say which limits of the machine are unknown, and what is assumed instead."""
-    stage, goal, flat = tuning.stage, tuning.goal, tuning.stage.flat()
-    lines = []
-    if stage.parasitic is None and not stage.flexure and goal.bandwidth_limit is None:
-        lines.append(
-            "Not known: modes of the machine. None is assumed; they make fast controllers unstable, so state "
-            '[parasitic], or the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz").'
-        )
-    if goal.force_limit is None and FORCE_LIMIT not in flat:
-        example = Quantity("N", positive, "200 N").on(stage.axis_kind).example
-        lines.append(
-            f'Not known: the force of the actuator. No limit is assumed; state one (--force-limit "{example}").'
-        )
-    return lines
+def _bandwidth_of(outcome: RemedyOutcome) -> str:
+    """Write the bandwidth of the loop with a remedy: where it last crosses 0 dB."""
+    own = loop_bandwidth(outcome.stage) if outcome.stage else math.inf
+    return f"{with_unit(own, 'Hz')}" if math.isfinite(own) else "that speed"
+
+
+def _drive_timed(tuning: Advice) -> bool:
+    """Tell whether the table [drive] of the file has a timing."""
+    return bool({"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())})
+
+
+def _first(tuning: Advice) -> RemedyOutcome:
+    """Return the remedy that the answer names: the least change, or the one that might work or works for some moves."""
+    return (*tuning.working[:1], *tuning.for_large_moves, *_unsure(tuning))[0]
+
+
+def _measured(tuning: Advice) -> Performance:
+    """Return the performance with the least change."""
+    assert tuning.least is not None
+    assert tuning.least.measured is not None
+    return tuning.least.measured
+
+
+_WORDS: Words[Advice] = {
+    "unstable": lambda of: unstable_where(of.case.unstable),
+    "changes": lambda of: listed(changes(of.stage, _stage_of(_first(of))), "and"),
+    "name": lambda of: _first(of).remedy.name,
+    "from": lambda of: length_from(_first(of)),
+    "why": lambda of: unsure_why(_first(of)),
+    "for_all": lambda of: " for all moves" if _some_moves_alone(of) else "",
+    "so_far": lambda of: " so far" if of.interrupted else "",
+    "goal": lambda of: goal_words(of.goal),
+    "brings": lambda of: _brings(of.present if not of.needed else _measured(of), of),
+    "settled": lambda of: _settled(_measured(of), of.goal),
+    "force": lambda of: _against(_measured(of).force(of.goal), of.present.force(of.goal), FORCE),
+    "margin": lambda of: f"{_measured(of).least_margin(of.goal):.2f}",
+    "fastest": lambda of: of.fastest.remedy.name if of.fastest else "",
+    "soonest": lambda of: _settled(of.fastest.measured, of.goal),  # type: ignore[union-attr]
+    "as_it_is": lambda of: as_it_is(of),
+    "bandwidth": lambda of: _bandwidth_of(_first(of)),
+    "limit": lambda of: Quantity("N", positive, "200 N").on(of.stage.axis_kind).example,
+    "rest": _rest,
+    "part": lambda of: "joint" if of.goal.controller else "controller",
+}
+
+_SAYS: Sequence[Alternatives[Advice]] = (
+    (
+        (lambda of: of.interrupted, "Interrupted: this is the best so far; other options were not tried."),
+        (lambda of: of.case.unstable, "The loop of the stage as its file gives it is {unstable}."),
+    ),
+    (
+        (lambda of: not of.needed, "The stage meets the goal as it is: {brings}."),
+        (lambda of: of.working, "Set {changes}: the least change that works{for_all}{so_far} ({name})."),
+        (
+            lambda of: of.for_large_moves,
+            "For moves of {from} and more alone: set {changes} ({name}); no change works for all moves.",
+        ),
+        (_unsure, "No change was found that surely works; {name} might ({changes}), but {why}."),
+        (always, "No change was found that surely meets the goal."),
+    ),
+    (
+        (lambda of: not of.needed, ""),
+        (lambda of: of.working, "Then {settled}, with {force} and a modulus margin of {margin}."),
+        (always, "{as_it_is}"),
+    ),
+    (
+        (lambda of: not of.needed or not of.working, ""),
+        (
+            lambda of: _modes_unknown(of) and not _first(of).remedy.buys_joint,
+            "No modes of the machine are in the file: first find out whether they allow {bandwidth} "
+            "(--bandwidth-limit).",
+        ),
+        (
+            lambda of: of.fastest is not of.least and of.fastest and of.fastest.measured,
+            "Soonest: with {fastest}, {soonest}.",
+        ),
+        (always, "{as_it_is}"),
+    ),
+)
+"""Sentences on what to change, what that brings and costs, and what remains open; the first three are said."""
+
+_EXPLAINED: Alternatives[Advice] = (
+    (lambda of: not of.working, "{rest}"),
+    (lambda of: of.needed, "{as_it_is}"),
+    (always, "The goal: {goal}."),
+    (_drive_timed, "The [drive] of the file counts for the margin alone, not for moves and hunting."),
+    (
+        _modes_unknown,
+        "Not known: modes of the machine. None is assumed; they make fast controllers unstable, so state [parasitic], "
+        'or the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz").',
+    ),
+    (
+        lambda of: of.goal.force_limit is None and FORCE_LIMIT not in of.stage.flat(),
+        'Not known: the force of the actuator. No limit is assumed; state one (--force-limit "{limit}").',
+    ),
+    (
+        lambda of: of.needed and not (of.working or (of.goal.controller and of.goal.joint)),
+        "Changes of the {part} were not tried, as told.",
+    ),
+)
+"""Details: other remedies, what the stage misses as it is, the goal, and what is not known of the machine."""
 
 
 def goal_words(goal: Goal) -> str:
@@ -190,41 +261,27 @@ def goal_words(goal: Goal) -> str:
     )
 
 
-def _interrupted(tuning: Advice) -> Iterator[str]:
-    """Yield that the search was interrupted and the answer is the best so far; or nothing."""
-    if tuning.interrupted:
-        yield (
-            "Interrupted: this is the best so far. Options that are not named were not tried, and one may be "
-            "unfinished."
-        )
-
-
 def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
-    """Say what to set for a remedy, and what that brings and costs.
-
-    `what` begins the first sentence, such as "The least change".
-    """
-    assert outcome.stage is not None
+    """Say what to set for a remedy, and what that brings and costs; `what` begins the first sentence."""
     assert outcome.measured is not None
     return [
-        f"{what}: set {listed(changes(tuning.stage, outcome.stage), 'and')} ({outcome.remedy.name}; "
-        f"{size_words(tuning.size(outcome))}).",
+        f"{what}: set {listed(changes(tuning.stage, _stage_of(outcome)), 'and')}.",
         f"{_brings(outcome.measured, tuning)}. {price(outcome.measured, tuning, outcome.remedy.buys_joint)}",
         *_made_of_leaves(outcome, tuning),
     ]
 
 
+def _stage_of(outcome: RemedyOutcome) -> Stage:
+    """Return the stage with the settings of a remedy that has some."""
+    assert outcome.stage is not None
+    return outcome.stage
+
+
 UNMADE = {
-    "rotary": "leaf springs of friso guide along a line, and this axis turns",
-    "mode": (
-        "the stage file states a parasitic mode of the machine, and a stage has no second one for the leaves; friso "
-        "design designs without it"
-    ),
+    "rotary": "leaf springs guide along a line, and this axis turns",
+    "mode": "the stage file states a parasitic mode, and a stage has no second one for the leaves (friso design)",
     "extra": f"that takes {install('design')}",
-    "none": (
-        "none of the sizes that friso init --spec begins with has this stiffness and bears this stroke; friso design "
-        "takes other sizes"
-    ),
+    "none": "no size of friso init --spec has this stiffness and bears this stroke (friso design takes others)",
 }
 """Why no leaf springs make the joint of a remedy."""
 
@@ -263,37 +320,31 @@ def _replaced(stage: Stage) -> str:
 
 def _verified(made: RemedyOutcome, tuning: Advice) -> str:
     """Say whether the stage still meets the goal with leaf springs and their parasitic mode."""
-    if made.certainty == "works":
-        assert made.measured is not None
+    if made.certainty == "works" and made.measured is not None:
         return f"With them, {share_with_interval(made.measured.share(tuning.goal))} of the machines meet the goal."
     if made.certainty == "unsure":
         return f"With them, it is not sure to work: {unsure_why(made)}."
-    result = "the search was given up" if made.certainty == "given up" else "it does not work"
-    return f"With them, {result}. {why_unmet(made, tuning)}"
-
-
-def size_words(size: ChangeSize) -> str:
-    """Write how large a change is: a joint, the number of keys changed, and their mean factor."""
-    keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
-    some = "" if size.scaled == size.keys else f"{'one' if size.scaled == 1 else size.scaled} of them "
-    average = f"{' each' * (not some)} on average" if size.scaled > 1 else ""
-    factor = f", {some}by a factor of {factor_text(size.mean)}{average}" if size.factor > 1 else ""
-    return f"{' and '.join([*(['a joint'] if size.bought else []), *keys])}{factor}"
+    return f"With them, it does not surely work. {why_unmet(made, tuning)}"
 
 
 def _brings(measured: Performance, tuning: Advice) -> str:
-    """Say how many machines meet the goal and how fast, compared with the stage as it is."""
-    before = slowest_time(tuning.present, tuning.goal)
-    as_is = "" if measured is tuning.present or before == ABSENT else f"; as it is: {before}"
-    meet = share_with_interval(measured.share(tuning.goal))
-    settled = slowest_time(measured, tuning.goal)
-    share = "fewer than 95 % are in position in time" if settled == ABSENT else f"95 % are in position within {settled}"
-    if not measured.slowest(tuning.goal):
-        share = "95 % are in position once the reference stands"
-    return (
-        f"Of {measured.count} fresh machines and moves, {meet} meet the goal, {_holds(measured, tuning.goal)}; "
-        f"{share}{as_is}"
-    )
+    """Say how many machines meet the goal, for which moves, and how fast."""
+    goal = tuning.goal
+    moves = held_range(measured, goal)
+    alone = "" if measured.holds_for_all_moves(goal) else " alone"
+    held = "for no range of moves" if moves == NOTHING else f"for moves of {moves}{alone}"
+    share = share_with_interval(measured.share(goal))
+    return f"Of {measured.count} fresh machines, {share} meet the goal, {held}; {_settled(measured, goal)}"
+
+
+def _settled(measured: Performance, goal: Goal) -> str:
+    """Say after which time 95 % of the machines are in position."""
+    if not measured.slowest(goal):
+        return "95 % of the machines are in position once the reference stands"
+    settled = slowest_time(measured, goal)
+    if settled == ABSENT:
+        return "fewer than 95 % of the machines are in position in time"
+    return f"95 % of the machines are in position within {settled}"
 
 
 def held_range(measured: Performance, goal: Goal) -> str:
@@ -302,12 +353,8 @@ def held_range(measured: Performance, goal: Goal) -> str:
     return NOTHING if held is None else range_with_unit(*held, "m")
 
 
-def _holds(measured: Performance, goal: Goal) -> str:
-    """Say for which moves the goal holds."""
-    moves = held_range(measured, goal)
-    if moves == NOTHING:
-        return "for no range of moves"
-    return f"which holds for moves of {moves}{'' if measured.holds_for_all_moves(goal) else ' alone'}"
+FORCE, LOAD = ("{effort}", "N"), ("stiffness against a load before the integral acts", "N/m")
+"""What a remedy changes beside the margin, and its unit."""
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
@@ -316,49 +363,33 @@ def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
     If it `buys_joint`, the text adds that standstill was not computed.
     """
     goal, before = tuning.goal, tuning.present
-    force = _against(measured.force(goal), before.force(goal), "force", "N")
-    resists = "stiffness against a load before the integral acts"
-    stiffness = _against(measured.stiffness, before.stiffness, resists, "N/m")
     margin, margin_before = (f"{performance.least_margin(goal):.2f}" for performance in (measured, before))
-    before_it = " as before" if margin == margin_before else f" instead of {margin_before}"
-    still = (
-        " Standstill was not computed: on a floor that shakes, a stage on a joint moves more (friso rig in-position)."
-        if buys_joint
-        else ""
+    says = (
+        f"Its price: {_against(measured.force(goal), before.force(goal), FORCE)}, a modulus margin of {margin} "
+        f"{'as before' if margin == margin_before else f'instead of {margin_before}'}, "
+        f"{_against(measured.stiffness, before.stiffness, LOAD)}."
     )
-    return f"Its price: {force}, a modulus margin of {margin}{before_it}, {stiffness}.{still}"
+    floor = (
+        "Standstill was not computed: on a floor that shakes, a stage on a joint moves more (friso rig in-position)."
+    )
+    return f"{says} {floor}" if buys_joint else says
 
 
-def _against(now: float, before: float, what: str, unit: str) -> str:
-    """Compare a quantity now with its value before, as a factor and with its unit."""
+def _against(now: float, before: float, quantity: tuple[str, str]) -> str:
+    """Compare a quantity, by its name and unit, now with its value before, as a factor and with its unit.
+
+    A rotary axis has a torque in place of a force.
+    """
+    name, unit = quantity[0].format(effort=axis_shown().effort), quantity[1]
     if not before > 0 or not math.isfinite(now / before):
-        return f"a {what} of {with_unit(now, unit)}"
+        return f"a {name} of {with_unit(now, unit)}"
     factor = factor_text(now / before)
-    return (
-        f"{'' if factor == '1' else f'{factor} times '}the {'same ' * (factor == '1')}{what} ({with_unit(now, unit)})"
-    )
+    return f"{'the same' if factor == '1' else f'{factor} times the'} {name} ({with_unit(now, unit)})"
 
 
 def factor_text(factor: float) -> str:
     """Write a factor to three digits, without an exponent."""
     return f"{float(f'{factor:.3g}'):.15g}"
-
-
-def _nothing(tuning: Advice) -> list[str]:
-    """Say that no remedy surely works, and which ones might."""
-    unsure = [outcome for outcome in tuning.outcomes if outcome.certainty == "unsure"]
-    lines = [f"No option was found that certainly meets the goal: {goal_words(tuning.goal)}."]
-    for outcome in tuning.for_large_moves:
-        lines += _works(outcome, tuning, f"For moves of {length_from(outcome)} and more alone")
-    lines += [
-        f"{outcome.remedy.name} might work ({listed(changes(tuning.stage, outcome.stage), 'and')}), but "
-        f"{unsure_why(outcome)}."
-        for outcome in unsure
-        if outcome.stage is not None
-    ]
-    if not (tuning.goal.controller and tuning.goal.joint):
-        lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
-    return lines
 
 
 def length_from(outcome: RemedyOutcome) -> str:
@@ -399,87 +430,56 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
     if outcome.points is None:
         return "Its motions take too much computing."
     points, goal = outcome.points, tuning.goal
-    sentence = next(_reasons(points, outcome, goal))
+    sentence = _reason(points, outcome, goal)
     largest = goal.moves.largest if goal.moves else np.inf
     for number in points.for_large_moves(goal, largest)[:1]:
         smallest = with_unit(float(points.moves_from[number]), "m")
         sentence += f" For moves of {smallest} and more alone, one does on the machines of the search."
-    edges = _edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ""
     cut = " The search was given up there, as it takes too much computing: others may work." if outcome.cut else ""
-    return f"{sentence}{edges}{cut}"
+    return f"{sentence}{cut}"
 
 
-def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
-    """Yield sentences on why no setting of a remedy meets the goal; only the first one counts.
+def _reason(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> str:
+    """Say why no setting of a remedy meets the goal, by the part of the goal at which no setting is left.
 
-    The parts of the goal are checked in order. The first sentence names the part at which no setting is left. If some
-    settings meet all parts, it says that none surely does on fresh machines, or that it is not known whether they hunt.
+    The parts are checked in order. If some settings meet all parts, the sentence says that none surely does on fresh
+    machines, or that it is not known whether they hunt.
     """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
-    margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
-    some = bool(broken["margin"].any())  # these settings lack the margin and are not mentioned
-    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} tried)"
-    brings, still_settles = f"{tried} brings", f"{tried} still settles"
-    if len(left) == 1:  # no setting is varied
-        brings, still_settles = "It does not bring", "It does not settle any more"
-    settle = f"All settings that {'keep the margin and ' * some}settle"
-    sentences = {
-        "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
-        f"{best:.{digits_that_differ((best, goal.margin))}g}.",
-        "settling": f"{brings} {percent(goal.share)} of the machines to rest in position in time.",
-        "distance": f"{still_settles} in time at {1 / goal.distance:.2f} of its bandwidth.",
-        "force": f"{settle} take more force than there is.",
-        "settle": f"{settle} do so too late.",
-        "bandwidth": f"Only settings above your bandwidth limit meet the rest of the goal{_lowest(points, goal)}.",
+    best = float(points.margin.max(initial=0.0))
+    numbers = {
+        "tried": str(len(left)),
+        "kept": f" with a modulus margin of {goal.margin:g}" if broken["margin"].any() else "",
+        "margin": f"{goal.margin:g}",
+        "best": f"{best:.{digits_that_differ((best, goal.margin))}g}",
+        "share": percent(goal.share),
+        "distance": f"{1 / goal.distance:.2f}",
+        "surveyed": str(outcome.attracted),
     }
-    for name, sentence in sentences.items():
+    for name, text in _UNMET.items():
         left = left & ~broken[name]
         if not left.any():
-            yield sentence
-    meet = f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal on the machines of the search"
-    if outcome.cut and not outcome.attracted:
-        yield f"{meet}; of none it is known whether something attracts these."
-    else:
-        yield (
-            f"{meet}; of those looked at further ({outcome.attracted} surveyed) none surely meets it on fresh machines"
-            f"{'' if outcome.cut else ', others may'}."
-        )
+            return text.format_map(numbers)
+    text = "Of {tried} settings tried {left} meet the rest of the goal on the machines of the search; "
+    surveyed = _SURVEYED[bool(outcome.attracted) or not outcome.cut]
+    return f"{text}{surveyed}".format_map(numbers | {"left": str(left.sum())})
 
 
-def _lowest(points: TriedPoints, goal: Goal) -> str:
-    """Write the lowest bandwidth of the settings that miss the goal by their bandwidth alone.
+_UNMET = {
+    "margin": "No setting keeps a modulus margin of {margin} on {share} of the machines: the best has {best}.",
+    "settling": "No setting{kept} (of {tried} tried) brings {share} of the machines to rest in position in time.",
+    "distance": "No setting{kept} (of {tried} tried) still settles in time at {distance} of its bandwidth.",
+    "force": "All settings{kept} that settle take more force than there is.",
+    "settle": "All settings{kept} that settle do so too late.",
+    "bandwidth": "Only settings above your bandwidth limit meet the rest of the goal.",
+}
+"""Sentence for each part of the goal, in the order in which they are checked, if no setting is left that meets it."""
 
-    The text is empty if there is no such setting.
-    """
-    others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
-    lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
-    return (
-        f", the slowest of which last crosses 0 dB at {with_unit(float(lowest), 'Hz')}" if np.isfinite(lowest) else ""
-    )
-
-
-def _edges(tuning: Advice) -> str:
-    """Say at which bandwidth hunting ends, and up to which bandwidth the margin is enough.
-
-    The user's limit of the bandwidth is added. What is not known is left out; if nothing is known, the text is empty.
-    """
-    edge, comfortable, stage = tuning.case.judgement.margin, tuning.limits.highest_comfortable, tuning.stage
-    parts = []
-    if edge is not None:
-        factors = (edge.quiet, tuning.goal.distance * edge.quiet)
-        ends, needed = (with_unit(float(hertz), "Hz") for hertz in bandwidths_at(stage, factors))
-        parts.append(f"hunting of the machine in the file ends at {ends} (it needs {needed}, others more)")
-    if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
-        again = [low for low, _ in tuning.limits.comfortable if low > comfortable][:1]
-        own = bandwidth(stage.flat()) or 1.0
-        hertz = [with_unit(float(at), "Hz") for at in bandwidths_at(stage, np.array([comfortable, *again]) / own)]
-        parts.append(
-            f"a modulus margin of {COMFORTABLE_MARGIN:g} is kept up to "
-            f"{' and again from '.join(hertz)}{' on' * len(again)}"
-        )
-    if tuning.goal.bandwidth_limit is not None:
-        parts.append(f"your limit is {with_unit(tuning.goal.bandwidth_limit, 'Hz')}")
-    return f" In bandwidth (where the loop last crosses 0 dB) {listed(parts, 'and')}." if parts else ""
+_SURVEYED = {
+    True: "{surveyed} of these were surveyed, and none surely meets it on fresh machines.",
+    False: "none of these was surveyed, so that they may still hunt.",
+}
+"""What is known of settings that meet every part of the goal on the machines of the search: was any surveyed?"""
 
 
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
@@ -523,48 +523,47 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
     ]
 
 
-def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
-    """Yield what was not tried because friction is too small; nothing without friction.
-
-    Settings against friction need a break-away force, and an isolator needs friction that holds the cart.
-    """
-    if leading_friction(flat)["friction.model"] == "none":
-        return
-    if breakaway(flat) <= 0:
-        yield "No settings against friction were tried: the friction law declares no break-away force to size them by."
-    if goal.joint and least_breakaway(flat) <= 0:
-        yield (
-            "No isolator was tried: the friction of the guide does not hold the cart against the force of a joint and "
-            "the bias force."
-        )
-
-
 def assumptions(tuning: Advice) -> list[str]:
     """Say what is assumed of the machine, and how the machines were drawn."""
-    lines, stage, machines = [], tuning.stage, tuning.machines
-    lines += _without_friction(stage.flat(), tuning.goal)
-    if any(outcome.remedy.of_setting for outcome in tuning.outcomes) and any(
-        not outcome.remedy.buys_joint for outcome in tuning.working
-    ):
-        lines.append(
-            "Settings against friction were not tried together with the bandwidth, nor those of more keys than what "
-            "works, as less works."
-        )
-    alone = {outcome.remedy.name for outcome in tuning.working}
-    if {"gains", "isolator"} <= alone:
-        lines.append("Gains and isolator were not tried together, as each works alone.")
-    if any(outcome.remedy.buys_joint and outcome not in tuning.recommended for outcome in tuning.working):
-        lines.append("Leaf springs were sized only for joints of what is told first; friso design sizes others.")
-    spread = ", spread evenly over the logarithm" * (machines.moves.smallest < machines.moves.largest)
-    lines.append(
+    machines = tuning.machines
+    return [*say_all(tuning, _ASSUMED, _ABOUT), *spread_sentences(machines.from_file, machines.spreads)]
+
+
+def _has_friction(tuning: Advice) -> bool:
+    """Tell whether a friction law acts on the stage."""
+    return leading_friction(tuning.stage.flat())["friction.model"] != "none"
+
+
+def _drive_keys(tuning: Advice) -> list[str]:
+    """List the uncertain keys of the drive, which all machines have in the middle of their range."""
+    return [key for key in tuning.complete(tuning.stage).uncertain() if key.startswith("drive.")]
+
+
+_ABOUT: Words[Advice] = {
+    "count": lambda of: str(of.machines.count),
+    "seed": lambda of: str(of.seed),
+    "moves": lambda of: moves_words(of.machines.moves),
+    "keys": lambda of: listed(_drive_keys(of), "and"),
+    "left_out": lambda of: str(of.machines.left_out),
+}
+
+_ASSUMED: Alternatives[Advice] = (
+    (
+        lambda of: _has_friction(of) and breakaway(of.stage.flat()) <= 0,
+        "No settings against friction were tried: the friction law declares no break-away force to size them by.",
+    ),
+    (
+        lambda of: _has_friction(of) and of.goal.joint and least_breakaway(of.stage.flat()) <= 0,
+        "No isolator was tried: the friction of the guide does not hold the cart against the force of a joint and the "
+        "bias force.",
+    ),
+    (
+        always,
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
-        f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
-        f"each with a move of its own: {moves_words(machines.moves)}{spread}."
-    )
-    lines += spread_sentences(machines.from_file, machines.spreads)
-    held = [key for key in tuning.complete(stage).uncertain() if key.startswith("drive.")]
-    if held:
-        lines.append(f"In the middle of its range on all machines: {listed(held, 'and')}.")
-    if machines.left_out:
-        lines.append(f"{machines.left_out} draws that no stage may have were replaced by others.")
-    return lines
+        "continuous time. {count} machines that the optimiser did not see were drawn (seed {seed}), each with a move "
+        "of its own, spread evenly over the logarithm: {moves}.",
+    ),
+    (_drive_keys, "In the middle of its range on all machines: {keys}."),
+    (lambda of: of.machines.left_out, "{left_out} draws that no stage may have were replaced by others."),
+)
+"""Sentences on what was not tried, what the model holds, and which machines were drawn."""

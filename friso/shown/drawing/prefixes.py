@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.axis import axis_shown, unit_shown
+from friso.axis import unit_shown
 from friso.quantities import NOTHING, percent
 from friso.shown.drawing.figure import Array
 
@@ -76,7 +76,7 @@ def length_at_rest(value: float) -> str:
 
     Below a nanometre, digits would only show the solver's error.
     """
-    return axis_shown().text("< 1 nm") if value < SOLVED_LENGTH else with_unit(value, "m")
+    return f"< 1 {unit_shown('nm')}" if value < SOLVED_LENGTH else with_unit(value, "m")
 
 
 def digits_that_differ(values: Sequence[float]) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE, counted_peaks
 from friso.quantities import percent
-from friso.questions.bode.figures import ResponseCurve, bode_figures, magnitude, phases
+from friso.questions.bode.figures import ResponseCurve, bode_figures, magnitude
 from friso.questions.boundary.figures import DASHES
 from friso.questions.check.figures import SHARES
 from friso.questions.map.figures import map_panel
@@ -18,6 +18,7 @@ from friso.questions.map.findings import statement
 from friso.shown.drawing.colours import ramp
 from friso.shown.drawing.figure import Axis, Figure, Limit, Markers, Panel, Series
 from friso.shown.drawing.palette import GREY, INK, VERMILLION
+from friso.shown.drawing.phases import phases
 from friso_thesis.questions.reproduce.rig_figures import rig_figures
 from friso_thesis.studies.thesis.experiments import BUILT
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE

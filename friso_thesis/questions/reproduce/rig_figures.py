@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.identification.settings import experiment_settings
-from friso.questions.bode.figures import phases
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.figure import Axis, Figure, Limit, Map, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, VERMILLION
+from friso.shown.drawing.phases import phases
 from friso_thesis.studies.thesis.experiments import (
     BUILT,
     GRID,

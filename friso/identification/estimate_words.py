@@ -8,23 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.questions.map.words import quantity
+from friso.identification.settings import identification_settings, presentation_settings
 from friso.shown.drawing.prefixes import NOTHING, choose, pretty
-
-INTERVAL_DIGITS = 2
-"""Significant digits of the half-width of an interval, which also set the digits of the value."""
-
-MOST_DIGITS = 4
-"""Largest number of significant digits of a value without interval."""
-
-MOST_ZEROS, MOST_DECIMALS = 4, 7
-"""Zeros before and decimals behind the point above which a number gets an exponent."""
-
-EXACT_DIGITS = 15
-"""Largest number of digits after the first one."""
-
-PLAIN_FORCES = (1e-2, 1e4)
-"""Range of forces [N], and of quantities per newton, without an SI prefix; they are compared with each other."""
+from friso.shown.key_words import key_in_words
 
 _NAMES = {
     "bias.cart": "Constant force on the cart",
@@ -42,7 +28,7 @@ _NAMES = {
 
 def name_of(key: str) -> str:
     """Write a key of the stage file, or another quantity, in words."""
-    return _NAMES.get(key) or quantity(key)
+    return _NAMES.get(key) or key_in_words(key)
 
 
 def within(key: str) -> str:
@@ -118,7 +104,8 @@ def _scale(estimate: Estimate) -> tuple[float, str]:
     if math.isfinite(estimate.value):  # for a value next to 0, the interval gives the scale
         finite = [max(abs(estimate.value), estimate.half_width) if estimate.value else 0.0]
     unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
-    if unit.startswith("N") and PLAIN_FORCES[0] < size < PLAIN_FORCES[1]:
+    low, high = presentation_settings.plain_forces
+    if unit.startswith("N") and low < size < high:
         return 1.0, pretty(unit)
     return choose(np.array(finite), unit)
 
@@ -132,14 +119,17 @@ def _places(estimate: Estimate, factor: float) -> int:
             for number in (estimate.value, estimate.low, estimate.high)
             if math.isfinite(number) and number != 0
         ]
-        return MOST_DIGITS - 1 - math.floor(math.log10(max(finite))) if finite else 0
-    return INTERVAL_DIGITS - 1 - math.floor(math.log10(half))
+        digits_shown = presentation_settings.digits_without_an_interval
+        return digits_shown - 1 - math.floor(math.log10(max(finite))) if finite else 0
+    return identification_settings.digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
 
 
 def _written(value: float, factor: float, places: int) -> str:
     """Write a value times a factor, to so many decimal places, or with an exponent if shorter."""
-    if math.isfinite(value) and not -MOST_ZEROS <= places <= MOST_DECIMALS:
+    zeros, decimals = presentation_settings.zeros_before_an_exponent, presentation_settings.decimals_before_an_exponent
+    if math.isfinite(value) and not -zeros <= places <= decimals:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
-        return f"{value * factor:.{max(MOST_DIGITS - 1, min(places + size, EXACT_DIGITS))}e}"
+        most = min(places + size, presentation_settings.digits_of_an_exact_value)
+        return f"{value * factor:.{max(presentation_settings.digits_without_an_interval - 1, most)}e}"
     rounded = round(value * factor, places)
     return f"{rounded + 0.0:.{max(places, 0)}f}"  # + 0.0: no minus before a zero

@@ -1,16 +1,27 @@
-"""Fit two masses and a joint to responses at the driven mass and, if measured, at the other mass."""
+"""Fit one mass, or two masses and a joint, to responses at the driven mass and, if measured, at the other mass.
+
+To the masses comes the effect of the drive and of modes above the band: delay, hold, compliance. A force that is held
+for T at each sample acts T/2 late on average, and is weaker by sin(x)/x, x = omega T/2. The samples of the position
+also contain the images of the force at the frequencies f + k/T with k = +/- 1, +/- 2 and so on: a response G(f) is
+sampled as the sum over all k of G(f + k/T) sin(x)/(x + k pi), with a delay of T/2 (of the double integrator with a
+zero-order hold that is x^2 cos(x)/sin(x)^2 / (m s^2): Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed. 1997,
+section 2.3). The images move every mass that is rigid up there, not the driven one alone. A log does not show whether
+its force was held, so T is fitted, between zero and the sample time. Modes above the band add a compliance that does
+not depend on frequency.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import product
 
 import numpy as np
+from scipy import stats
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.response.beyond import COMPLIANCES, DELAY, HELD, believed, beyond, bounds
 from friso.identification.response.fitting import ResponseFit, ResponseTarget, deviations
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
@@ -22,17 +33,31 @@ METHOD = "two-mass model fitted to the response"
 FARTHEST_LOG = np.log(30.0)
 """Logarithm of the factor by which masses and stiffness may differ from the start; damping may by twice as much."""
 
-DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, BEYOND = range(7)
-"""Indices of the parameters: logarithms of two masses, stiffness and damping; viscous friction on each mass; from
-`BEYOND` on, the parameters of module `beyond`."""
+DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, OF_TWO = range(7)
+"""Indices of the parameters of two masses: logarithms of the masses, stiffness and damping; viscous friction on each
+mass; from `OF_TWO` on, the parameters of drive and modes above."""
+
+MASS, DAMPER, SPRING, OF_ONE = range(4)
+"""Indices of the parameters of one mass: its logarithm, viscous friction, spring to ground; from `OF_ONE` on, the
+parameters of drive and modes above."""
+
+DELAY, HELD, COMPLIANCES = range(3)
+"""Indices of the parameters of drive and modes above: the delay [s]; the square of the time for which the force is held
+[ms^2]; from `COMPLIANCES` on, the compliance for each output."""
+
+IMAGES = np.array([k for k in range(-8, 9) if k])[:, None]
+"""Numbers k of the images that are summed, shape (images, 1). At four samples per period the others add 0.00002 of a
+mass's response."""
+
+ONE_THOUSANDTH = 1e-3
 
 
 @dataclass(frozen=True)
 class TwoMass:
     """A driven mass, a joint and another mass, as fitted to a response.
 
-    The unit of masses is input per acceleration. `fit` has the parameters, in the order of the constants of this
-    module. `signs` of the two outputs are -1 if they oppose the input. `estimates` has masses, stiffness, damping,
+    The unit of masses is input per acceleration. `fit` has the parameters, in the order of `DRIVEN` and so
+    on. `signs` of the two outputs are -1 if they oppose the input. `estimates` has masses, stiffness, damping,
     viscous friction, delay, antiresonance and resonance.
     """
 
@@ -62,7 +87,7 @@ def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
     mass.
     """
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
-    outputs = len(parameters) - BEYOND - COMPLIANCES
+    outputs = len(parameters) - OF_TWO - COMPLIANCES
 
     def masses(frequency: np.ndarray) -> np.ndarray:
         s = 2j * np.pi * frequency
@@ -71,7 +96,79 @@ def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
         second = other * s**2 + parameters[OTHER_DRAG] * s + joint
         return (np.stack([second, joint]) / (first * second - joint**2))[:outputs]
 
-    return beyond(masses, frequency, parameters[BEYOND:])
+    return beyond(masses, frequency, parameters[OF_TWO:])
+
+
+def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+    """Return the response of one mass to a force, at frequencies [Hz]; shape (outputs, lines).
+
+    The mass has viscous friction and a spring to ground. Delay, hold and a compliance for each output are added.
+    `parameters` are in the order of `MASS` and so on.
+    """
+    mass, outputs = np.exp(parameters[MASS]), len(parameters) - OF_ONE - COMPLIANCES
+
+    def masses(frequency: np.ndarray) -> np.ndarray:
+        s = 2j * np.pi * frequency
+        return np.tile(1 / (mass * s**2 + parameters[DAMPER] * s + parameters[SPRING]), (outputs, 1))
+
+    return beyond(masses, frequency, parameters[OF_ONE:])
+
+
+def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Add delay, hold and a compliance for each output to the responses of masses.
+
+    `model` returns the responses of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), also negative
+    ones. The result has the shape (outputs, lines).
+    """
+    delay, held, compliances = (
+        parameters[DELAY],
+        ONE_THOUSANDTH * np.sqrt(parameters[HELD]),
+        parameters[COMPLIANCES:, None],
+    )
+    masses = model(frequency) * np.sinc(frequency * held)
+    if held > 0:
+        turns = IMAGES + frequency * held
+        shares = np.sin(np.pi * frequency * held) / (np.pi * turns)
+        images = model((turns / held).ravel()).reshape(len(masses), *turns.shape)
+        masses = masses + np.sum(images * shares, axis=1)
+    return (masses + compliances) * np.exp(-2j * np.pi * frequency * delay)
+
+
+def _fitting(
+    masses: Callable[..., np.ndarray],
+    own: int,
+    responses: Sequence[FrequencyResponse],
+    signs: Sequence[float],
+    band: tuple[float, float] | None,
+) -> tuple[ResponseTarget, np.ndarray, Callable[..., ResponseFit]]:
+    """Set up the fit of a model of `masses` to responses of one or two outputs, in a `band` [Hz] (None: all).
+
+    The model has `own` parameters before those of drive and modes above. Responses with sign -1 are reversed. Returns
+    the target, its frequencies [Hz], and the fit by a start, and by lower and upper limits of the masses' own
+    parameters.
+    """
+    parts = [response if band is None else response.between(*band) for response in responses]
+    frequency = parts[0].frequency
+    values = np.stack([sign * part.response for part, sign in zip(parts, signs, strict=False)])
+    deviation = np.stack([deviations(part) for part in parts])
+    target = ResponseTarget(partial(masses, frequency=frequency), values, deviation)
+    late, free = settings.periods_of_a_delay / float(frequency[-1]), np.full(len(parts), np.inf)
+    longest = (_longest(responses[0], 0.5) / ONE_THOUSANDTH) ** 2
+    half = (_longest(responses[0], settings.periods_of_a_sample) / ONE_THOUSANDTH) ** 2 / 2  # from 0 to a sample time
+
+    def fitted(start: np.ndarray, lower: Sequence[float], upper: Sequence[float]) -> ResponseFit:
+        low, high = np.array([*lower, -late, 0.0, *-free]), np.array([*upper, late, longest, *free])
+        return target.refined(start, low, high, {own + HELD: (half, half)})
+
+    return target, frequency, fitted
+
+
+def _longest(response: FrequencyResponse, share: float) -> float:
+    """Return the sample time [s] of a response or, if not known, the longest that is plausible.
+
+    Plausible is at most the fraction `share` of the period of the response's highest frequency.
+    """
+    return response.sample_time or share / float(response.frequency[-1])
 
 
 def fit_two_mass(
@@ -85,28 +182,49 @@ def fit_two_mass(
     the same lines. Raises InputError if they do not, or for too few lines.
     """
     responses = [collocated] if noncollocated is None else [collocated, noncollocated]
-    if band is not None:
-        responses = [response.between(*band) for response in responses]
-    frequency = responses[0].frequency
+    parts = responses if band is None else [response.between(*band) for response in responses]
+    frequency = parts[0].frequency
     if len(frequency) < 8:
         raise InputError("band", f"{len(frequency)} lines", "at least 8 lines for a two-mass model", "3 to 20 Hz")
-    if len(responses) > 1 and not np.array_equal(frequency, responses[1].frequency):
+    if len(parts) > 1 and not np.array_equal(frequency, parts[1].frequency):
         raise InputError("response", "responses on different lines", "both outputs of the same records", "one period")
-    values = np.stack([response.response for response in responses])
-    deviation = np.stack([deviations(response) for response in responses])
-    sign = _sign(values[0])
+    sign = _sign(parts[0].response)
     options = [(sign, sign), (sign, -sign)][: len(responses)]
-    seen = cache(lambda: _from_modes(responses[0], len(responses)))
-    held = {BEYOND + HELD: believed(collocated)}
-    outside = bounds(collocated, float(frequency[-1]), len(values))
-    fits = [
-        (_best(np.array(pair)[: len(values), None] * values, deviation, frequency, seen, outside, held), pair)
-        for pair in options
-    ]
-    fit, signs = min(fits, key=lambda candidate: candidate[0].squares)
-    _follows(np.array(signs)[: len(values), None] * values, two_masses(fit.parameters, frequency))
+    seen = cache(lambda: _from_modes(parts[0], len(responses)))
+    fits = [(_best(responses, pair, band, seen), pair) for pair in options]
+    (fit, values), signs = min(fits, key=lambda candidate: candidate[0][0].squares)
+    _follows(values, two_masses(fit.parameters, frequency))
     limits = (float(frequency[0]), float(frequency[-1]))
     return TwoMass(signs, fit, _estimates(fit, collocated), limits, tuple(_warnings(signs, fit)))
+
+
+def fit_one_mass(
+    responses: list[FrequencyResponse], signs: tuple[float, ...], band: tuple[float, float]
+) -> ResponseFit:
+    """Fit one mass to the responses of one or two outputs on the same lines in a band [Hz].
+
+    Responses with sign -1 are reversed. Fits start from several corner frequencies of friction and spring inside and
+    below the band; the best is returned.
+    """
+    target, frequency, fitted = _fitting(one_mass, OF_ONE, responses, signs, band)
+    starts = sorted(_starts_of_one(target.response, frequency), key=target.misfit)[: settings.starts_refined]
+    fits = [fitted(start, [-np.inf, 0.0, 0.0], [np.inf] * 3) for start in starts]
+    return min(fits, key=lambda fit: fit.squares)
+
+
+def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
+    """Tell whether two masses explain the responses much better than one mass does.
+
+    The single mass has viscous friction and a spring to ground. Both models include delay and compliance, and cover the
+    band of `model`. An F-test decides whether the difference is chance; its level is divided by the number of lines,
+    because the mode could lie at any line.
+    """
+    responses = [response for response in (driven, other) if response is not None]
+    one, two = fit_one_mass(responses, model.signs, model.band), model.fit
+    free, more = max(two.count - len(two.parameters), 1), len(two.parameters) - len(one.parameters)
+    better = (one.squares - two.squares) / more / (two.squares / free)
+    chance = float(stats.f.sf(better, more, free)) * one.count / (2 * len(responses))
+    return two.squares < settings.squares_left_by_two * one.squares and chance < settings.chance_of_two_masses
 
 
 def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
@@ -179,44 +297,55 @@ def _start(other: float, stiffness: float, damping: float, outputs: int) -> np.n
     `other` is the fraction of the mass beyond the joint; `outputs` is the number of outputs. Friction, delay and
     compliances begin at 0.
     """
-    return np.array([*np.log([1 - other, other, stiffness, damping]), *np.zeros(BEYOND - DRAG + COMPLIANCES + outputs)])
+    return np.array([*np.log([1 - other, other, stiffness, damping]), *np.zeros(OF_TWO - DRAG + COMPLIANCES + outputs)])
 
 
 def _best(
-    values: np.ndarray,
-    deviation: np.ndarray,
-    frequency: np.ndarray,
+    responses: Sequence[FrequencyResponse],
+    signs: tuple[float, float],
+    band: tuple[float, float] | None,
     seen: Callable[[], list[np.ndarray]],
-    outside: tuple[np.ndarray, np.ndarray],
-    held: Mapping[int, tuple[float, float]],
-) -> ResponseFit:
+) -> tuple[ResponseFit, np.ndarray]:
     """Fit a two-mass model from several starts; stop at the first good fit, else take the best.
 
-    Starts are the best mass ratio on a grid, the models from the modes `seen`, and the second-best ratio. `outside` has
-    the lower and upper bounds of delay, hold and compliances. `held` has prior values and deviations of parameters, by
-    index.
+    Starts are the best mass ratio on a grid, the models from the modes `seen`, and the second-best ratio. The responses
+    that were fitted are returned, too, with their `signs`.
     """
     reach = np.array([FARTHEST_LOG] * 3 + [2 * FARTHEST_LOG])
-
-    target = ResponseTarget(partial(two_masses, frequency=frequency), values, deviation)
+    target, frequency, fitted = _fitting(two_masses, OF_TWO, responses, signs, band)
+    values = target.response
 
     def starts() -> Iterator[np.ndarray]:
-        first, second, *_ = sorted(_starts(values, frequency), key=target.misfit)
+        first, second, *_ = sorted(_starts_of_two(values, frequency), key=target.misfit)
         yield first
         yield from (_scaled_to(visible, values[0], frequency) for visible in seen())
         yield second
 
     fits = []
     for start in starts():
-        lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, *outside[0]])
-        upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, *outside[1]])
-        fits.append(target.refined(start, lower, upper, held))
+        fits.append(fitted(start, [*(start[:DRAG] - reach), 0.0, 0.0], [*(start[:DRAG] + reach), np.inf, np.inf]))
         if fits[-1].reduced < settings.misfit_of_a_right_model:
             break
-    return min(fits, key=lambda fit: fit.squares)
+    return min(fits, key=lambda fit: fit.squares), values
 
 
-def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
+def _starts_of_one(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
+    """Return starts of a fit, with different corner frequencies of friction and spring.
+
+    The magnitude of each start is, on average, that of the first response in `values`.
+    """
+    places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])
+    starts = []
+    for corner, mode in product(places, places):
+        drag, spring = corner + settings.width_of_a_start * mode, mode**2
+        rest = np.zeros(COMPLIANCES + len(values))
+        shape = one_mass(np.array([0.0, drag, spring, *rest]), frequency)[0]
+        level = float(np.mean(np.log(np.abs(shape) / np.abs(values[0]))))
+        starts.append(np.array([level, drag * np.exp(level), spring * np.exp(level), *rest]))
+    return starts
+
+
+def _starts_of_two(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
     """Yield starts with the resonance at the highest acceleration of the driven mass.
 
     The starts have several mass ratios.
@@ -266,7 +395,7 @@ def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate,
     plain = [
         fit.estimate("driven viscous friction", _si(rate), METHOD, lambda p: float(p[DRAG])),
         fit.estimate("other viscous friction", _si(rate), METHOD, lambda p: float(p[OTHER_DRAG])),
-        fit.estimate("delay", "s", METHOD, lambda p: float(p[BEYOND + DELAY])),
+        fit.estimate("delay", "s", METHOD, lambda p: float(p[OF_TWO + DELAY])),
     ]
     return (*positive, *plain)
 

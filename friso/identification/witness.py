@@ -1,0 +1,230 @@
+"""Replay the given controller on the logged reference and position, and compare its force with the logged one.
+
+The controller saw the machine: where both are right, the force that it commands on what was logged is the logged force.
+What turns one into the other names what is wrong with the record or with the controller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.signal import bilinear, lfilter, ss2tf
+
+from friso.errors import InputError
+from friso.frequency.parts import FEEDFORWARD, FORCE, REFERENCE, STAGE, VELOCITY, compensator
+from friso.frequency.system import System
+from friso.identification.inverse_model import least_squares, unit_of
+from friso.identification.logs.log import Log
+from friso.identification.settings import witness_settings as settings
+from friso.quantities import percent, plain_factor
+from friso.stage.tables import TRANSMISSION
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replay:
+    """Force of the controller on a log, compared with the logged force.
+
+    The logged force, of RMS `force` [N], is `slope` times the commanded one, and leaves the share `left` of its own
+    variation. It comes `lag` [s] after the command. Time of the log runs `clock` times as slowly as the controller's.
+    `mass` [kg] times the reference's acceleration, and `direction` [N] in its direction, are in it besides. `slopes`
+    are those before and after an instant at which gains were switched.
+    """
+
+    slope: float
+    left: float
+    lag: float = 0.0
+    clock: float = 1.0
+    mass: float = 0.0
+    direction: float = 0.0
+    force: float = 1.0
+    slopes: tuple[float, float] | None = None
+
+    @property
+    def explains(self) -> bool:
+        """Tell whether the controller explains the course of the logged force, whatever its size."""
+        return self.left <= settings.force_left_by_the_controller
+
+    @property
+    def agrees(self) -> bool:
+        """Tell whether the controller explains the logged force, its size included."""
+        return self.explains and abs(self.slope - 1) <= settings.error_of_an_agreeing_slope
+
+
+class Witness:
+    """A log with reference, position and force, and the controller of a stage whose keys in SI are `flat`."""
+
+    def __init__(self, log: Log, flat: Mapping[str, Any]) -> None:
+        part = log.longest
+        self.log, self.step = log, log.sample_time
+        self.reference, self.position, self.force = (log[name][part] for name in CHANNELS)
+        self.system = compensator(flat, 1)
+        size = np.abs(self.force)
+        inside = size < settings.share_of_a_limit * size.max()
+        if np.mean(~inside) < settings.share_at_a_limit:
+            inside[:] = True  # the largest force is no limit
+        inside[: settings.samples_of_a_start] = False
+        self.rows = np.flatnonzero(inside)
+        self.stretch = np.cumsum(np.diff(inside.astype(int), prepend=0) > 0)[self.rows]
+
+    def best(self) -> Replay:
+        """Return the replay that explains the logged force best: over delays, and if need be over clocks.
+
+        Feedforward of the reference is added if neither explains the force.
+        """
+        plain = self._lagged(1.0)
+        if plain.explains:
+            return plain
+        clocks = np.geomspace(1 / settings.reach_of_a_clock, settings.reach_of_a_clock, settings.clocks_tried)
+        near = min((self.replay(float(clock)) for clock in clocks), key=lambda one: one.left)
+        step = float(clocks[1] / clocks[0])
+        for _ in range(settings.refinements_of_a_clock):
+            step = step**0.5
+            near = min([near, *(self.replay(near.clock * step**side) for side in (-1, 1))], key=lambda one: one.left)
+        others = [self._lagged(near.clock), self._lagged(1.0, fed=True)]
+        share = settings.share_left_by_a_cause * plain.left
+        sure = [one for one in others if one.agrees and one.left < share]
+        return min(sure, key=lambda one: one.left, default=plain)
+
+    def replay(self, clock: float = 1.0, shift: int = 0, fed: bool = False) -> Replay:
+        """Compare the forces, with the controller's clock `clock` times as fast as the log's.
+
+        The command comes `shift` samples later. If `fed`, acceleration and direction of the reference explain a part.
+        """
+        count = len(self.force)
+        columns = [
+            np.roll(self.command(clock), shift),
+            np.linspace(0.0, 1.0, count),
+        ]
+        if fed:
+            columns += [*self._derivatives(self.step)[1:2], np.sign(self._derivatives(self.step)[0])]
+        signals = self._deviations(np.stack([*columns, self.force], axis=1)[self.rows])
+        solution, left = least_squares(signals[:, :-1], signals[:, -1])
+        spread = float(np.std(signals[:, -1])) or 1.0
+        mass, direction = solution[2:] if fed else (0.0, 0.0)
+        return Replay(
+            slope=float(solution[0]),
+            left=float(np.std(left)) / spread,
+            lag=shift * self.step,
+            clock=clock,
+            mass=float(mass),
+            direction=float(direction),
+            force=spread,
+        )
+
+    def command(self, clock: float = 1.0) -> np.ndarray:
+        """Return the force [N] that the controller commands on the log, (samples,)."""
+        step = self.step / clock
+        velocity = np.diff(self.position, prepend=self.position[0]) / step
+        inputs = {REFERENCE: self.reference, STAGE: self.position, VELOCITY: velocity}
+        inputs |= dict(zip(FEEDFORWARD, self._derivatives(step), strict=True))
+        return _driven(self.system, inputs, step)
+
+    def at_both_ends(self, clock: float = 1.0) -> tuple[float, float] | None:
+        """Return the slopes before and after the instant that divides the record best; None if none explains it.
+
+        Gains that are switched have two slopes.
+        """
+        signals, count = np.stack([self.command(clock), self.force], axis=1)[self.rows], len(self.rows)
+        best, slopes = settings.force_left_by_the_controller, None
+        spread = float(np.std(signals[:, 1])) or 1.0
+        for share in np.linspace(*settings.shares_of_a_record, settings.instants_tried):
+            parts = [signals[: int(share * count)], signals[int(share * count) :]]
+            fits = [least_squares((one - one.mean(axis=0))[:, :1], (one - one.mean(axis=0))[:, 1]) for one in parts]
+            left = float(np.sqrt(sum(float(rest @ rest) for _, rest in fits) / count)) / spread
+            if left < best:
+                best, slopes = left, (float(fits[0][0][0]), float(fits[1][0][0]))
+        return slopes
+
+    def _lagged(self, clock: float, fed: bool = False) -> Replay:
+        """Return the best replay with a clock over delays of few samples."""
+        shifts = range(-1, settings.samples_of_delay + 1)
+        return min((self.replay(clock, shift, fed) for shift in shifts), key=lambda one: one.left)
+
+    def _derivatives(self, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return velocity, acceleration and jerk of the reference, (samples,) each, with samples a `step` [s] apart."""
+        rate = np.gradient(self.reference, step)
+        acceleration = np.gradient(rate, step)
+        return rate, acceleration, np.gradient(acceleration, step)
+
+    def _deviations(self, signals: np.ndarray) -> np.ndarray:
+        """Subtract the means over each stretch between limits: the integral may have changed there."""
+        _, number, count = np.unique(self.stretch, return_inverse=True, return_counts=True)
+        means = np.stack([np.bincount(number, signal) / count for signal in signals.T], axis=1)
+        return signals - means[number]
+
+
+def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
+    """Replay the controller of a stage on a log; None where what it saw and commanded is not what was logged.
+
+    That is so with a disturbance in the force, or if the controller may see the motor and the log the load. Raises
+    InputError if the log contradicts its own clock, unit or sign: no value of such a log holds.
+    """
+    if "disturbance" in log or any(key.startswith(f"{TRANSMISSION}.") for key in flat):
+        return None
+    witness = Witness(log, flat)
+    replay = witness.best()
+    left = f"the controller leaves {percent(witness.replay().left)} of the force, so {percent(replay.left)}"
+    if replay.clock != 1.0:
+        slow = f"time that runs {plain_factor(replay.clock)} times as slowly as the controller's"
+        actual = f"{slow} (with time as logged {left})"
+        expected = "the clock with which the drive sampled, or another controller"
+        example = f'--dt "{log.sample_time / replay.clock * 1e3:.4g} ms"'
+        raise InputError("time", actual, expected, example, log.name)
+    low, high = settings.slopes_of_a_scale
+    if replay.explains and not low < replay.slope < high:
+        actual = f"a force that is {replay.slope:.3g} times what the controller of the stage file commands"
+        expected = "force and controller with agreeing units and signs (of position, too)"
+        example = f'--scale force="{1 / replay.slope:.3g} {log.unit("force")}/{log.unit("force")}"'
+        raise InputError("force", actual, expected, example, log.name)
+    return replay if replay.agrees or replay.explains else replace(replay, slopes=witness.at_both_ends())
+
+
+def doubt_of(replay: Replay, log: Log) -> str:
+    """Say what the replay contradicts: gains, feedforward, or the controller as a whole; "" if it agrees."""
+    unit, kg = log.unit("force"), unit_of("kg", log)
+    if replay.mass or replay.direction:
+        has = "has" if replay.mass > 0 else "lacks"
+        also = f", and {abs(replay.direction):.2g} {unit} in its direction"
+        also = also if abs(replay.direction) > settings.error_of_an_agreeing_slope * replay.force else ""
+        return (
+            f"the logged force {has} {abs(replay.mass):.3g} {kg} times the acceleration of the reference{also}, which "
+            "the controller of the stage file does not command: a feedforward"
+        )
+    if replay.agrees:
+        return ""
+    if replay.explains:
+        return (
+            f"the logged force is {replay.slope:.3g} times what the controller of the stage file commands: its gains "
+            "or the scale of the force are off by that"
+        )
+    if replay.slopes:
+        before, after = replay.slopes
+        return (
+            f"the controller answers the same error with {after / before:.2g} times the force in the later part: its "
+            "gains are switched"
+        )
+    return (
+        f"another controller drove the machine: that of the stage file leaves {percent(replay.left)} of the logged "
+        "force (check gains, derivative, filters and the mass it is tuned for)"
+    )
+
+
+CHANNELS = ("reference", "position", "force")
+"""Channels of a log that a replay needs."""
+
+
+def _driven(system: System, inputs: dict[str, np.ndarray], step: float) -> np.ndarray:
+    """Return the force [N] of a linear controller on sampled inputs, by Tustin's rule, (samples,)."""
+    chosen = system.take([name for name in system.inputs if name in inputs], (FORCE,))
+    a, b, c, d = chosen.a[0], chosen.b[0], chosen.c[0], chosen.d[0]
+    total = np.zeros(len(next(iter(inputs.values()))))
+    for number, name in enumerate(chosen.inputs):
+        numerator, denominator = ss2tf(a, b, c, d, input=number)
+        if not numerator.any():
+            continue
+        poles, zeros = bilinear(np.trim_zeros(numerator[0], "f"), denominator, 1 / step)[::-1]
+        total += lfilter(zeros, poles, inputs[name])
+    return total

@@ -1,1 +1,0 @@
-"""Show results of experiments; each module declares the `VIEW` of the kind that it is named after."""

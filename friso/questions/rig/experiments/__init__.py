@@ -1,1 +1,0 @@
-"""Show the outcomes of the rig's experiments; each module declares the `VIEW` of one."""

@@ -1,0 +1,228 @@
+"""Guess friction that nobody measured from the kind of contact: ranges of what similar machines have."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from friso.axis import LINEAR, AxisKind
+from friso.errors import InputError, StageError
+from friso.intervals import WIDE_RATIO, is_range, uncertain_value
+from friso.quantities import Quantity, positive, quoted
+from friso.stage.section import nearest_name, numeric_fields
+from friso.stage.tables import FRICTION
+
+if TYPE_CHECKING:
+    from friso.stage.stage import Stage
+
+Ends = tuple[float, float]
+"""Lowest and highest value of a range [SI]."""
+
+_FORCE = Quantity("N", positive, "5 N")
+
+_EXAMPLE = 'guess = "recirculating ball, size 25, light preload, 4 carriages"'
+
+MOST_CARRIAGES = 100
+"""Largest number of carriages of an axis."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """A kind of contact, with ranges of what nearly all machines with it show (file contacts.toml, with sources).
+
+    `ratio` is static over Coulomb friction, `stribeck_velocity` is in m/s. Over `presliding` [m] the contact gives way
+    before it slides. `settling` [s] is bristle damping over bristle stiffness, and `viscous` [s/m] is viscous over
+    Coulomb friction. A rotary contact has radians for metres. `sizes`, `preloads`, `seals` and `friction_coefficient`
+    say how much a carriage drags, for contacts of which makers publish that.
+    """
+
+    name: str
+    source: str
+    ratio: Ends
+    stribeck_velocity: Ends
+    presliding: Ends
+    settling: Ends
+    viscous: Ends
+    axis: str = LINEAR.name
+    sizes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    preloads: Mapping[str, Ends] = field(default_factory=dict)
+    seals: Ends = (1.0, 1.0)
+    friction_coefficient: Ends = (0.0, 0.0)
+
+    def drag(self, size: str, preload: str) -> Ends:
+        """Return the Coulomb friction [N] of one carriage of a size, with a preload."""
+        one, shares = self.sizes[size], self.preloads[preload]
+        return tuple(
+            seal * one["seal"] + coefficient * share * one["rating"]
+            for seal, coefficient, share in zip(self.seals, self.friction_coefficient, shares, strict=True)
+        )  # type: ignore[return-value]
+
+    def ranges(self, coulomb: Ends, stiffness: Ends = (0.0, math.inf)) -> dict[str, Ends]:
+        """Return the ranges [SI] of the keys of [friction] for a range of Coulomb friction [N].
+
+        A range of bristle `stiffness` [N/m] that something else shows cuts that of the contact. Static friction spans
+        orders of magnitude only where Coulomb friction does, so that their centres fit together.
+        """
+        low, high = coulomb
+        least = low if high > WIDE_RATIO * low else high * self.ratio[1] / WIDE_RATIO / self.ratio[0]
+        soft, stiff = cut((low / self.presliding[1], high / self.presliding[0]), stiffness)
+        return {
+            "coulomb": coulomb,
+            "static": (max(low, least) * self.ratio[0], high * self.ratio[1]),
+            "stribeck_velocity": self.stribeck_velocity,
+            "bristle_stiffness": (soft, stiff),
+            "bristle_damping": (soft * self.settling[0], stiff * self.settling[1]),
+            "viscous": (low * self.viscous[0], high * self.viscous[1]),
+        }
+
+
+@cache
+def contacts(axis: str = LINEAR.name) -> dict[str, Contact]:
+    """Return the kinds of contact of an axis, "linear" or "rotary", by name; the first one is any contact."""
+    rows = tomllib.loads(files("friso").joinpath("contacts.toml").read_text(encoding="utf-8"))["contact"]
+    several = [Contact(**{key: _ends(value) for key, value in row.items()}) for row in rows]
+    return {one.name: one for one in several if one.axis == axis}
+
+
+def _ends(value: Any) -> Any:
+    """Return lists of a row, and of the tables in it, as pairs."""
+    if isinstance(value, dict):
+        return {key: _ends(item) for key, item in value.items()}
+    return tuple(map(float, value)) if isinstance(value, list) else value
+
+
+STRIBECK_EXPONENT = 2
+"""Exponent of a guessed Stribeck curve, a Gaussian one."""
+
+
+def any_contact(axis: AxisKind) -> Contact:
+    """Return the ranges that hold for every contact on a kind of axis."""
+    return next(iter(contacts(axis.name).values()))
+
+
+def with_guess(tables: Mapping[str, Any], axis: AxisKind) -> dict[str, Any]:
+    """Complete the tables of a stage file whose [friction] has a `guess`, which names the contact.
+
+    Keys that the file lacks get ranges, and stand in the list of what is unknown. Tables without a guess stay as they
+    are. Raises StageError for a guess that is not understood, or that leaves open how large the friction is.
+    """
+    friction = tables.get("friction")
+    if not isinstance(friction, Mapping) or not isinstance(friction.get("guess"), str):
+        return {**tables}
+    contact, drag = _understood(friction["guess"], axis)
+    table = {"model": "lugre", **friction}
+    law = FRICTION.pick(table)
+    coulomb = _stated(table, "coulomb", axis) or _from_static(_stated(table, "static", axis), contact) or drag
+    if coulomb is None:
+        expected = "Coulomb friction beside the guess, since this contact has no size that says how large it is"
+        raise StageError("friction.coulomb", "nothing", expected, f'coulomb = "5 {axis.force}"')
+    ranges = contact.ranges(coulomb)
+    fields = numeric_fields(law)
+    added = {
+        key: written(ranges[key], fields[key].on(axis).unit) for key in fields if key in ranges and key not in table
+    }
+    if "stribeck_exponent" in fields and "stribeck_exponent" not in table:
+        table["stribeck_exponent"] = STRIBECK_EXPONENT
+    said = tables.get("unknown", "")
+    unknown = [said] * bool(said) + [f"friction.{key}" for key in added]
+    return {**tables, "friction": {**table, **added}, **({"unknown": ", ".join(unknown)} if unknown else {})}
+
+
+def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Ends]) -> dict[str, Ends]:
+    """Return what similar machines have for some keys of [friction] that nobody knows, as ranges [SI] by key.
+
+    They follow from Coulomb friction, or else from static friction, and from the contact that the stage's guess names;
+    `bounds` cut them. A key has no range if nobody knows these either, or if nothing is usual for it.
+    """
+    flat, intervals, axis = stage.flat(), stage.uncertain(), stage.axis_kind
+    guess = getattr(stage.friction, "guess", "")
+    contact = _understood(guess, axis)[0] if guess else any_contact(axis)
+
+    def known(key: str) -> Ends | None:
+        """Return the range of a key's value; None if the stage has none, or if nobody knows it."""
+        if key in keys or key not in flat:
+            return None
+        interval = intervals.get(key)
+        return (flat[key], flat[key]) if interval is None else (max(interval.low, flat[key] / 10), interval.high)
+
+    coulomb = known("friction.coulomb") or _from_static(known("friction.static"), contact)
+    if coulomb is None:
+        return {}
+    stiffness = bounds.get("friction.bristle_stiffness", (0.0, math.inf))
+    ranges = {f"friction.{key}": ends for key, ends in contact.ranges(coulomb, stiffness).items()}
+    return {key: cut(ranges[key], bounds.get(key, ranges[key])) for key in keys if key in ranges and key in flat}
+
+
+def cut(ends: Ends, other: Ends) -> Ends:
+    """Return the common part of two ranges, or the first one if they have none."""
+    low, high = max(ends[0], other[0]), min(ends[1], other[1])
+    return (low, high) if low < high else ends
+
+
+def written(ends: Ends, unit: str) -> str:
+    """Write a range for a stage file: "1.2 N .. 3 N"."""
+    return " .. ".join(f"{end:.3g} {unit}".rstrip() for end in ends)
+
+
+def _stated(table: Mapping[str, Any], key: str, axis: AxisKind) -> Ends | None:
+    """Return the range in which a table states a force [N]; None without one, or if it cannot be read."""
+    text = getattr(table.get(key), "text", table.get(key))
+    if text is None:
+        return None
+    try:
+        if is_range(text):
+            interval = uncertain_value(text, _FORCE.on(axis)).interval
+            return max(interval.low, interval.high / 1e3), interval.high
+        value = float(_FORCE.on(axis).read(text))
+    except InputError:  # a later check reports this error
+        return 1.0, 1.0
+    return value, value
+
+
+def _from_static(static: Ends | None, contact: Contact) -> Ends | None:
+    """Return the Coulomb friction [N] of a contact with a range of static friction."""
+    return static and (static[0] / contact.ratio[1], static[1] / contact.ratio[0])
+
+
+def _understood(guess: str, axis: AxisKind) -> tuple[Contact, Ends | None]:
+    """Return the contact that a guess names, and its Coulomb friction [N], or None if the guess has no size.
+
+    Raises StageError for words that are not understood.
+    """
+    name, *words = (part.strip() for part in guess.split(","))
+    kinds = contacts(axis.name)
+    contact = kinds[_named(name, kinds)]
+    size, preload, carriages = None, None, 1
+    for word in words:
+        what, _, rest = word.partition(" ")
+        if what == "size" and contact.sizes:
+            size = _named(rest, contact.sizes)
+        elif rest == "preload" and contact.preloads:
+            preload = _named(what, contact.preloads)
+        elif rest in ("carriage", "carriages") and what.isdecimal() and 1 <= int(what) <= MOST_CARRIAGES:
+            carriages = int(what)
+        else:
+            raise _not_understood(word, "size, preload and number of carriages, of contacts that have sizes")
+    if size is None:
+        return contact, None
+    drags = [contact.drag(size, share) for share in ([preload] if preload else contact.preloads)]
+    low, high = carriages * min(low for low, _ in drags), carriages * max(high for _, high in drags)
+    return contact, (low, high)
+
+
+def _named(word: str, names: Iterable[str]) -> str:
+    """Return a word if it is one of some names. Raises StageError, which lists them, for another word."""
+    if word in (names := [*names]):
+        return word
+    near = nearest_name(word, names)
+    raise _not_understood(word, f"one of {', '.join(names)}{f'; did you mean {near}?' if near else ''}")
+
+
+def _not_understood(word: str, expected: str) -> StageError:
+    """Make the error for a word of a guess that is not understood."""
+    return StageError("friction.guess", quoted(word, "not understood"), expected, _EXAMPLE)

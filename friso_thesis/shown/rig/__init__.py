@@ -1,1 +1,0 @@
-"""Show outcomes of the thesis's own experiments, one module each."""

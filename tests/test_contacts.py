@@ -1,0 +1,106 @@
+"""Friction that nobody measured: ranges of similar machines, by the contact or by what a log shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from friso.axis import KINDS
+from friso.errors import StageError
+from friso.identification.estimate import Estimate
+from friso.identification.stage_file import CHOSEN, with_unknown
+from friso.interface.inputs import correlations_of
+from friso.stage import Stage
+from friso.stage.contacts import any_contact, contacts
+from friso.stage.correlations import draw
+
+GUESSED = {
+    "masses": {"cart": "12 kg"},
+    "friction": {"guess": "recirculating ball, size 25, light preload, 4 carriages"},
+    "controller": {"kind": "pid", "crossover": "20 Hz", "alpha": 0.1, "beta": 2},
+    "motion": {"kind": "step", "size": "1 mm", "duration": "5 s"},
+}
+
+
+def test_a_guess_gives_ranges_and_says_that_nobody_knows_them() -> None:
+    """Coulomb friction of four carriages: seals 0.5 to 3 times 2 N, and 0 to 3 % of 26.5 kN times 0.002 to 0.004."""
+    stage = Stage(**GUESSED)
+    coulomb = stage.uncertain()["friction.coulomb"]
+    assert (coulomb.low, coulomb.high) == (4.0, pytest.approx(4 * (6 + 0.004 * 0.03 * 26500), rel=0.01))
+    assert {*stage.unknown_keys} == {key for key in stage.uncertain() if key.startswith("friction.")}
+    assert not stage.doubt
+    assert Stage(**stage.as_written()) == stage
+
+
+def test_what_the_file_states_is_kept_and_known() -> None:
+    friction = GUESSED["friction"] | {"coulomb": "8 N", "stribeck_velocity": "2 mm/s"}
+    stage = Stage(**GUESSED | {"friction": friction})
+    assert stage.flat()["friction.coulomb"] == 8
+    assert "friction.coulomb" not in stage.unknown_keys
+    low, high = (getattr(stage.uncertain()["friction.static"], end) for end in ("low", "high"))
+    assert (low, high) == (pytest.approx(8.4), pytest.approx(12.8))
+    assert "friction.static" not in stage.replace({"friction.static": "9 N"}).unknown_keys
+
+
+def test_drawn_machines_have_ratios_of_their_contact() -> None:
+    """Levels of friction, and stiffness and damping, grow together: 90 % of ratios lie about those of the contact."""
+    stage = Stage(**GUESSED)
+    keys = draw(stage, correlations_of(stage, stage), 256, 0).keys
+    contact = contacts()["recirculating ball"]
+    for upper, lower, ends in (
+        ("static", "coulomb", contact.ratio),
+        ("bristle_damping", "bristle_stiffness", contact.settling),
+    ):
+        ratios = keys[f"friction.{upper}"] / keys[f"friction.{lower}"]
+        middle = np.quantile(ratios, [0.05, 0.95])
+        assert ends[0] / 2 < middle[0]
+        assert middle[1] < 2 * ends[1]
+
+
+@pytest.mark.parametrize(
+    ("guess", "word"),
+    [
+        ("recirculating bal", "recirculating ball"),
+        ("recirculating ball, size 26", "25"),
+        ("recirculating ball, size 25, strong preload", "heavy"),
+        ("ball screw, size 25", "size"),
+        ("recirculating ball, size 25, 0 carriages", "number of carriages"),
+        ("ball screw", "Coulomb"),
+        ("strain-wave gear", "one of"),
+    ],
+)
+def test_a_guess_that_is_not_understood_names_what_is(guess: str, word: str) -> None:
+    with pytest.raises(StageError) as caught:
+        Stage(**GUESSED | {"friction": {"guess": guess}})
+    assert word in caught.value.expected
+    assert caught.value.key.startswith("friction.")
+    assert caught.value.example
+
+
+@pytest.mark.parametrize("kind", ["linear", "rotary"])
+def test_the_range_of_any_contact_holds_those_of_all(kind: str) -> None:
+    every = any_contact(KINDS[kind])
+    for contact in contacts(kind).values():
+        assert contact.source
+        for name in ("ratio", "stribeck_velocity", "presliding", "settling", "viscous"):
+            low, high = getattr(contact, name)
+            assert getattr(every, name)[0] <= low < high <= max(high, getattr(every, name)[1])
+
+
+def test_what_a_log_does_not_show_becomes_a_range_that_holds_the_file_s_own_value(rig: Stage) -> None:
+    """Bounds of the log cut the range; without Coulomb friction there is none."""
+    origins = dict.fromkeys(rig.flat(), "as given")
+    key, damping = "friction.bristle_stiffness", "friction.bristle_damping"
+    atleast = Estimate.unknown(key, "N/m", "moves", "too few moves", 5e4)
+    stage = with_unknown(rig, origins, [key], [atleast])
+    interval = stage.uncertain()[key]
+    assert (interval.low, interval.high) == (5e4, pytest.approx(1 / 0.3e-6, rel=0.01))
+    assert stage.unknown_keys == (key,)
+    narrow = replace(atleast, high=6e4)
+    outside = with_unknown(rig, origins, [key], [narrow]).uncertain()[key]
+    assert outside.low <= 5e4
+    assert outside.high >= rig.flat()[key]
+    both = with_unknown(rig, origins, [key, damping], [narrow]).uncertain()
+    assert both[damping].high / both[key].high <= 5e-3 * 1.01
+    nothing = with_unknown(rig, origins | {"friction.static": CHOSEN}, ["friction.static", "friction.coulomb"], [])
+    assert nothing.assumed_keys == ("friction.static", "friction.coulomb")

@@ -1,0 +1,115 @@
+"""The given controller as a witness: replayed on a log it tells clock, units, signs, gains and feedforward."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from friso.identification.logs.log import Log
+from friso.identification.witness import Witness
+from friso.stage import Stage
+
+STEP = 1e-3
+
+KP, KI, KD = 9e3, 7e4, 260.0
+
+STAGE = Stage(
+    masses={"cart": "4.2 kg"},
+    controller={
+        "kind": "pid",
+        "kp": f"{KP} N/m",
+        "ki": f"{KI} N/(m*s)",
+        "kd": f"{KD} N*s/m",
+        "derivative_on": "measurement",
+    },
+    motion={"kind": "step", "size": "1 mm", "duration": "5 s"},
+)
+
+
+def recorded(limit: float = np.inf) -> Log:
+    """An axis of 4.2 kg with Coulomb friction of 5 N, moved there and back, its controller sampled at 1 kHz.
+
+    Own equations, steps of 50 us, and a spring that yields at 5 N for friction; independent of friso.
+    """
+    time = np.arange(0.0, 6.0, STEP)
+    phase = np.clip((time % 1.5) / 0.2, 0, 1)
+    there = phase**3 * (10 - 15 * phase + 6 * phase**2)
+    reference = 0.02 * np.where((time // 1.5) % 2 == 0, there, 1 - there)
+    position, force = np.zeros((2, len(time)))
+    x = v = z = integral = before = 0.0
+    for k, wanted in enumerate(reference):
+        integral += KI * (wanted - x) * STEP
+        command = KP * (wanted - x) + integral - KD * (x - before) / STEP
+        u = float(np.clip(command, -limit, limit))
+        if u != command:
+            integral -= KI * (wanted - x) * STEP
+        before, position[k], force[k] = x, x, u
+        for _ in range(20):
+            z = float(np.clip(z + v * STEP / 20, -1e-5, 1e-5))
+            v += (u - 5e5 * z - 14 * v) / 4.2 * STEP / 20
+            x += v * STEP / 20
+    signals = {"reference": reference, "position": position, "force": force}
+    return Log("axis", time, STEP, signals, (slice(0, len(time)),))
+
+
+LOG = recorded()
+ACCELERATION = np.gradient(np.gradient(LOG["reference"], STEP), STEP)
+
+
+def changed(**signals: np.ndarray) -> Log:
+    return replace(LOG, signals={**LOG.signals, **signals})
+
+
+def test_a_sound_record_agrees() -> None:
+    """Slope 1 within 5 %, less than 10 % left, no lag of more than a sample."""
+    best = Witness(LOG, STAGE.flat()).best()
+    assert best.agrees
+    assert best.slope == pytest.approx(1, abs=0.05)
+    assert best.left < 0.1
+    assert abs(best.lag) <= STEP
+    assert (best.clock, best.mass) == (1, 0)
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.5, 10.0])
+def test_a_wrong_clock_is_found_by_its_factor(factor: float) -> None:
+    slow = replace(LOG, time=factor * LOG.time, sample_time=factor * STEP)
+    best = Witness(slow, STAGE.flat()).best()
+    assert best.agrees
+    assert best.clock == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize("factor", [-1.0, 1e-3, 0.5, 2.0])
+def test_a_wrong_scale_or_sign_of_the_force_is_its_slope(factor: float) -> None:
+    best = Witness(changed(force=factor * LOG["force"]), STAGE.flat()).best()
+    assert best.explains
+    assert not best.agrees
+    assert best.slope == pytest.approx(factor, rel=0.05)
+
+
+@pytest.mark.parametrize("mass", [4.0, -4.0])
+def test_feedforward_is_found_whether_the_force_has_it_or_lacks_it(mass: float) -> None:
+    best = Witness(changed(force=LOG["force"] + mass * ACCELERATION), STAGE.flat()).best()
+    assert best.agrees
+    assert best.mass == pytest.approx(mass, rel=0.15)
+
+
+def test_gains_that_are_switched_have_two_slopes() -> None:
+    switched = np.where(LOG.time < 3.5, 1.0, 0.56) * LOG["force"]
+    witness = Witness(changed(force=switched), STAGE.flat())
+    assert not witness.best().explains
+    slopes = witness.at_both_ends()
+    assert slopes is not None
+    assert slopes == pytest.approx((1.0, 0.56), rel=0.05)
+
+
+def test_another_controller_is_none_of_these() -> None:
+    other = STAGE.replace({"controller.kp": "1e3 N/m", "controller.ki": "2e6 N/(m*s)", "controller.kd": "5 N*s/m"})
+    witness = Witness(LOG, other.flat())
+    assert not witness.best().explains
+
+
+def test_forces_at_a_limit_do_not_count() -> None:
+    """An integral that is clamped at the limit restarts elsewhere: each stretch between limits has its own mean."""
+    peak = float(np.abs(LOG["force"]).max())
+    best = Witness(recorded(limit=0.6 * peak), STAGE.flat()).best()
+    assert best.agrees
