@@ -21,7 +21,7 @@ from friso.materials import materials
 from friso.questions.design.figures import design_figures
 from friso.questions.design.steps import requirement_rows, steps
 from friso.questions.design.window import lower, upper
-from friso.questions.design.words import headline, need_words, refusal, so_far
+from friso.questions.design.words import need_words, of_laws, refusal, so_far, verdicts
 from friso.questions.flexure.drawing import drawing_svg
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json, unit_suffix
@@ -32,9 +32,6 @@ from friso.stage import Stage
 LEAVES_STEP = 2
 """Number of the step that shows the drawing and the requirements."""
 
-MOST_SENTENCES = 3
-"""Number of verdicts in the answer; those on friction laws behind them are details."""
-
 NOT_VERIFIED = "design-not-verified.toml"
 """Name of the stage file of an unfinished design."""
 
@@ -44,8 +41,8 @@ def blocks(design: Design | UnfinishedDesign) -> list[AnswerBlock]:
     numbers = partial(design_document, design)
     if isinstance(design, UnfinishedDesign):
         return [AnswerBlock(sentences=so_far(design), numbers=numbers)]
-    colours, sentences = zip(*headline(design)[:MOST_SENTENCES], strict=True)
-    laws = [sentence for _, sentence in headline(design)[MOST_SENTENCES:]]
+    colours, sentences = zip(*verdicts(design), strict=True)
+    laws = [sentence for _, sentence in of_laws(design)]
     titled = [f"{step.title}: {' '.join(step.sentences)}" for step in steps(design)]
     details = [*laws, *(f"{number}. {text}" for number, text in enumerate(titled, 1))]
     draw = partial(design_figures, design)
@@ -56,7 +53,7 @@ def page_values(design: Design) -> dict[str, Any]:
     """Return the steps that the page shows, with the drawing and how much of each requirement is used."""
     return {
         "spec": design.spec,
-        "laws": headline(design)[MOST_SENTENCES:],
+        "laws": of_laws(design),
         "steps": steps(design),
         "leaves": LEAVES_STEP,
         "drawing": Markup(_drawing(design)),
