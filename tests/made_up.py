@@ -137,6 +137,7 @@ def fake_stage(
         source="made up",
         note="",
         unknown_keys=(),
+        assumed_keys=(),
         doubt="",
         axis_kind=LINEAR,
         conditions=None,

@@ -615,7 +615,8 @@ def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
     assert faster.rests
     quick = replace(faster, option=replace(faster.option, factor=2.0))
     line = answer(replace(hunting, results=(base, quick), needed=needed))[-1]
-    assert "from a bandwidth of 12.0 Hz on" in line  # as built, it brings the machines to rest there
+    assert "at a bandwidth of 12.0 Hz" in line  # as built, it brings the machines to rest there
+    assert "not at all higher ones" in line
     none = answer(replace(hunting, needed=replace(needed, shares=needed.shares * 0.5)))[-1]
     assert "does not bring 99 % of the machines to rest at any bandwidth up to 16.0 Hz" in none
     assert comparison.needed is not None
