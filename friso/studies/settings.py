@@ -70,6 +70,15 @@ class StudySettings(Settings):
     most_open_draws: float = setting(0.05, "")
     """Largest share of draws that hunt or have no certain verdict where the others decide: advice holds for 95 %."""
 
+    accelerations_of_friction: tuple[float, float] = setting((0.01, 10.0), "m/s^2")
+    """Range of Coulomb friction over mass that bearings have, from air-like to a preloaded screw on a light stage."""
+
+    levels_of_friction: int = setting(10, "")
+    """Levels of Coulomb friction tried over that range, a factor of two apart."""
+
+    machines_of_a_level: int = setting(32, "")
+    """Machines drawn at each level of Coulomb friction."""
+
     most_draws: int = setting(100_000, "")
     """Most draws. At the edge of hunting a draw takes 50 ms, so more take hours."""
 
