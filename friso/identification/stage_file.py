@@ -144,12 +144,14 @@ def with_unknown(
     tables = [name for name in left if "." not in name]
     unknown = [*(key for key in unknown if key.partition(".")[0] not in tables), *tables]
     listed = dict.fromkeys([*stage.unknown_keys, *unknown])
+    follows = {key for key, origin in origins.items() if origin.startswith(FOLLOWS)}
     bounds = {one.name: (one.low, one.high) for one in estimates if not one.determined}
-    wide = {key for key, interval in stage.uncertain().items() if interval.wide and origins.get(key) == NOT_IDENTIFIED}
-    open_keys = [*wide, *(key for key in listed if key not in uncertain)]
+    bounded = {key: one for key, one in stage.uncertain().items() if origins.get(key) == NOT_IDENTIFIED}
+    wide = {key for key, interval in bounded.items() if interval.wide and key != "friction.coulomb"}
+    open_keys = [*wide, *(key for key in listed if key not in uncertain or key in follows)]
     keys, flat, changes = stage.numeric_keys(), stage.flat(), {}
     for key, ends in usual_ranges(stage, open_keys, bounds).items():
-        own = ends[0] if origins.get(key) == CHOSEN or key in wide else flat[key]
+        own = ends[0] if origins.get(key) == CHOSEN or key in wide | follows else flat[key]
         changes[key] = written((min(ends[0], own), max(ends[1], own)), keys[key].unit)
     return stage.replace({**changes, **({"unknown": ", ".join(listed)} if listed else {})})
 

@@ -104,12 +104,12 @@ class DrawnBandwidths:
 
     @property
     def quiet(self) -> np.ndarray:
-        """Tell at which bandwidths no drawn stage hunts, for certain, (bandwidths,)."""
-        return (self.hunts == 0).all(axis=0)
+        """Tell at which bandwidths nearly all drawn stages surely do not hunt, (bandwidths,)."""
+        return _quiet(self.hunts)
 
     @property
     def cure(self) -> tuple[float, float] | None:
-        """Return the first range of faster bandwidths at which no drawn stage hunts, as factors; None without one.
+        """Return the first factors between which nearly no drawn stage hunts on a faster controller; None without them.
 
         It reaches over a coarse step at least, so that the cure does not stand on an edge.
         """
@@ -137,14 +137,19 @@ class DrawnBandwidths:
         return low, high
 
 
+def _quiet(hunts: np.ndarray) -> np.ndarray:
+    """Tell whether nearly all stages surely do not hunt; `hunts` has a row for each, as in `DrawnBandwidths`."""
+    return (hunts != 0).mean(axis=0) <= settings.most_open_draws
+
+
 FINEST_STEP = 1e-6
 """Relative difference below which two bandwidths are one."""
 
 
 def by_bandwidth(stage: Stage, sample: Sample) -> DrawnBandwidths | None:
-    """Find at which bandwidths the first drawn stages hunt: faster until none does, or slower until most do.
+    """Find at which bandwidths the first drawn stages hunt: faster until nearly none does, or slower until most do.
 
-    The number of stages follows from a fixed amount of work. Where none hunts any more, a survey of all attractors
+    The number of stages follows from a fixed amount of work. Where nearly none hunts, a survey of all attractors
     confirms that. Returns None if the controller cannot be made faster, or if the stages cannot hunt.
     """
     own = bandwidth(stage.flat())
@@ -204,12 +209,12 @@ class _Ladder:
         return self.columns[place]
 
     def climb(self) -> None:
-        """Try faster controllers until no stage hunts over a coarse step, and find the first of these bandwidths."""
+        """Try faster controllers until nearly no stage hunts over a coarse step, and find the first such bandwidth."""
         place, quiet = 0, 0
         while quiet < 2 and self.within(place + self.coarse):
             place += self.coarse
             column = self.hunts(place)
-            quiet = 0 if np.any(column != 0) else quiet + 1
+            quiet = quiet + 1 if _quiet(column) else 0
             if np.isnan(column).mean() > settings.most_unstable_draws:
                 return
         if quiet < 2:
@@ -217,8 +222,8 @@ class _Ladder:
         low, high = place - 2 * self.coarse, place - self.coarse
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (middle, high) if np.any(self.hunts(middle) != 0) else (low, middle)
-        while np.any(self.hunts(high, thoroughly=True) != 0) and high < place:
+            low, high = (low, middle) if _quiet(self.hunts(middle)) else (middle, high)
+        while not _quiet(self.hunts(high, thoroughly=True)) and high < place:
             high += 1
 
     def descend(self) -> None:

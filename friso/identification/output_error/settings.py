@@ -71,6 +71,10 @@ class OutputErrorSettings(Settings):
     """Random seed of the starts, which makes results repeatable."""
 
     # Plausible ranges of a bearing's parameters.
+    coulomb_friction_of_one_way: tuple[float, float] = setting((0.18, 2.2), "")
+    """Range left to Coulomb friction, in shares of its sum with a constant force. A cable or a tilt helps a motion by
+    half of the friction, or opposes it by four times as much."""
+
     highest_friction_ratio: float = setting(4.0, "")
     """Largest plausible ratio of static to Coulomb friction of a bearing. The thesis's rig has 3."""
 

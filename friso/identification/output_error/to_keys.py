@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -94,11 +94,16 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
     if SHARE in unknown:
         why = f"the log shows the sum of both masses, {fit.value(MASS):.4g} kg, not how it is split"
         unknown |= {"masses.cart": why, "masses.stage": why}
-    if "friction.coulomb" in parameters and not any(name.startswith("bias.") for name in parameters):
+    if _one_way(parameters):
         total = f"{fit.value('friction.coulomb'):.4g} {parameters['friction.coulomb'].unit}"
         why = f"the log moves in one direction only: its sum with a constant force is {total}"
         unknown |= {"friction.coulomb": why, "friction.static": why}
     return unknown
+
+
+def _one_way(parameters: Collection[str]) -> bool:
+    """Tell whether a fit of some parameters has Coulomb friction, but no constant force from which to tell it."""
+    return "friction.coulomb" in parameters and not any(name.startswith("bias.") for name in parameters)
 
 
 def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.ndarray:
@@ -135,11 +140,15 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
 
     `owner` is the parameter's name. The range is the one that the parameter has in the fit, for any bearing. For the
     ratio of static to Coulomb friction it is a range of static friction. The fitted value is no bound, because it
-    compensates for what the model lacks. Nothing bounds a parameter that every motion shows, if this record does not;
+    compensates for what the model lacks. Of motion in one direction the sum with a constant force bounds Coulomb
+    friction. Nothing bounds a parameter that every motion shows, if this record does not;
     nor static friction and bristles without Coulomb friction, from which their ranges follow.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter, number_of = parameters[owner], {name: number for number, name in enumerate(parameters)}
+    if owner == "friction.coulomb" and _one_way(parameters):
+        low, high = settings.coulomb_friction_of_one_way
+        return low * fit.value(owner), high * fit.value(owner)
     of_coulomb = owner in (RATIO, *BRISTLES) and number_of["friction.coulomb"] not in fit.bounded
     if parameter.core or of_coulomb:
         return -np.inf, np.inf

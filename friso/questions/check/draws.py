@@ -103,7 +103,7 @@ def _verdict(name: str, draws: Draws) -> str:
         does = f"may hunt: {share_with_interval(attracted)} of {count} machines drawn do{_swings(fates)}{doubt}"
         return f"{loop}{does}.{_hangs_on(fates, draws)}"
     if not attracted.probability:
-        rare = f"at most {percentage(attracted.high)} of all such machines do"
+        rare = f"at most {percentage(attracted.high)} % of all such machines do"
         return f"{loop}does not hunt: none of {count} machines drawn does ({rare}{doubt})."
     always = after_this.probability == attracted.probability
     does = "hunts" if always else f"can hunt, and {share_with_interval(after_this)} of the machines do after this move"
@@ -147,10 +147,11 @@ def _at_other_bandwidths(name: str, draws: Draws) -> str:
         if tried.cure is None:
             top = bandwidth(float(tried.factors[-1]))
             freed = _freed(name, draws, " Cure: free the joint.")
-            return f" No bandwidth up to {top} keeps all of {count} machines from hunting.{freed}"
+            return f" No bandwidth up to {top} surely keeps 95 % of {count} machines from hunting.{freed}"
         low, high = tried.cure
         freed = _freed(name, draws, ", or free the joint")
-        seen = f"none of {count} machines hunts there, nor at {bandwidth(high)}"
+        quiet = int(np.count_nonzero(tried.at(low) == 0))
+        seen = f"{quiet} of {count} machines surely do not hunt there, nor at {bandwidth(high)}"
         return f" Cure: {_faster(draws.stage, tried, low)} or more ({seen}){freed}."
     if edge is None:
         return f" None of {count} hunts at {bandwidth(float(tried.factors[0]))} either."
