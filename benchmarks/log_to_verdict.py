@@ -1,10 +1,11 @@
 """Follow drawn machines from their log to the verdict, and compare with what the machines do.
 
-`python -m benchmarks.log_to_verdict [--machines 20] [--first 0] [--kept FILE]` draws rigid machines (tests/machines.py),
-simulates a log of moves of each with noise and digits, and asks `friso identify --check` with the machine's own
-controller, as a user would. Of ten machines two move nearly one way alone, two move too little, one has a log with a
-wrong clock, unit or sign, and five have sound logs. Truth is the check of the true machine, and, for the cure told, of
-the true machine with that bandwidth. With `--kept`, results are appended to a file as they come, and not computed again.
+`python -m benchmarks.log_to_verdict [--machines 20] [--first 0] [--kept FILE]` draws rigid machines
+(tests/machines.py), simulates a log of moves of each with noise and digits, and asks `friso identify --check` with the
+machine's own controller, as a user would. Of ten machines two move one way alone, two log one move alone, one has a log
+with a wrong clock, unit or sign, and five have sound logs. Truth is the check of the true machine, and, for the cure
+told, of the true machine with that bandwidth. With `--kept`, results are appended to a file as they come, and not
+computed again.
 """
 
 from __future__ import annotations

@@ -41,13 +41,12 @@ class FrictionLevels:
 def friction_levels(stage: Stage) -> FrictionLevels | None:
     """Draw machines like a stage without friction at levels of Coulomb friction, and see which of them hunt.
 
-    Levels are those that bearings of such a mass may have. Returns None for a stage that states friction, that moves
-    for ever, or whose loop cannot hunt with any friction.
+    Levels are those that bearings of such a mass may have. Returns None for a stage that states its friction, be it
+    none, that moves for ever, or whose loop cannot hunt with any friction.
     """
-    flat = stage.flat()
-    if flat["friction.model"] != "none":
+    if stage.friction is not None:
         return None
-    mass = float(moving_mass(flat))
+    mass = float(moving_mass(stage.flat()))
     levels = mass * np.geomspace(*settings.accelerations_of_friction, settings.levels_of_friction)
     columns = []
     for level in levels:

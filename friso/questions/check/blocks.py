@@ -12,6 +12,7 @@ from friso.questions.check.cases import case_document, rows, rows_behind
 from friso.questions.check.draws import draws_details, draws_document, draws_figure, draws_rows, draws_sentences
 from friso.questions.check.isolator_words import isolator_document, isolator_sentence
 from friso.questions.check.laws import laws_columns, laws_document, laws_rows, laws_sentences
+from friso.questions.check.levels import levels_document, levels_sentence
 from friso.questions.check.margin_words import joint_sentences
 from friso.questions.check.words import activity_sentences, answer, between_surveyed, details_of
 from friso.shown.blocks import AnswerBlock
@@ -61,6 +62,11 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
         yield AnswerBlock(
             sentences=[isolator_sentence(suggested)],
             numbers=lambda: {"isolator": plain_json(isolator_document(suggested))},
+        )
+    if levels := check.friction_levels:
+        yield AnswerBlock(
+            sentences=[levels_sentence(levels)],
+            numbers=lambda: plain_json({"friction_levels": levels_document(levels)}),
         )
     if draws:
         yield AnswerBlock(

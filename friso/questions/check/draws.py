@@ -99,6 +99,8 @@ def _verdict(name: str, draws: Draws) -> str:
     doubt = f", {open_ones} of them not for certain" if open_ones else ""
     if open_ones == count:
         return f"{loop}what {count} machines drawn do is not certain."
+    if draws.split(name) and not attracted.probability:
+        return f"{loop}none of {count} machines drawn surely hunts{doubt.replace(' of them', '')}."
     if draws.split(name):
         does = f"may hunt: {share_with_interval(attracted)} of {count} machines drawn do{_swings(fates)}{doubt}"
         return f"{loop}{does}.{_hangs_on(fates, draws)}"
@@ -106,7 +108,9 @@ def _verdict(name: str, draws: Draws) -> str:
         rare = f"at most {percentage(attracted.high)} % of all such machines do"
         return f"{loop}does not hunt: none of {count} machines drawn does ({rare}{doubt})."
     always = after_this.probability == attracted.probability
+    never = "settles after this move, but another move or a kick makes it hunt"
     does = "hunts" if always else f"can hunt, and {share_with_interval(after_this)} of the machines do after this move"
+    does = does if after_this.probability else never
     return f"{loop}{does}{_swings(fates)} (all of {count} machines drawn{doubt})."
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from friso.hunting.criteria import Verdict
     from friso.remedies.catalogue import Suggestion
     from friso.shown.files import Files
+    from friso.studies.friction_levels import FrictionLevels
     from friso.studies.laws.verdicts import VerdictsByLaw
 
 
@@ -54,6 +55,15 @@ class CheckAnswer(Answer):
     def interrupted(self) -> bool:
         """Tell whether Ctrl-C ended the work before all machines were drawn."""
         return self.cut
+
+    @cached_property
+    def friction_levels(self) -> FrictionLevels | None:
+        """Return for which friction a stage would hunt whose stage file states none; None for any other."""
+        if self.stage.friction is not None:
+            return None
+        from friso.studies.friction_levels import friction_levels
+
+        return friction_levels(self.stage)
 
     @cached_property
     def isolator(self) -> Suggestion | None:

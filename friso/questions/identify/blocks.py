@@ -15,6 +15,7 @@ from friso.identification.method import Experiment, Identification, Prediction
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import with_origins
 from friso.questions.identify import words
+from friso.questions.identify.against_words import against_document, against_sentences
 from friso.questions.identify.figures import identify_figures
 from friso.questions.identify.words import headline
 from friso.shown.blocks import AnswerBlock
@@ -39,14 +40,24 @@ def blocks(answer: IdentifyAnswer) -> list[AnswerBlock]:
         draw=lambda: identify_figures(result, predictions),
         numbers=lambda: identify_document(result, inputs, predictions),
     )
+    against = [
+        AnswerBlock(
+            sentences=[text for name, one in answer.compared.items() for text in against_sentences(name, suspect, one)],
+            numbers=lambda: plain_json(
+                {"against": [against_document(name, one) for name, one in answer.compared.items()]}
+            ),
+        )
+        for suspect in [answer.suspect]
+        if suspect is not None
+    ]
     if checked is None:
-        return [identified]
+        return [*against, identified]
     verdict = AnswerBlock(sentences=checked.sentences(), numbers=lambda: {"check": checked.document()})
     tables = [
         AnswerBlock(title=table.title, columns=table.columns, rows=table.rows, behind=table.behind)
         for table in checked.tables()
     ]
-    return [identified, verdict, *tables]
+    return [*against, identified, verdict, *tables]
 
 
 def page_values(answer: IdentifyAnswer) -> dict[str, Any]:

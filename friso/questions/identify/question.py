@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from friso.identification.method import Identification
     from friso.questions.check.question import CheckAnswer
     from friso.shown.pages import Report
+    from friso.studies.contradiction import Contradiction
 
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
@@ -55,12 +56,15 @@ class IdentifyAnswer(Answer):
 
     `result` is an `Identification` with the estimates, and with a `stage` if the logs describe a whole machine.
     `inputs` are the files read, and `predictions` the predictions of other logs. `checked` is the answer of `friso
-    check` on the stage; None unless that was asked for.
+    check` on the stage; None unless that was asked for. `compared` has, by log, whether it contradicts the stage
+    `suspect`, if that was asked for.
     """
 
     inputs: Sequence[LogFile]
     predictions: Sequence[Prediction]
     checked: CheckAnswer | None
+    compared: Keyed[str, Contradiction]
+    suspect: Stage | None
 
     @property
     def condition(self) -> str:
@@ -110,6 +114,7 @@ def identify(
     band: FrequencyBand | None = None,
     period: TimeLike | None = None,
     check: bool = False,
+    against: StageLike | None = None,
     folder: Path = Path(),
     keep: MappingKeeper | None = None,
     progress: Progress = silent,
@@ -135,6 +140,9 @@ def identify(
         Period of a periodic excitation, "5 s" or a number [s].
     check : bool
         Also say whether the identified stage hunts, as friso check does of the stage file that is written.
+    against : Stage, path or dict, optional
+        A stage whose verdict the logs may contradict: do they hunt as it does, and which change would explain it.
+        Without `stage`, it is also what is known beforehand.
     folder : Path
         Where what was said of channels is looked for, if not beside the logs.
     keep : callable, optional
@@ -159,6 +167,7 @@ def identify(
         first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
         wanted = "a stage whose keys to override"
         raise InputError("set", str(first), wanted, "--stage stage.toml (in Python stage=...)")
+    stage = against if stage is None else stage
     tables = {} if stage is None else inputs.tables_of(stage)
     lacking = [name for name in TOLD_BY_LOGS if name not in tables] if "controller" in tables else []
     assumed = None if stage is None or lacking else inputs.stage_of(stage, set)
@@ -196,7 +205,30 @@ def identify(
         from friso.questions.check.question import checked_stage
 
         checked = checked_stage(result.stage, result.correlations, progress=progress)
-    return IdentifyAnswer(result, inputs=held, predictions=predictions, axis_kind=axis_kind, checked=checked)
+    suspect = None if against is None else inputs.stage_of(against, None)
+    compared = {} if suspect is None else _compared(suspect, [log for log, _ in sources if isinstance(log, Log)])
+    return IdentifyAnswer(
+        result,
+        inputs=held,
+        predictions=predictions,
+        axis_kind=axis_kind,
+        checked=checked,
+        compared=compared,
+        suspect=suspect,
+    )
+
+
+def _compared(stage: Stage, logs: Sequence[Log]) -> dict[str, Contradiction]:
+    """Compare what the logs show at rest with the verdict on a stage, by the names of the logs.
+
+    Raises InputError if no log has position and reference.
+    """
+    from friso.studies.contradiction import contradiction, standing_of
+
+    usable = [log for log in logs if "reference" in log and "position" in log]
+    if not usable:
+        raise InputError("against", "no log with position and reference", "one of both", "--map reference=CHANNEL")
+    return {log.name: contradiction(stage, standing_of(log)) for log in usable}
 
 
 def _worth_keeping(file: LogFile, result: Identification) -> Mapping:

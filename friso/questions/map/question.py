@@ -17,6 +17,7 @@ import numpy as np
 
 from friso.axis import speak_of
 from friso.errors import InputError, StoreError
+from friso.hunting import is_moved_evenly
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import LOGGER, Address, AxisPoints, Changes, Links, MetricName, StageLike, Tolerance
@@ -286,6 +287,8 @@ def sweep(
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else CONFIRMED_FROM)
         else:
+            if metric is None and not confirm and is_moved_evenly(inputs.read_stage(stage, set)):
+                metric = "stick_slip"
             metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
             chosen = inputs.read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
             if runs_as_built(chosen, [metric]):
