@@ -48,7 +48,7 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Explanation:
+class ExplainingChange:
     """A change that makes the stage do what the log shows: its name, and the factor on its keys.
 
     `swing` [m] and `period` [s] are those of the changed stage, None if it rests.
@@ -72,7 +72,7 @@ class Contradiction:
     certain: bool
     swing: float | None
     period: float | None
-    explanations: tuple[Explanation, ...]
+    explanations: tuple[ExplainingChange, ...]
 
     @property
     def agrees(self) -> bool:
@@ -166,7 +166,7 @@ def _attracted(flat: Mapping[str, Any], factors: np.ndarray) -> tuple[np.ndarray
 
 def _nearest(
     name: str, standing: Standing, factors: np.ndarray, attracted: tuple[np.ndarray, ...]
-) -> Explanation | None:
+) -> ExplainingChange | None:
     """Return the change with the smallest factor that makes the stage do what the log shows; None without one."""
     attracts, certain, swings, periods = attracted
     for number in np.argsort(abs(np.log(factors))):
@@ -175,5 +175,5 @@ def _nearest(
         swing, period = (float(values[number]) if attracts[number] else None for values in (swings, periods))
         fits = alike(standing, swing, period) if standing.hunts else not attracts[number]
         if fits:
-            return Explanation(name, float(factors[number]), swing, period)
+            return ExplainingChange(name, float(factors[number]), swing, period)
     return None

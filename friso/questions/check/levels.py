@@ -20,7 +20,8 @@ def levels_sentence(levels: FrictionLevels) -> str:
     also = f", and half from {with_unit(half[0], 'N')} on" if half else ""
     return (
         "The stage file has no [friction]: with usual bearings some such machines hunt from "
-        f"{with_unit(some[0], 'N')} of Coulomb friction on{also}. A log of moves in both directions shows how much yours has (friso identify)."
+        f"{with_unit(some[0], 'N')} of Coulomb friction on{also}. A log of moves in both directions shows how much "
+        "yours has (friso identify)."
     )
 
 

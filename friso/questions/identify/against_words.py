@@ -8,7 +8,7 @@ from typing import Any
 from friso.quantities import plain_factor
 from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
 from friso.stage import Stage
-from friso.studies.contradiction import CHANGES, Contradiction, Explanation
+from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange
 
 MOST_EXPLANATIONS = 3
 """Largest number of changes that are told."""
@@ -41,7 +41,7 @@ def _swing(swing: float | None, period: float | None) -> str:
     return f"{plus_minus(swing or 0.0, 'm')} every {with_unit(period or 0.0, 's')}"
 
 
-def _change(stage: Stage, change: Explanation) -> str:
+def _change(stage: Stage, change: ExplainingChange) -> str:
     """Write a change by its factor, and by the value of its key if it has a single one."""
     times = f"{change.name} {plain_factor(change.factor)} times"
     keys, flat = CHANGES[change.name], stage.flat()
