@@ -97,12 +97,12 @@ def followed(seed: int) -> dict[str, Any]:
     if answer.checked is None:
         return result | {"asked": "no stage"}
     checked = answer.checked
-    given = checked["given"]
+    case_checked = checked["given"]
     draws = checked.draws
     result["headline"] = checked.sentences()[0]
     result["condition"] = checked.condition
-    result["sure"] = bool(given.judgement.hunting.certain and not checked.condition)
-    result["attracted"] = given.verdict in ATTRACTED
+    result["sure"] = bool(case_checked.judgement.hunting.certain and not checked.condition)
+    result["attracted"] = case_checked.verdict in ATTRACTED
     if draws is not None:
         document = checked.document()["cases"]["given"]["draws"]
         result["draws"] = {key: document[key] for key in ("amplitude_m", "period_s", "edge_hz", "cure_hz", "split")}
