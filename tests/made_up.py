@@ -138,6 +138,7 @@ def fake_stage(
         note="",
         unknown_keys=(),
         assumed_keys=(),
+        friction=object(),
         doubt="",
         axis_kind=LINEAR,
         conditions=None,

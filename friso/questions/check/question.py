@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -50,6 +50,11 @@ class CheckAnswer(Answer):
     draws: Draws | None
     laws: VerdictsByLaw | None
     cut: bool
+
+    @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys over which machines were drawn."""
+        return [*self.draws.sample.keys] if self.draws else ()
 
     @property
     def interrupted(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 from friso.interface import inputs
@@ -14,6 +14,11 @@ from friso.quantities import Quantity, positive
 
 class CompareAnswer(Answer):
     """Several options on the same machines; `result` is a `Comparison`."""
+
+    @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys over which machines are drawn."""
+        return [*self.result.stage.uncertain()]
 
     @property
     def interrupted(self) -> bool:

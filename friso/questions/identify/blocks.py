@@ -57,7 +57,7 @@ def blocks(answer: IdentifyAnswer) -> list[AnswerBlock]:
         AnswerBlock(title=table.title, columns=table.columns, rows=table.rows, behind=table.behind)
         for table in checked.tables()
     ]
-    return [*against, identified, verdict, *tables]
+    return [*against, verdict, identified, *tables]
 
 
 def page_values(answer: IdentifyAnswer) -> dict[str, Any]:

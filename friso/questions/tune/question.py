@@ -46,6 +46,11 @@ class TuneAnswer(Answer):
     status = 2
 
     @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys over which machines are drawn."""
+        return [*self.result.stage.uncertain()]
+
+    @property
     def failure(self) -> str:
         """Say that a change is needed and none surely works; empty otherwise."""
         if not self.result.needed or self.result.working:
@@ -155,9 +160,9 @@ def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
     if outcome.certainty != "works" or outcome.stage is None or outcome.measured is None:
         return
     changed = listed(changes(stage, outcome.stage), "and")
-    when = slowest_time(outcome.measured, goal)
+    when, condition = slowest_time(outcome.measured, goal), unknown_condition(stage, [*stage.uncertain()])
     LOGGER.info(
-        f"{unknown_condition(stage)}this works: {changed}, in position after {when}; others are tried",
+        f"{condition}this works: {changed}, in position after {when}; others are tried",
         extra={"meanwhile": True},
     )
 
