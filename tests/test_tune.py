@@ -549,7 +549,7 @@ def test_a_least_change_before_an_interrupt_is_that_so_far(tuning: Advice) -> No
     whole = replace(tuning, interrupted=False)
     for advice, so_far in ((tuning, " so far"), (whole, "")):
         line = next(line for line in answer(advice) if line.startswith("Set controller.crossover"))
-        assert f"the least change that works{so_far} (" in line
+        assert f"the cheapest change that works{so_far} (" in line
 
 
 def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning: Advice) -> None:

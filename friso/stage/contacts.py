@@ -140,7 +140,7 @@ def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Conta
     `bounds` cut them. A key has no range if nobody knows these either, or if nothing is usual for it.
     """
     flat, intervals, axis = stage.flat(), stage.uncertain(), stage.axis_kind
-    guess = getattr(stage.friction, "guess", "")
+    guess = getattr(stage.friction, "guess", None)
     contact = _understood(guess, axis)[0] if guess else any_contact(axis)
 
     def known(key: str) -> ContactRange | None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Keyed
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from friso.axis import LINEAR, speak_of
@@ -63,8 +64,8 @@ class IdentifyAnswer(Answer):
     inputs: Sequence[LogFile]
     predictions: Sequence[Prediction]
     checked: CheckAnswer | None
-    compared: Keyed[str, Contradiction]
-    suspect: Stage | None
+    compared: Keyed[str, Contradiction] = MappingProxyType({})
+    suspect: Stage | None = None
 
     @property
     def condition(self) -> str:

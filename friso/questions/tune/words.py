@@ -196,7 +196,7 @@ _SAYS: Sequence[Alternatives[Advice]] = (
     ),
     (
         (lambda of: not of.needed, "The stage meets the goal as it is: {brings}."),
-        (lambda of: of.working, "Set {changes}: the least change that works{for_all}{so_far} ({name})."),
+        (lambda of: of.working, "Set {changes}: the cheapest change that works{for_all}{so_far} ({name})."),
         (
             lambda of: of.for_large_moves,
             "For moves of {from} and more alone: set {changes} ({name}); no change works for all moves.",
