@@ -171,7 +171,7 @@ def estimate_text(estimate: Estimate) -> str:
     """Write an estimate for a stage file: "20.4 N +/- 0.1 N", or a range "1 N .. 2.5 N"."""
     unit = f" {estimate.unit}" if estimate.unit else ""
     if not estimate.determined:
-        return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
+        return written((estimate.low, estimate.high), estimate.unit)
     half, digits = round_uncertainty(estimate.half_width)
     value = f"{round(estimate.value, digits) + 0.0:.{max(digits, 0)}f}"  # + 0.0: no minus before a zero
     return f"{value}{unit} +/- {half}{unit}"

@@ -166,7 +166,7 @@ def cut(ends: ContactRange, other: ContactRange) -> ContactRange:
 
 def written(ends: ContactRange, unit: str) -> str:
     """Write a range for a stage file: "1.2 N .. 3 N"."""
-    return " .. ".join(f"{end:.3g} {unit}".rstrip() for end in ends)
+    return " .. ".join(f"{float(f'{end:.3g}'):.12g} {unit}".rstrip() for end in ends)
 
 
 def _stated(table: Mapping[str, Any], key: str, axis: AxisKind) -> ContactRange | None:
