@@ -146,12 +146,11 @@ def with_unknown(
     listed = dict.fromkeys([*stage.unknown_keys, *unknown])
     follows = {key for key, origin in origins.items() if origin.startswith(FOLLOWS)}
     bounds = {one.name: (one.low, one.high) for one in estimates if not one.determined}
-    bounded = {key: one for key, one in stage.uncertain().items() if origins.get(key) == NOT_IDENTIFIED}
-    wide = {key for key, interval in bounded.items() if interval.wide and key != "friction.coulomb"}
-    open_keys = [*wide, *(key for key in listed if key not in uncertain or key in follows)]
+    bounded = {key for key in stage.uncertain() if origins.get(key) == NOT_IDENTIFIED} - {"friction.coulomb"}
+    open_keys = [*bounded, *(key for key in listed if key not in uncertain or key in follows)]
     keys, flat, changes = stage.numeric_keys(), stage.flat(), {}
     for key, ends in usual_ranges(stage, open_keys, bounds).items():
-        own = ends[0] if origins.get(key) == CHOSEN or key in wide | follows else flat[key]
+        own = ends[0] if origins.get(key) == CHOSEN or key in bounded | follows else flat[key]
         changes[key] = written((min(ends[0], own), max(ends[1], own)), keys[key].unit)
     return stage.replace({**changes, **({"unknown": ", ".join(listed)} if listed else {})})
 
