@@ -1,10 +1,11 @@
 """Follow drawn machines from their log to the verdict, and compare with what the machines do.
 
-`python -m benchmarks.log_to_verdict [--machines 20] [--first 0] [--kept FILE]` draws rigid machines (tests/machines.py),
-simulates a log of moves of each with noise and digits, and asks `friso identify --check` with the machine's own
-controller, as a user would. Of ten machines two move nearly one way alone, two move too little, one has a log with a
-wrong clock, unit or sign, and five have sound logs. Truth is the check of the true machine, and, for the cure told, of
-the true machine with that bandwidth. With `--kept`, results are appended to a file as they come, and not computed again.
+`python -m benchmarks.log_to_verdict [--machines 20] [--first 0] [--kept FILE]` draws rigid machines
+(tests/machines.py), simulates a log of moves of each with noise and digits, and asks `friso identify --check` with the
+machine's own controller, as a user would. Of ten machines two move one way alone, two log one move alone, one has a log
+with a wrong clock, unit or sign, and five have sound logs. Truth is the check of the true machine, and, for the cure
+told, of the true machine with that bandwidth. With `--kept`, results are appended to a file as they come, and not
+computed again.
 """
 
 from __future__ import annotations
@@ -96,12 +97,12 @@ def followed(seed: int) -> dict[str, Any]:
     if answer.checked is None:
         return result | {"asked": "no stage"}
     checked = answer.checked
-    given = checked["given"]
+    case_checked = checked["given"]
     draws = checked.draws
     result["headline"] = checked.sentences()[0]
     result["condition"] = checked.condition
-    result["sure"] = bool(given.judgement.hunting.certain and not checked.condition)
-    result["attracted"] = given.verdict in ATTRACTED
+    result["sure"] = bool(case_checked.judgement.hunting.certain and not checked.condition)
+    result["attracted"] = case_checked.verdict in ATTRACTED
     if draws is not None:
         document = checked.document()["cases"]["given"]["draws"]
         result["draws"] = {key: document[key] for key in ("amplitude_m", "period_s", "edge_hz", "cure_hz", "split")}

@@ -11,12 +11,21 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from friso.axis import LINEAR
 from friso.equations.controllers.pid_gains import PidGains
 from friso.equations.controllers.van_dijk import VanDijk
 from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare, ReturnMap, Target
-from friso.questions.check.page import check_html
+from friso.questions.check.question import CheckAnswer
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.figure import Axis, Figure, Limit, Map, Markers, Panel, Series
+
+
+def check_html(cases: dict[str, Any]) -> str:
+    """The page of cases that have their traces, and for which no isolator is looked up."""
+    stage = next(iter(cases.values())).stage if "given" not in cases else cases["given"].stage
+    answer = CheckAnswer(cases, stage=stage, draws=None, laws=None, cut=False, traced=cases, isolator=None)
+    return answer.page().html()
+
 
 UNITS = {
     "reference": "m",
@@ -128,7 +137,10 @@ def fake_stage(
         source="made up",
         note="",
         unknown_keys=(),
+        assumed_keys=(),
+        friction=object(),
         doubt="",
+        axis_kind=LINEAR,
         conditions=None,
         **dict.fromkeys(("drive", "rail", "cable", "floor")),
         joint=joint,

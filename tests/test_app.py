@@ -218,6 +218,18 @@ def test_whoever_has_no_key_and_reads_slowly_is_cut_off_and_a_question_is_not(
         assert answer.result(LIMIT)[-1]["kind"] == "answer"
 
 
+def test_a_websocket_is_refused_without_advice_on_the_terminal(
+    served: Served, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Any page may ask for a WebSocket, which this server has none of."""
+    caplog.set_level("DEBUG")
+    wanted = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: QUJD\r\n"
+    with socket.create_connection(("127.0.0.1", served.port), timeout=LIMIT) as browser:
+        browser.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n{wanted}\r\n".encode())
+        assert b"HTTP/1.1" in browser.recv(4096)
+    assert not [record for record in caplog.records if "WebSocket" in record.getMessage()]
+
+
 def test_that_there_is_no_room_for_connections_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
     once, loop = connections.Once(), asyncio.new_event_loop()
     logging.getLogger("friso.app").addFilter(once)

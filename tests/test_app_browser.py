@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 from browser import BROWSER, needs_browser
 from log_files import motion, write_text
-from made_up import both_joints
+from made_up import both_joints, check_html
 from patience import LIMIT
 from test_map_views import plain
 
 import friso
 from friso.app.frames import frame
 from friso.escapes import escaped
-from friso.questions.check.page import check_html
 from friso.questions.map.page import map_html
+from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.drawing.palette import INK
 from friso.shown.pages import Report
@@ -1021,8 +1021,8 @@ def long_report() -> str:
     """A page with tables and texts that scroll, as every command writes them."""
     lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"a line with a long name, {k}", INK) for k in range(4))
     figure = Figure("f", "Lines", "", (Panel("A title", Axis("x", ""), Axis("y", ""), lines),))
-    values = {"columns": ["Locked"], "rows": [("Verdict", ["hunts, " * 30])]}
-    return Report("check", "Rig", [figure], "name = 'a'\n" + "# " * 200, values=values).html()
+    block = AnswerBlock(columns=["Locked"], rows=[("Verdict", ["hunts, " * 30])], draw=lambda: [figure])
+    return Report("check", "Rig", [block], stage_file="name = 'a'\n" + "# " * 200).html()
 
 
 PAGES = {

@@ -16,6 +16,7 @@ from made_up import (
     NO_RETURN,
     both_joints,
     cannot_hunt,
+    check_html,
     fake_case,
     fake_cycle,
     fake_hunting,
@@ -34,10 +35,9 @@ from snapshots import Snapshots
 
 from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing, advised
 from friso.hunting.criteria import Verdict
+from friso.questions.check.cases import rows, rows_behind
 from friso.questions.check.figures import check_figures, response_figure
-from friso.questions.check.page import check_html, conclusion, verdict_sentence
-from friso.questions.check.table import rows, rows_behind
-from friso.questions.check.words import answer, details_sentences, edge_text
+from friso.questions.check.words import answer, conclusion, details_sentences, edge_text, verdict_sentence
 from friso.shown import pages
 from friso.shown.cases import COLOURS, ShownCase, shown_cases
 from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer

@@ -28,9 +28,9 @@ from friso.frequency.members import limit_cases, member
 from friso.frequency.settings import FrequencySettings
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
 from friso.interface.output_folder import MARKER
-from friso.questions.compare.document import compare_document
+from friso.questions.compare.blocks import compare_document
 from friso.questions.compare.figures import compare_figures
-from friso.questions.compare.page import compare_files
+from friso.questions.compare.question import CompareAnswer
 from friso.questions.compare.words import answer, brought, paired_rows, sentences, table_rows
 from friso.shares import share
 from friso.shown.drawing import matplotlib_renderer
@@ -480,7 +480,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
         assert ("1.00 nm RMS" in " ".join(said)) == compared
         assert ("[floor]" in said[-1]) != compared
         assert paired_rows(item)[0][1][4] == ratio
-        document, text = compare_document(item), Page(str(compare_files(item)["compare.html"])).text
+        document, text = compare_document(item), Page(str(CompareAnswer(item).files()["compare.html"])).text
         rms = document["options"]["c"]["against_a"]["in_position_rms"]
         assert (document["standstill_compared"], rms is not None) == (compared, compared)
         assert any("no [floor]" in note for note in document["notes"]) is not compared
@@ -529,7 +529,7 @@ def test_command_writes_page_and_figures(
     assert document["options"]["d"]["settling_time_s"]["high"] is None
     assert {item.name for item in (tmp_path / "out").iterdir()} == WRITTEN
     page = Page((tmp_path / "out" / "compare.html").read_text(encoding="utf-8"))
-    assert [tag for tag in page.tags if tag in ("table", "figure")] == ["table", "figure", "table", "table"]
+    assert [tag for tag in page.tags if tag in ("table", "figure")] == ["figure", "table", "table"]
     snapshots.check("compare", "page", page.lines)
     snapshots.check("compare", "run", friso_inside(tmp_path, "compare", EXAMPLE, "--details").stdout)
 
@@ -615,7 +615,8 @@ def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
     assert faster.rests
     quick = replace(faster, option=replace(faster.option, factor=2.0))
     line = answer(replace(hunting, results=(base, quick), needed=needed))[-1]
-    assert "from a bandwidth of 12.0 Hz on" in line  # as built, it brings the machines to rest there
+    assert "at a bandwidth of 12.0 Hz" in line  # as built, it brings the machines to rest there
+    assert "not at all higher ones" in line
     none = answer(replace(hunting, needed=replace(needed, shares=needed.shares * 0.5)))[-1]
     assert "does not bring 99 % of the machines to rest at any bandwidth up to 16.0 Hz" in none
     assert comparison.needed is not None

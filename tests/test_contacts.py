@@ -38,7 +38,7 @@ def test_what_the_file_states_is_kept_and_known() -> None:
     assert stage.flat()["friction.coulomb"] == 8
     assert "friction.coulomb" not in stage.unknown_keys
     low, high = (getattr(stage.uncertain()["friction.static"], end) for end in ("low", "high"))
-    assert (low, high) == (pytest.approx(8.4), pytest.approx(12.8))
+    assert (low, high) == (pytest.approx(8.4), pytest.approx(16))
     assert "friction.static" not in stage.replace({"friction.static": "9 N"}).unknown_keys
 
 

@@ -33,7 +33,7 @@ from friso.design_method.spec import Position, Spec, load_spec
 from friso.interface.output_folder import MARKER, OutputFolder
 from friso.progress import Progress
 from friso.quantities import outwards
-from friso.questions.design.document import design_document, refused_document
+from friso.questions.design.blocks import design_document, refused_document
 from friso.questions.design.figures import design_figures
 from friso.questions.design.steps import (
     controller_step,
@@ -148,7 +148,7 @@ def some(count: int, otherwise: float) -> np.ndarray:
 def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are not drawn again, and nothing is written."""
     monkeypatch.setattr("friso.interface.output_folder.write", lambda *_: [])
-    monkeypatch.setattr("friso.questions.design.page.design_figures", lambda design: ())
+    monkeypatch.setattr("friso.questions.design.blocks.design_figures", lambda design: ())
 
 
 @pytest.fixture

@@ -3,10 +3,12 @@
 import json
 import sys
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import Page
 from refusals import rows_of
 from scipy.stats import beta
 
@@ -14,8 +16,7 @@ import friso
 from friso.cli import main
 from friso.hunting import find_margin
 from friso.hunting.criteria import ATTRACTED, VERDICTS
-from friso.questions.check.document import draws_document
-from friso.questions.check.draws import draws_details, draws_figure, draws_rows, draws_sentences
+from friso.questions.check.draws import draws_details, draws_document, draws_figure, draws_rows, draws_sentences
 from friso.shown.documents import plain_json
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Sample, draw
@@ -211,6 +212,13 @@ def test_verdicts_that_hang_on_uncertain_keys_are_not_certain(rig: Stage) -> Non
     assert not answer["given"].judgement.hunting.certain
     assert "may hunt" in answer.sentences()[0]
     assert "friction.static, which nobody measured" in answer.sentences()[0]
+    conclusion, page = answer.to_dict()["conclusion"], Page(str(answer.files()["report.html"])).text
+    for sentence in answer.sentences():
+        assert sentence in conclusion
+        assert sentence in page
+        assert escape(sentence) in answer._repr_html_()
+    assert any(text.startswith("At the centre of the ranges") and text in page for text in answer.details())
+    assert answer.tables()[0].title == f"{stage.name}, at the centre of its ranges"
 
 
 def test_document_rows_and_sentences() -> None:

@@ -29,6 +29,7 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.read import file_format, read_table
 from friso.interface.question import HUNTS, QUESTIONS
 from friso.progress import Progress
+from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.pages import Report
 from friso.stage import Stage
@@ -203,8 +204,9 @@ def test_a_metric_of_its_own_is_swept_drawn_and_told(
 def test_a_page_of_its_own_needs_no_template() -> None:
     hold = Hold(Estimate.unknown("a", "N", "", "", 1.0), np.arange(3.0), np.ones(3))
     (figure,) = HeldForce().figures(hold, (), "held")
-    values = {"sentences": ["It <holds>."], "columns": ["Force"], "rows": [("Held", ["2 N"])], "computed": ", by hand"}
-    page = Report("hold", "A stage", [figure], values=values).html()
+    rows = [("Held", ["2 N"])]
+    block = AnswerBlock(sentences=["It <holds>."], columns=["Force"], rows=rows, draw=lambda: [figure])
+    page = Report("hold", "A stage", [block], computed=", by hand").html()
     assert "<title>A stage: friso hold</title>" in page
     assert all(text in page for text in ("It &lt;holds&gt;.", "<td>2 N</td>", "Forces held", ", by hand."))
 
@@ -244,18 +246,11 @@ def hold(
     force = Quantity("N", positive, "2 N").on(chosen.axis_kind)
     return HoldAnswer(quantity_of(force_limit, "force_limit", force), stage=chosen)
 """,
-    "words": """
-def sentences(answer):
-    return [f"It holds {answer.result:g} N."]
-""",
-    "document": """
-def hold_document(answer):
-    return {"conclusion": answer.sentences()[0], "force_n": answer.result}
-""",
-    "page": """
-from friso.shown.pages import Report
-def hold_files(answer):
-    return {"hold.html": Report.of_stage("hold", answer.stage, (), sentences=answer.sentences()).html()}
+    "blocks": """
+from friso.shown.blocks import AnswerBlock
+def blocks(answer):
+    holds = f"It holds {answer.result:g} N."
+    return [AnswerBlock(sentences=[holds], numbers=lambda: {"conclusion": holds, "force_n": answer.result})]
 """,
 }
 """The folder of a question, by module."""

@@ -22,13 +22,12 @@ from friso.leaf_springs.beams import BeamFailure
 from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels, both_models
 from friso.leaf_springs.evaluation import Mode
 from friso.leaf_springs.mechanism import Mechanism
-from friso.questions.flexure.document import flexure_document
+from friso.questions.flexure.blocks import flexure_document
 from friso.questions.flexure.drawing import drawing_svg
 from friso.questions.flexure.figures import VIEWS, best_view, flexure_figures, modes_figure
 from friso.questions.flexure.layout import SCALES, SHEET_WIDTH, block_size
-from friso.questions.flexure.page import flexure_files
-from friso.questions.flexure.question import EXAMPLE
-from friso.questions.flexure.table import rows
+from friso.questions.flexure.numbers import rows
+from friso.questions.flexure.question import EXAMPLE, FlexureAnswer
 from friso.questions.flexure.words import assumptions, findings, sentences, warnings
 from friso.stage import Stage
 
@@ -258,7 +257,7 @@ def test_without_a_mode_that_interferes_there_is_no_limit(models: BothModels, sn
     quiet = tuple(replace(mode, peak=0.0) for mode in models.closed.modes)
     alone = BothModels(models.stage, replace(models.closed, modes=quiet), None, "singular at step 7")
     assert flexure_document(alone)["first_interfering_hz"] is None
-    assert "singular at step 7" in Page(str(flexure_files(alone)["flexure.html"])).text
+    assert "singular at step 7" in Page(str(FlexureAnswer(alone).files()["flexure.html"])).text
     snapshots.check("flexure", "closed forms alone", "\n".join(sentences(alone)))
 
 

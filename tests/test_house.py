@@ -12,13 +12,10 @@ from pathlib import Path
 
 import grimp
 import pytest
-import typer
-from typer.core import TyperGroup
 
 import friso
 import friso_thesis
 from friso import hunting
-from friso.cli.app import command_line
 from friso.hunting import criteria, measures
 from friso.interface.answer import Answer
 from friso.interface.question import QUESTIONS
@@ -58,14 +55,8 @@ RECIPES = {
 """What CONTRIBUTING.md explains how to add, and the folder for its file."""
 
 
-SHOWN_BY = {
-    **dict.fromkeys(("sentences", "blocks", "tables", "details"), ("words", 0)),
-    "next_steps": ("words", 1),
-    "figures": ("figures", 0),
-    "document": ("document", 0),
-    "files": ("page", 0),
-}
-"""Methods of answers to the modules of a question's folder that show them, and what those take beside the answer."""
+SHOWN_BY = {"blocks": 0, "basis": 0, "further_files": 0, "page_values": 0, "next_steps": 1}
+"""Functions of a question's folder that show its answers, and how much they take beside the subject."""
 
 INTERFACE = {module.__name__: {*module.__all__} for module in (hunting, criteria, measures)}
 """What friso.hunting offers to other floors, to benchmarks, and to tests outside its inner modules."""
@@ -168,35 +159,18 @@ def is_percentage(value: ast.expr, behind: ast.expr | None) -> bool:
     return (hundred and sign) or (value.format_spec is not None and "%'" in ast.unparse(value.format_spec))
 
 
-def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
-    """A command that writes has <command>_files in page.py; one with --json <command>_document, or in words.py."""
-    group = typer.main.get_command(command_line())
-    assert isinstance(group, TyperGroup)
-    missing = []
-    for name, command in group.commands.items():
-        options = {option for parameter in command.params for option in parameter.opts}
-        places = {"--out": (["page"], f"{name}_files"), "--json": (["document", "words"], f"{name}_document")}
-        package = PACKAGE if (PACKAGE / "questions" / name).exists() else THESIS
-        for modules, function in (place for option, place in places.items() if option in options):
-            paths = [package / "questions" / name / f"{module}.py" for module in modules]
-            if not any(f"def {function}(" in path.read_text(encoding="utf-8") for path in paths if path.exists()):
-                missing.append(f"{paths[0].relative_to(package)}: {function}")
-    assert missing == []
-
-
-def test_what_shows_an_answer_takes_what_answers_hand_over() -> None:
-    """If an answer's class leaves a method to a function of its question's folder, that function takes the subject."""
+def test_a_question_gives_its_blocks_in_one_place() -> None:
+    """What shows an answer stands in blocks.py or words.py and takes the subject; or is a method."""
     wrong = []
     for name, question in QUESTIONS.items():
-        module = importlib.import_module(question.module)
-        classes = [item for item in vars(module).values() if isinstance(item, type) and issubclass(item, Answer)]
-        for answer in (item for item in classes if item.__module__ == module.__name__):
-            for method, (place, more) in SHOWN_BY.items():
-                path = f"{question.package}.{place}"
-                own = f"{question.package.rpartition('.')[2]}_{method}" if place != "words" else method
-                shown = getattr(importlib.import_module(path), own, None) if importlib.util.find_spec(path) else None
-                if shown and method not in vars(answer) and len(inspect.signature(shown).parameters) != 1 + more:
-                    wrong.append(f"{name}: {answer.__name__}.{method}")
+        places = [f"{question.package}.{part}" for part in ("blocks", "words")]
+        modules = [importlib.import_module(place) for place in places if importlib.util.find_spec(place)]
+        shown = {key: getattr(module, key) for module in modules for key in SHOWN_BY if hasattr(module, key)}
+        takes = {key: len(inspect.signature(function).parameters) for key, function in shown.items()}
+        wrong += [f"{name}: {key}" for key, count in takes.items() if count != 1 + SHOWN_BY[key]]
+        classes = [item for item in vars(importlib.import_module(question.module)).values() if isinstance(item, type)]
+        answers = [item for item in classes if issubclass(item, Answer) and item.__module__ == question.module]
+        wrong += [item.__name__ for item in answers if ("blocks" in shown) == ("blocks" in vars(item))]
     assert wrong == []
 
 

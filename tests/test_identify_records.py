@@ -25,7 +25,7 @@ from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import record
 from friso.identification.readings.settings import ReadingSettings
 from friso.identification.sources import log_with_signals, read_all
-from friso.questions.identify.document import identify_document
+from friso.questions.identify.blocks import identify_document
 from friso.questions.identify.words import details, estimate_rows, headline, sentences
 
 DT = 2e-3

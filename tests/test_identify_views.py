@@ -46,9 +46,9 @@ from friso.identification.response.analysis import analyse
 from friso.identification.response.masses import two_masses
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import estimate_text, identified_stage, made_up
-from friso.questions.identify.document import identify_document
+from friso.questions.identify.blocks import identify_document
 from friso.questions.identify.figures import identify_figures
-from friso.questions.identify.page import identify_files
+from friso.questions.identify.question import IdentifyAnswer
 from friso.questions.identify.words import (
     COLUMNS,
     LEFT,
@@ -71,6 +71,10 @@ DT = 1e-3
 MASS, VISCOUS, COULOMB = 10.0, 50.0, 8.0
 WHY = "no steady motion between 1 and 20 mm/s"
 TWO_MASSES = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 0.0, 0.0, 0.0, 0.0])
+
+
+def answered(result: Any, files: Any, predictions: Any) -> IdentifyAnswer:
+    return IdentifyAnswer(result, inputs=files, predictions=predictions, checked=None)
 
 
 def moves_log() -> Log:
@@ -563,9 +567,9 @@ def test_the_page_opens_offline_and_shows_all(
     """Logs that make no stage have a page all the same."""
     ends = ("intervals", "moves1_force", "moves1_friction", "frequency1_bode")
     subset = [item for item in figures if item.name.endswith(ends)]
-    monkeypatch.setattr("friso.questions.identify.page.identify_figures", lambda *_: subset)
+    monkeypatch.setattr("friso.questions.identify.blocks.identify_figures", lambda *_: subset)
     result, files, predictions = case
-    html = str(identify_files(*case)["identify.html"])
+    html = str(answered(*case).files()["identify.html"])
     page = Page(html)
     assert all(address.startswith("data:") for address in page.loads)
     text = " ".join(page.text.split())
@@ -581,6 +585,6 @@ def test_the_page_opens_offline_and_shows_all(
     bare = replace(result, stage=None, experiments=())
     assert NO_STAGE in [sentence for _, sentence in headline(bare)]
     assert identify_document(bare, files, [])["stage"] is None
-    alone = Page(str(identify_files(bare, files[:2], [])["identify.html"])).text
+    alone = Page(str(answered(bare, files[:2], []).files()["identify.html"])).text
     assert "bench.csv, exp1.csv" in alone
     assert ("Copy" in alone, "Copy" in text) == (False, True)

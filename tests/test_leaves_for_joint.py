@@ -17,7 +17,7 @@ from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
-from friso.questions.tune.page import stage_files
+from friso.questions.tune.blocks import further_files
 from friso.questions.tune.present_words import DOUBTS
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.words import UNMADE, explained
@@ -127,7 +127,7 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
     assert (made.confirmation.verdict, made.confirmation.certain) == ("settles", True)
     length = f"{made.stage.flat()['flexure.length'] * 1e3:.3g} x"
     assert any("2 leaves of" in line and length in line for line in explained(tuning))
-    files = stage_files(tuning)
+    files = further_files(tuning)
     written = loads(str(files["tuned-isolator-of-leaf-springs.toml"]))
     assert written.flat()["flexure.length"] == made.stage.flat()["flexure.length"]
     paths = [Path("tuned") / name for name in files]
@@ -161,9 +161,9 @@ def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) ->
     doubted = replace(tuning, outcomes=(isolator, replace(made, doubts=("distance",))))
     (sentence,) = (line for line in explained(doubted) if line.startswith("Leaf springs"))
     assert DOUBTS["distance"] in sentence
-    names = [name for name in stage_files(doubted) if "leaf-springs" in name]
+    names = [name for name in further_files(doubted) if "leaf-springs" in name]
     assert all("not-sure" in name for name in names)
-    paths = [Path("tuned") / name for name in stage_files(doubted)]
+    paths = [Path("tuned") / name for name in further_files(doubted)]
     assert TuneAnswer(doubted).next_steps(paths) == ["friso design tuned/tuned-isolator.toml"]
 
 

@@ -35,7 +35,7 @@ from friso.hunting.attractors.survey import Swinging
 from friso.hunting.path import key_path
 from friso.hunting.stage_margins import _margin
 from friso.hunting.what_attracts import Sketch
-from friso.questions.check.document import joint_margins_document
+from friso.questions.check.cases import joint_margins_document
 from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
 from friso.questions.check.question import CheckAnswer
 from friso.stage import Stage

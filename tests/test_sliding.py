@@ -59,3 +59,14 @@ def test_check_says_from_which_speed_on_the_stage_slides_smoothly(pulled: Stage,
     undecided = stick_slip_sentences(StickSlipSpeeds(None, False, 0.0, None, speeds.ranges, (1e-4, 1.0), 3), 0.2)
     assert "not decided" in undecided[0]
     assert "3 of the speeds" in undecided[1]
+
+
+def test_a_map_over_speeds_agrees_with_the_ranges_of_the_check(pulled: Stage, speeds: StickSlipSpeeds) -> None:
+    """Cells 10 % inside and outside the end of the range; another motion is no ramp."""
+    end = speeds.ranges[-1].fastest
+    axes = {"motion.velocity": f"{0.9 * end} m/s, {1.1 * end} m/s"}
+    cells = friso.sweep(pulled, axes, metric="stick_slip")["stick_slip"]
+    assert cells.values.tolist() == ["sticks and slips", "smooth"]
+    step = pulled.replace({"motion": {"kind": "step", "size": "1 mm", "duration": "1 s"}})
+    other = friso.sweep(step, {"friction.viscous": "0.3 N*s/m, 0.4 N*s/m"}, metric="stick_slip")["stick_slip"]
+    assert {*other.values.tolist()} == {"no ramp"}

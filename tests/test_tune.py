@@ -36,10 +36,9 @@ from friso.hunting.criteria import settling_of_runs
 from friso.hunting.measures import measured_run
 from friso.progress import Progress
 from friso.questions.check.isolator_words import isolator_sentence
-from friso.questions.tune.document import tune_document
+from friso.questions.tune.blocks import tune_document
 from friso.questions.tune.figures import drawn_stages, tune_figures
 from friso.questions.tune.gain_words import gain_lines
-from friso.questions.tune.page import tune_files
 from friso.questions.tune.present_words import DOUBTS, as_it_is
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.sensitivity_words import ranked_sentences
@@ -550,7 +549,7 @@ def test_a_least_change_before_an_interrupt_is_that_so_far(tuning: Advice) -> No
     whole = replace(tuning, interrupted=False)
     for advice, so_far in ((tuning, " so far"), (whole, "")):
         line = next(line for line in answer(advice) if line.startswith("Set controller.crossover"))
-        assert f"the least change that works{so_far} (" in line
+        assert f"the cheapest change that works{so_far} (" in line
 
 
 def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning: Advice) -> None:
@@ -621,7 +620,7 @@ def test_the_answer_names_what_to_change(tuning: Advice, works: Any) -> None:
 
 
 def test_the_answer_as_files(tuning: Advice, undrawn: None) -> None:
-    files = tune_files(replace(tuning, as_built={"drive": {"sample_time": "50 us"}}))
+    files = TuneAnswer(replace(tuning, as_built={"drive": {"sample_time": "50 us"}})).files()
     assert files["tuned.toml"] == files["tuned-bandwidth.toml"]
     assert loads(str(files["tuned.toml"])).flat()["drive.sample_time"] == 5e-5
     assert answer(tuning)[1].split(".")[0] in str(files["tune.html"])
@@ -892,7 +891,7 @@ def test_settings_for_large_moves_alone_are_told_as_that(tuning: Advice, works: 
     advice = replace(tuning, outcomes=(large,), interrupted=False)
     assert (large.certainty, advice.working, advice.least) == ("large moves", (), None)
     assert answer(advice)[0].startswith("For moves of 2.00 mm and more alone: set")
-    files = tune_files(advice)
+    files = TuneAnswer(advice).files()
     assert "tuned-bandwidth-for-large-moves.toml" in files
     assert files["tuned.toml"] is None
     assert "for large ones alone" in str(TuneAnswer(advice, stage=advice.stage).failure)

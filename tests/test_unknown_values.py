@@ -10,7 +10,7 @@ from refusals import refused
 
 import friso
 from friso.design_method.method import NoDesign
-from friso.questions.design.document import refused_document
+from friso.questions.design.blocks import refused_document
 from friso.stage import Stage
 from friso.studies.laws.conversion import convert
 

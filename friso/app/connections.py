@@ -57,6 +57,9 @@ class Connection(H11Protocol):
         self._since = self.loop.time()
         super().on_response_complete()
 
+    def _unsupported_upgrade_warning(self) -> None:
+        """Stay silent about a WebSocket, which this server has none of: any page may ask for one."""
+
     @property
     def is_at_work(self) -> bool:
         """Tell whether the connection is answering a client with a key."""

@@ -28,7 +28,6 @@ from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
 from friso.questions.map.places import SHOWN, with_places
 from friso.shown.cases import case_labels
-from friso.shown.documents import entries
 from friso.shown.drawing.figure import Figure
 from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
@@ -107,7 +106,11 @@ def words_of(answer: Answer) -> AnswerPart:
     return {
         "kind": "answer",
         "sentences": [*answer.sentences()],
-        "tables": [entries(table, "title", "columns", "rows") for table in answer.tables() if not table.behind],
+        "tables": [
+            {"title": table.title, "columns": table.labels, "rows": table.rows}
+            for table in answer.tables()
+            if not table.behind
+        ],
         "details": [*answer.details()],
         "failure": answer.failure,
     }

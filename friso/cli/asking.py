@@ -110,13 +110,14 @@ def show(answer: Answer, shown: Shown, write: Write | None, nothing: str = "no f
     else:
         details = shown.details
         for block in answer.blocks():
-            print(f"\n{block}\n")
+            if block.text:
+                print(f"\n{block.text}\n")
         tables = answer.tables()
         behind = any(table.behind for table in tables)
         more = answer.details() if details or not behind else ()  # details may take work
         for table in tables:
             if details or not table.behind:
-                print_table(table.title, table.columns, [(label, [*cells]) for label, cells in table.rows])
+                print_table(table.title, table.labels, [(label, [*cells]) for label, cells in table.rows])
         for paragraph in more if details else ():
             print_wrapped(paragraph)
         print_written(written)

@@ -22,10 +22,14 @@ from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.criteria import CREEPS, FAILED, RESTS, SWINGS, outcomes
+from friso.hunting.criteria.settling import settling_of_runs
 from friso.hunting.measures import run_ends, turns_of
 from friso.progress import Progress, silent
 from friso.shares import share_interval
 from friso.stage import Stage
+
+RETURN = "motion.return_at"
+"""Key of the time [s] at which a move there and back returns."""
 
 THERE_AND_BACK = {
     "kind": "there_and_back",
@@ -43,9 +47,9 @@ class MachineOutcomes(ArrayColumns):
 
     `words` say what the run does until its end (`friso.hunting.criteria.run_outcome`), with the position window as
     band. A machine rests if it stays in the window for the last quarter of the run. All other machines are simulated
-    ten times as long, and their words are those of the longer run. `settling` [s] is the time after the reference's
-    last corner from which the stage stays in the window; NaN if it does not rest. `swing` [m] is the peak-to-peak
-    motion in the last quarter.
+    ten times as long, and their words are those of the longer run. `settling` [s] is the time after a corner of the
+    reference from which the stage stays in the window, at the worse end of its move; NaN if it does not rest. `swing`
+    [m] is the peak-to-peak motion in the last quarter.
     """
 
     words: np.ndarray
@@ -153,9 +157,10 @@ def move_machines(
 ) -> MachineOutcomes:
     """Simulate the moves of `count` stages, given by keys with arrays of shape (count,).
 
-    If `patient`, machines that are not in position are simulated again for longer. `window` is the position window [m].
+    If `patient`, stages stand at the far end as long as at the near one, so that both ends decide, and machines that
+    are not in position are simulated again for longer. `window` is the position window [m].
     """
-    first = _followed_moves(flat, count, window, settings.followed_time, progress, label)
+    first = _followed_moves(flat, count, window, settings.followed_time, progress, label, patient)
     again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
@@ -174,12 +179,21 @@ def move_machines(
 
 
 def _followed_moves(
-    flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
+    flat: dict[str, Any],
+    count: int,
+    window: float,
+    time: float,
+    progress: Progress,
+    label: str,
+    both_ends: bool = True,
 ) -> MachineOutcomes:
     """Simulate the moves of `count` stages, each followed for a time [s] after its last corner.
 
-    `window` is the position window [m]; `label` names the work to the progress.
+    With `both_ends`, the stage stands as long at the far end, and settles as late as at the worse end. `window` is the
+    position window [m]; `label` names the work to the progress.
     """
+    if both_ends:
+        flat = {**flat, RETURN: last_corner(flat) - flat[RETURN] + time}
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
     options = RunOptions(
@@ -194,10 +208,15 @@ def _followed_moves(
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
     for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
-        numbers, end = runs.numbers, run_ends(runs, turns_of(runs), "inner")
+        numbers = runs.numbers
+        end = run_ends(runs, turns_of(runs, corner[numbers]), "inner")
         words = outcomes(end, window, hold=settings.last_share * end.ended)
+        settling = np.maximum(end.outside - corner[numbers], 0.0)
+        if both_ends:
+            settling = settling_of_runs(runs.part(keys), runs, "inner")
+            words = np.where((words == RESTS) & ~np.isfinite(settling), CREEPS, words)
         outcome.words[numbers] = words
-        outcome.settling[numbers] = np.where(words == RESTS, np.maximum(end.outside - corner[numbers], 0.0), np.nan)
+        outcome.settling[numbers] = np.where(words == RESTS, settling, np.nan)
         outcome.swing[numbers] = end.swing
         done += len(numbers)
         progress(done, count, label)

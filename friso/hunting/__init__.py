@@ -54,7 +54,7 @@ from friso.hunting.motions import Motions
 from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
-from friso.hunting.sliding import StickSlipSpeeds
+from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, lasting_swings
 from friso.hunting.stage_margins import ParameterMargin, joint_margins
 from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement
@@ -131,10 +131,12 @@ __all__ = [
     "find_swings",
     "flow_derivatives",
     "hunting",
+    "is_moved_evenly",
     "joint_margins",
     "judge_many",
     "judge_runs",
     "kernels_to_judge",
+    "lasting_swings",
     "loops_unstable",
     "moves_that_hunt",
     "multipliers",

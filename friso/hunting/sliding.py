@@ -13,10 +13,11 @@ from friso.engine.allowance import Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motions.ramp import VELOCITY
-from friso.equations.structure import structure
+from friso.equations.structure import shared_structure, structure
 from friso.hunting.attractors.rounds import SURVEY_RTOL
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.measures import LAST_QUARTER
+from friso.hunting.motions import some_of
 from friso.hunting.rows import spans
 from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
@@ -71,7 +72,7 @@ def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
     factors, lasts, decided = np.ones(1), np.zeros(1, bool), np.zeros(1, bool)
     try:
         with allowance(work):
-            lasts, decided, swing = _lasting(flat, np.array([own]))
+            lasts, decided, swing = lasting_swings(flat, 1)
             period, sticks = _course(flat, own) if lasts[0] else (None, False)
     except Exhausted:
         return None
@@ -79,7 +80,8 @@ def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
     with suppress(Exhausted), allowance(work):
         others = np.geomspace(*tracking_settings.speeds_tried, tracking_settings.speed_count)
         for _ in range(2):
-            columns = zip((lasts, decided), _lasting(flat, own * others)[:2], strict=True)
+            more = lasting_swings({**flat, VELOCITY: own * others}, len(others))[:2]
+            columns = zip((lasts, decided), more, strict=True)
             lasts, decided = (np.append(*pair) for pair in columns)
             factors = np.append(factors, others)
             order = np.argsort(factors)
@@ -113,27 +115,19 @@ def _ranges(speeds: np.ndarray, lasts: np.ndarray, decided: np.ndarray) -> tuple
     )
 
 
-def _durations(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Return times [s] in which stages moved at these speeds stick and slip many times, (count,).
+@np.errstate(all="ignore")
+def lasting_swings(flat: Mapping[str, Any], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Tell whether stages that move at constant speeds keep swinging about their references, always from rest.
 
-    A swing takes as long as the reference needs to deflect the loop to break-away and back, and the loop to swing.
+    `flat` has the keys of `count` stages of one structure in SI. Returns which keep swinging, where that is decided,
+    and the swing of the error [m], peak to peak, each (count,). Each run is compared with a longer one, until its swing
+    has lasted or is dying out.
     """
-    stage = Ensemble.held({**flat, VELOCITY: float(speeds[0])}, 1)
-    swing = 2 * np.pi / stage.number("rate")[0] + 2 * stage.length[0] / np.abs(speeds)
-    return np.asarray(tracking_settings.swings_followed * swing)
-
-
-def _lasting(flat: Mapping[str, Any], speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return at which speeds the error keeps swinging, where that is decided, and the swing [m], each (count,).
-
-    Each run is compared with a longer one, until its swing has lasted or is dying out.
-    """
-    shape, length = kernel(structure(flat)), float(Ensemble.held(flat, 1).length[0])
-    count = len(speeds)
+    shape, lengths = kernel(shared_structure(flat)), _lengths(flat, count)
     lasts, decided, swings = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
-    left, durations = np.arange(count), _durations(flat, speeds)
+    left, durations = np.arange(count), _durations(flat, count)
     for number in range(1 + tracking_settings.longer_runs):
-        moved = {**flat, VELOCITY: speeds[left], DURATION: durations[left]}
+        moved = {**some_of(flat, left), DURATION: durations[left]}
         budget = tracking_settings.most_sliding_steps
         options = RunOptions(SURVEY_RTOL, window=LAST_QUARTER, record_from=np.inf, least_swing=np.inf, budget=budget)
         swing = np.full(len(left), np.nan)
@@ -142,7 +136,7 @@ def _lasting(flat: Mapping[str, Any], speeds: np.ndarray) -> tuple[np.ndarray, n
             swing[runs.numbers] = np.where(done(runs.results), spread, np.nan)
         before = swings[left]
         swings[left] = np.where(np.isfinite(swing), swing, before)
-        small = swing < tracking_settings.no_swing_share * length
+        small = swing < tracking_settings.no_swing_share * lengths[left]
         if number:
             lasts[left] = ~small & (swing > tracking_settings.lasting_share * before)
         dies = small | (swing < tracking_settings.dying_share * before)
@@ -154,9 +148,24 @@ def _lasting(flat: Mapping[str, Any], speeds: np.ndarray) -> tuple[np.ndarray, n
     return lasts, decided, swings
 
 
+def _lengths(flat: Mapping[str, Any], count: int) -> np.ndarray:
+    """Return the lengths [m] by which the loops of stages are deflected at break-away, (count,)."""
+    return np.broadcast_to(Ensemble.held(flat, count, form=shared_structure(flat)).length, (count,)).astype(float)
+
+
+def _durations(flat: Mapping[str, Any], count: int) -> np.ndarray:
+    """Return times [s] in which moving stages stick and slip many times, (count,).
+
+    A swing takes as long as the reference needs to deflect the loop to break-away and back, and the loop to swing.
+    """
+    rate = np.broadcast_to(Ensemble.held(flat, count, form=shared_structure(flat)).number("rate"), (count,))
+    swing = 2 * np.pi / rate + 2 * _lengths(flat, count) / np.abs(flat[VELOCITY])
+    return np.asarray(tracking_settings.swings_followed * swing)
+
+
 def _course(flat: Mapping[str, Any], speed: float) -> tuple[float | None, bool]:
     """Return the period of the error's swing [s] (None: too few swings), and whether the stage sticks in it."""
-    shape, duration = kernel(structure(flat)), float(_durations(flat, np.array([speed]))[0])
+    shape, duration = kernel(structure(flat)), float(_durations(flat, 1)[0])
     interval = duration / tracking_settings.samples_of_a_course
     options = RunOptions(SURVEY_RTOL, interval=interval, record_from=np.inf, least_swing=np.inf)
     (runs,) = run_chunks(shape, {**flat, DURATION: duration}, 1, options)

@@ -125,7 +125,7 @@ def quality_of(
     named = [] if led and not (poor or seen) else reasons
     words = _verdict(plain, named, case.unit, poor, rejected, flat["friction.model"] == "none")
     findings += [RaisedDoubt(words=words, size=plain.ratio, doubt="model")] if words else []
-    findings += raised("value", ValueCase(log, inverse, cart_share, plain.lacks_something, poor))
+    findings += raised("value", ValueCase(log, inverse, cart_share, replay, lacks=plain.lacks_something, poor=poor))
     without = tuple(cause.without for cause in reasons if cause.without)
     best = min([inverse.error, *(model.error for model in without)])
     unsettled = plain.lacks_something and min(left / force, best) > doubt_settings.error_of_an_unsettled_record

@@ -146,12 +146,11 @@ def with_unknown(
     listed = dict.fromkeys([*stage.unknown_keys, *unknown])
     follows = {key for key, origin in origins.items() if origin.startswith(FOLLOWS)}
     bounds = {one.name: (one.low, one.high) for one in estimates if not one.determined}
-    bounded = {key: one for key, one in stage.uncertain().items() if origins.get(key) == NOT_IDENTIFIED}
-    wide = {key for key, interval in bounded.items() if interval.wide and key != "friction.coulomb"}
-    open_keys = [*wide, *(key for key in listed if key not in uncertain or key in follows)]
+    bounded = {key for key in stage.uncertain() if origins.get(key) == NOT_IDENTIFIED} - {"friction.coulomb"}
+    open_keys = [*bounded, *(key for key in listed if key not in uncertain or key in follows)]
     keys, flat, changes = stage.numeric_keys(), stage.flat(), {}
     for key, ends in usual_ranges(stage, open_keys, bounds).items():
-        own = ends[0] if origins.get(key) == CHOSEN or key in wide | follows else flat[key]
+        own = ends[0] if origins.get(key) == CHOSEN or key in bounded | follows else flat[key]
         changes[key] = written((min(ends[0], own), max(ends[1], own)), keys[key].unit)
     return stage.replace({**changes, **({"unknown": ", ".join(listed)} if listed else {})})
 
@@ -171,7 +170,7 @@ def estimate_text(estimate: Estimate) -> str:
     """Write an estimate for a stage file: "20.4 N +/- 0.1 N", or a range "1 N .. 2.5 N"."""
     unit = f" {estimate.unit}" if estimate.unit else ""
     if not estimate.determined:
-        return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
+        return written((estimate.low, estimate.high), estimate.unit)
     half, digits = round_uncertainty(estimate.half_width)
     value = f"{round(estimate.value, digits) + 0.0:.{max(digits, 0)}f}"  # + 0.0: no minus before a zero
     return f"{value}{unit} +/- {half}{unit}"

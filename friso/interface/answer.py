@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import copy_context
-from dataclasses import dataclass
 from functools import wraps
 from html import escape
 from importlib import import_module
@@ -25,8 +24,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from friso.shown.blocks import AnswerBlock
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
+    from friso.shown.pages import Report
+    from friso.stage import Stage
 
 
 Arguments = ParamSpec("Arguments")
@@ -49,19 +51,6 @@ def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Ret
     return asked
 
 
-@dataclass(frozen=True)
-class AnswerTable:
-    """A small table: labelled columns, and rows that have names.
-
-    A table `behind` the answer is shown only with its details.
-    """
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[tuple[str, Sequence[str]]]
-    behind: bool = False
-
-
 _SHOWN = {
     "sentences",
     "blocks",
@@ -71,66 +60,36 @@ _SHOWN = {
     "figures",
     "document",
     "document_of_details",
+    "page",
     "files",
 }
 """Names of the methods by which an answer is shown."""
 
 
 def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) -> Callable[..., Returned]:
-    """Wrap a method of an answer so that it speaks in the units of the answer's axis."""
+    """Wrap a method of an answer so that it speaks in the units of the answer's axis, and makes blocks only once."""
 
     @wraps(method)
     def shown(answer: Answer, *arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
         with speaking_of(answer.axis_kind):
-            return method(answer, *arguments, **options)
+            if method.__name__ != "blocks":
+                return method(answer, *arguments, **options)
+            if "_blocks" not in vars(answer):
+                vars(answer)["_blocks"] = method(answer, *arguments, **options)
+            return vars(answer)["_blocks"]
 
     return shown
-
-
-def _sentences_under_condition(method: Callable[[Any], Sequence[str]]) -> Callable[[Any], Sequence[str]]:
-    """Wrap the sentences of an answer so that the first one states the condition under which they hold."""
-
-    @wraps(method)
-    def shown(answer: Answer) -> Sequence[str]:
-        sentences, condition = method(answer), answer.condition
-        return [condition + sentences[0], *sentences[1:]] if condition and sentences else sentences
-
-    return shown
-
-
-def _document_under_condition(method: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:
-    """Wrap the document of an answer so that it, and its conclusion, state the condition under which they hold."""
-
-    @wraps(method)
-    def shown(answer: Answer) -> dict[str, Any]:
-        document, condition = method(answer), answer.condition
-        if not condition:
-            return document
-        said = document.get("conclusion", "")
-        conclusion = {"conclusion": said if said.startswith(condition) else condition + said} if said else {}
-        return {**document, **conclusion, "condition": condition.removesuffix(": ")}
-
-    return shown
-
-
-_CONDITIONAL = {"sentences": _sentences_under_condition, "document": _document_under_condition}
-"""Wrappers of the methods that state the condition under which an answer holds, by the method's name."""
-
-
-def _shown(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a method by which an answer is shown, called `name`."""
-    return _in_its_units(_CONDITIONAL[name](method) if name in _CONDITIONAL else method)
 
 
 class Answer:
     """What friso answers to a question.
 
-    The answer in words stands first (`sentences`), then small `tables`, then `details`. Functions in the folder of its
-    question make these: `words.sentences`, `words.tables`, `words.details`, `words.blocks`, `words.next_steps`, and, of
-    the question NAME, `figures.NAME_figures`, `document.NAME_document`, `page.NAME_files`. Each function takes the
-    `subject`; an answer that shows something else overrides the method. `result` is what the analysis returned.
-    Attributes and items that the answer lacks are taken from the result, so that ``cases["given"]`` is a case of
-    `friso.check` and ``runs.outcome`` a variable of `friso.sweep`.
+    An answer is a list of `blocks`; terminal, page, notebook and JSON document show all of them in their order. The
+    function `blocks` in the folder of its question makes them, in the module `blocks` or `words`. Further functions
+    there are optional: `basis` says how all was computed, `further_files` returns files beside the page, `page_values`
+    what a template of the question's own names, and `next_steps` what to do next. Each takes the `subject`. `result` is
+    what the analysis returned. Attributes and items that the answer lacks are taken from the result, so that
+    ``cases["given"]`` is a case of `friso.check` and ``runs.outcome`` a variable of `friso.sweep`.
 
     Attributes
     ----------
@@ -161,7 +120,10 @@ class Answer:
         """Make all methods that show an answer use the units of its axis."""
         cls.package = cls.__module__.rpartition(".")[0]
         for name in _SHOWN & vars(cls).keys():
-            setattr(cls, name, _shown(name, vars(cls)[name]))
+            setattr(cls, name, _in_its_units(vars(cls)[name]))
+
+    templates: ClassVar[str] = "friso.shown"
+    """Package whose folder `templates` may have a template for the page of the question."""
 
     package: ClassVar[str]
     """Package of the question, whose modules show its answers."""
@@ -192,7 +154,12 @@ class Answer:
         """
         from friso.shown.unknown import unknown_condition
 
-        return unknown_condition(vars(self).get("stage") or getattr(self.result, "stage", None), self.varied)
+        return unknown_condition(self._stage, self.varied)
+
+    @property
+    def _stage(self) -> Stage | None:
+        """Return the stage that the answer is about, if there is one."""
+        return vars(self).get("stage") or getattr(self.result, "stage", None)
 
     @property
     def varied(self) -> Sequence[str]:
@@ -209,52 +176,70 @@ class Answer:
         """Tell whether Ctrl-C ended the work, so that the answer says what was found so far."""
         return False
 
-    def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
-        """Show the answer by a `function` in a `module` of the question's folder, or in its `words`.
+    def _shown_by(self, function: str, otherwise: Any, *more: Any) -> Any:
+        """Show the answer by a `function` in the module `blocks` or `words` of the question's folder.
 
         Returns what that function returns for the answer's subject and `more` arguments, or `otherwise` if there is no
-        such function. Raises AttributeError if the folder has the `module`, but without the function.
+        such function.
         """
-        places = [f"{self.package}.{part}" for part in (module, "words") if self.package]
-        modules = [import_module(place) for place in places if find_spec(place)]
-        for one in modules:
-            if hasattr(one, function):
-                return getattr(one, function)(self.subject, *more)
-        if module != "words" and modules and modules[0].__name__ == places[0]:
-            raise AttributeError(f"{places[0]} has no function {function}, which a module of this name declares")
+        for place in (f"{self.package}.blocks", f"{self.package}.words"):
+            if self.package and find_spec(place) and hasattr(module := import_module(place), function):
+                return getattr(module, function)(self.subject, *more)
         return otherwise
 
+    def blocks(self) -> Sequence[AnswerBlock]:
+        """Return the parts of the answer, the conclusion first."""
+        return [*self._shown_by("blocks", ())]
+
     def sentences(self) -> Sequence[str]:
-        """Return the answer in words, the conclusion first."""
-        return self._shown_by("words", "sentences", ())
+        """Return the answer in words, the conclusion first, after the condition under which it holds."""
+        sentences = [sentence for block in self.blocks() for sentence in block.sentences]
+        return [self.condition + sentences[0], *sentences[1:]] if sentences else []
 
-    def blocks(self) -> Sequence[str]:
-        """Return drawings and files as text for a fixed-width font."""
-        return self._shown_by("words", "blocks", ())
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return small tables with the numbers behind the answer, as texts."""
-        return self._shown_by("words", "tables", ())
+    def tables(self) -> Sequence[AnswerBlock]:
+        """Return the blocks that have small tables, with the numbers behind the answer as texts."""
+        return [block for block in self.blocks() if block.rows]
 
     def details(self) -> Sequence[str]:
-        """Return further paragraphs, which `--details` shows."""
-        return self._shown_by("words", "details", ())
+        """Return further paragraphs, which `--details` shows; some may take work."""
+        return [text for block in self.blocks() for text in (*block.details, *block.long_details())]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return commands that follow from the answer, given the `files` written."""
-        return self._shown_by("words", "next_steps", (), files)
+        return self._shown_by("next_steps", (), files)
 
     def figures(self) -> Sequence[Figure]:
         """Return the figures, the most important one first."""
-        return self._shown_by("figures", f"{self._name}_figures", ())
+        return [figure for block in self.blocks() for figure in block.figures]
 
     def document(self) -> dict[str, Any]:
-        """Return the JSON document of the command."""
-        return self._shown_by("document", f"{self._name}_document", {})
+        """Return the JSON document of the command: the numbers of all blocks, and the condition if there is one."""
+        from friso.shown.documents import merged
+
+        document, condition = merged(block.numbers() for block in self.blocks()), self.condition
+        if not condition:
+            return document
+        said = document.get("conclusion", "")
+        conclusion = {"conclusion": said if said.startswith(condition) else condition + said} if said else {}
+        return {**document, **conclusion, "condition": condition.removesuffix(": ")}
+
+    def page(self) -> Report:
+        """Return the page that shows the answer."""
+        from friso.shown.pages import Report
+
+        return Report.of_stage(
+            self.command,
+            self._stage,
+            self.blocks(),
+            condition=self.condition,
+            computed=self._shown_by("basis", ""),
+            values=self._shown_by("page_values", {}),
+            templates=self.templates,
+        )
 
     def files(self) -> Files:
         """Return the contents of the files that the command writes, by name."""
-        return self._shown_by("page", f"{self._name}_files", {})
+        return {**self._shown_by("further_files", {}), **self.page().files()}
 
     @property
     def data(self) -> xr.Dataset:
@@ -367,8 +352,8 @@ class Answer:
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the sentences and the small tables, but no arrays."""
         first, *rest = [escape(sentence) for sentence in self.sentences()] or ["no answer"]
-        blocks = "".join(f"<pre>{escape(block)}</pre>" for block in self.blocks())
-        tables = blocks + "".join(_html_table(table) for table in self.tables() if not table.behind)
+        tables = "".join(f"<pre>{escape(block.text)}</pre>" for block in self.blocks() if block.text)
+        tables += "".join(_html_table(table) for table in self.tables() if not table.behind)
         texts = "".join(f"<p>{sentence}</p>" for sentence in rest)
         return escaped(f"<div><p><b>{first}</b></p>{texts}{tables}</div>")
 
@@ -401,12 +386,12 @@ class Answer:
 
 
 for _name in _SHOWN:
-    setattr(Answer, _name, _shown(_name, getattr(Answer, _name)))
+    setattr(Answer, _name, _in_its_units(getattr(Answer, _name)))
 
 
-def _html_table(table: AnswerTable) -> str:
+def _html_table(table: AnswerBlock) -> str:
     """Write a small table as HTML, with all texts escaped."""
-    head = "".join(f"<th>{escape(column)}</th>" for column in ("", *table.columns))
+    head = "".join(f"<th>{escape(column)}</th>" for column in ("", *table.labels))
     rows = "".join(
         f"<tr><th>{escape(label)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
         for label, cells in table.rows

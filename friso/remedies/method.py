@@ -17,7 +17,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
-from friso.frequency.crossover import Limits, limits
+from friso.frequency.crossover import Limits, limits, loop_bandwidth
 from friso.hunting import Case
 from friso.platform.extras import missing
 from friso.progress import Progress, silent
@@ -83,10 +83,7 @@ class Advice:
 
     @property
     def least(self) -> RemedyOutcome | None:
-        """Return the remedy with the smallest change that works (`ChangeSize`); None if none does.
-
-        Remedies that work for all moves come before those that do not, however small the change.
-        """
+        """Return the remedy that works and costs the machine least (see `working`); None if none does."""
         return next(iter(self.working), None)
 
     def complete(self, tuned: Stage) -> Stage:
@@ -112,7 +109,7 @@ class Advice:
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that work: those for all moves first, and of these the smallest change first.
+        """Return the remedies that work: those for all moves first, and of these the cheapest for the machine first.
 
         Leaf springs that make the joint of a remedy are no remedies of their own.
         """
@@ -126,8 +123,8 @@ class Advice:
     def recommended(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that are described in full.
 
-        First comes the smallest change. The remedy that settles soonest follows, or the next larger change if the
-        smallest already settles soonest.
+        First comes the cheapest change. The remedy that settles soonest follows, or the next one if the first already
+        settles soonest.
         """
         return _recommended(self.working, self.goal)
 
@@ -150,15 +147,22 @@ def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
 
 
 def _working(outcomes: Iterable[RemedyOutcome], stage: Stage, goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Return the remedies of a stage that work: those for all moves first, of these the smallest change first.
+    """Return the remedies of a stage that work: those for all moves first, of these the cheapest for the machine.
 
-    Leaf springs that make the joint of another remedy are left out.
+    Parts to be bought cost most. The speed of the controller, one knob of every controller, comes before other changes
+    up to a factor that machines allow whose modes nobody stated. Others follow by what they cost the machine, force
+    times bandwidth, however many keys spell them. Leaf springs that make the joint of another remedy are left out.
     """
+    own = loop_bandwidth(stage)
+    modes_known = goal.bandwidth_limit is not None or stage.parasitic is not None
 
-    def rank(outcome: RemedyOutcome) -> tuple[bool, ChangeSize]:
+    def rank(outcome: RemedyOutcome) -> tuple[bool, bool, bool, float, ChangeSize]:
         assert outcome.measured is not None
         assert outcome.stage is not None
-        return not outcome.measured.holds_for_all_moves(goal), change_size(stage, outcome.stage)
+        size, ratio = change_size(stage, outcome.stage), max(1.0, loop_bandwidth(outcome.stage) / own)
+        knob = outcome.remedy.name == BANDWIDTH and (modes_known or ratio <= settings.fastest_unasked)
+        cost = outcome.measured.force(goal) * ratio
+        return not outcome.measured.holds_for_all_moves(goal), size.bought, not knob, cost, size
 
     works = (outcome for outcome in outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
     return tuple(sorted(works, key=rank))

@@ -18,6 +18,9 @@ class RemedySettings(Settings):
     """Factors on the bandwidth tried either way. Fewer overshoot the smallest change; each costs a move of all
     machines."""
 
+    fastest_unasked: float = setting(4.0, "")
+    """Largest factor on the bandwidth that is advised first where nobody stated modes or a limit of the machine."""
+
     machine_factor: int = setting(2, "")
     """Factor on the number of machines drawn for searches, so that others stand in for those that are left out."""
 

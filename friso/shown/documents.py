@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,16 @@ def plain_json(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     return value
+
+
+def merged(documents: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Join documents into one; tables of the same key are joined, too."""
+    whole: dict[str, Any] = {}
+    for document in documents:
+        for key, value in document.items():
+            old = whole.get(key)
+            whole[key] = merged([old, value]) if isinstance(old, dict) and isinstance(value, Mapping) else value
+    return whole
 
 
 def entries(source: object, *keys: str) -> dict[str, Any]:

@@ -8,22 +8,21 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib import resources
-from types import MappingProxyType
 from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from friso.escapes import escaped
+from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.images import ON_PAGE, draw_beforehand, image
 from friso.shown.drawing.prefixes import listed
-from friso.shown.files import Content, Files, pictures
+from friso.shown.files import Content, pictures
 from friso.shown.glossary import Glossary
-from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.version import VERSION
@@ -37,29 +36,22 @@ def made_with() -> str:
 OWN_TEMPLATES = "friso.shown"
 """The package with friso's own templates, which other packages' templates extend."""
 
-CONTENTS: Mapping[str, Any] = MappingProxyType(
-    {"condition": "", "verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
-)
-"""Values that every page shows if it has them.
-
-The `condition` stands before the answer. `verdicts` have a colour and `sentences` have none; `notes` stand below them.
-`columns` of the table are texts, or have a label and a colour. Its `rows` are a text and a list of texts. `computed`
-says how the result was computed; it follows the version of friso and has no full stop.
-"""
-
 
 @dataclass(frozen=True)
 class Report:
-    """The page of a `command`: name, figures, stage file, and contents by name.
+    """The page of a `command`: name, blocks of the answer, stage file, and values of the command's own template.
 
-    `values` holds the contents named in `CONTENTS`, and what the command's own template names. That template, if there
-    is one, is the file templates/COMMAND.html in the package that the field `templates` names. It extends `page.html`
-    and changes its blocks: answer, table, figures, footer. Pages that are `scripted` load plotly even without figures.
+    The `condition` stands before the answer. `computed` says how the result was computed; it follows the version of
+    friso and has no full stop. The command's own template, if there is one, is the file templates/COMMAND.html in the
+    package that the field `templates` names. It extends `page.html` and changes its parts: style, answer, sections,
+    footer; `values` are what it names besides. Pages that are `scripted` load plotly even without figures.
     """
 
     command: str
     name: str
-    figures: Sequence[Figure] = ()
+    blocks: Sequence[AnswerBlock] = ()
+    condition: str = ""
+    computed: str = ""
     stage_file: str = ""
     source: str = ""
     version: str = field(default_factory=made_with)
@@ -69,42 +61,49 @@ class Report:
 
     @classmethod
     def of_stage(
-        cls,
-        command: str,
-        stage: Stage | None,
-        figures: Sequence[Figure],
-        name: str = "Unnamed stage",
-        templates: str = OWN_TEMPLATES,
-        **values: Any,
+        cls, command: str, stage: Stage | None, blocks: Sequence[AnswerBlock], name: str = "Unnamed stage", **parts: Any
     ) -> Report:
-        """Return the page about a stage, or about no stage.
+        """Return the page about a stage, or about no stage, with other fields as `parts`.
 
         `name` stands at the head if the stage has no name.
         """
-        if stage is None:
-            return cls(command, name, figures, templates=templates, values=values)
-        values = {"condition": unknown_condition(stage), **values}
-        about = (stage.to_toml(), stage.source)
-        return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
+        about = {} if stage is None else {"stage_file": stage.to_toml(), "source": stage.source}
+        return cls(command, (stage.name if stage else "") or name, blocks, **about, **parts)
 
-    def files(self, beside: Files = MappingProxyType({})) -> dict[str, Content]:
-        """Return the page, files `beside` it, and every figure in all formats, by file name.
+    @property
+    def figures(self) -> list[Figure]:
+        """Return the figures of all blocks."""
+        return [figure for block in self.blocks for figure in block.figures]
+
+    def files(self) -> dict[str, Content]:
+        """Return the page, and every figure in all formats, by file name.
 
         The page has the name of the command's question.
         """
         images = pictures(self.figures)  # other processes draw them while the page is written
-        return {f"{self.command.partition(' ')[0]}.html": self.html(), **beside, **images}
+        return {f"{self.command.partition(' ')[0]}.html": self.html(), **images}
 
     def html(self) -> str:
         """Return the page, which opens offline and prints; every run gives the same bytes."""
         draw_beforehand(self.figures, [ON_PAGE])
-        figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
+        sections = [(block, [_shown_figure(figure) for figure in block.figures]) for block in self.blocks]
+        figures = [figure for _, several in sections for figure in several]
         scripts = plotly_renderer.script() if figures or self.scripted else None
-        values: dict[str, Any] = {"figures": figures, "plotly": scripts, "page_script": script("page")}
-        values |= {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
+        values: dict[str, Any] = {
+            "figures": figures,
+            "drawn_blocks": sections,
+            "plotly": scripts,
+            "page_script": script("page"),
+            **{part.name: getattr(self, part.name) for part in fields(self)},
+        }
         assert not values.keys() & self.values.keys()  # a command's value must not replace one of these
         template = environment(self.templates).select_template([f"{self.command}.html", "page.html"])
-        return template.render(**{**values, **CONTENTS, **self.values})
+        return template.render(**values, **self.values)
+
+
+def _shown_figure(figure: Figure) -> tuple[Figure, Markup, Markup]:
+    """Return a figure, and how it looks on a page with scripts and on paper."""
+    return figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)
 
 
 def script(name: str) -> Markup:
@@ -126,6 +125,7 @@ def environment(package: str = OWN_TEMPLATES) -> Environment:
         finalize=_escaped_text,
     )
     templates.tests["starting"] = str.startswith
+    templates.globals["zip"] = zip
     glossary = Glossary()
     templates.filters["explained"], templates.globals["glossary"] = glossary.linked, glossary
     return templates

@@ -11,10 +11,10 @@ from friso.stage import Stage
 def unknown_condition(stage: Stage | None, varied: Collection[str] = ()) -> str:
     """Write the condition under which an answer holds, with a colon and a blank behind it.
 
-    The values are those that the stage file lists as unknown without a range, except for the keys that are `varied`.
-    Returns "" if there are none.
+    The values are those that the stage file lists as unknown, or the centres of their ranges, except for the keys that
+    are `varied`. Returns "" if there are none.
     """
-    unknown = [] if stage is None else [key for key in stage.assumed_keys if key not in varied]
+    unknown = [] if stage is None else [key for key in stage.unknown_keys if key not in varied]
     if stage is None or not unknown:
         return ""
     flat, keys = stage.flat(), stage.numeric_keys()

@@ -20,7 +20,7 @@ from friso.stage.tables import FRICTION
 if TYPE_CHECKING:
     from friso.stage.stage import Stage
 
-Ends = tuple[float, float]
+ContactRange = tuple[float, float]
 """Lowest and highest value of a range [SI]."""
 
 _FORCE = Quantity("N", positive, "5 N")
@@ -32,7 +32,7 @@ MOST_CARRIAGES = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contact:
+class ContactKind:
     """A kind of contact, with ranges of what nearly all machines with it show (file contacts.toml, with sources).
 
     `ratio` is static over Coulomb friction, `stribeck_velocity` is in m/s. Over `presliding` [m] the contact gives way
@@ -43,18 +43,18 @@ class Contact:
 
     name: str
     source: str
-    ratio: Ends
-    stribeck_velocity: Ends
-    presliding: Ends
-    settling: Ends
-    viscous: Ends
+    ratio: ContactRange
+    stribeck_velocity: ContactRange
+    presliding: ContactRange
+    settling: ContactRange
+    viscous: ContactRange
     axis: str = LINEAR.name
     sizes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    preloads: Mapping[str, Ends] = field(default_factory=dict)
-    seals: Ends = (1.0, 1.0)
-    friction_coefficient: Ends = (0.0, 0.0)
+    preloads: Mapping[str, ContactRange] = field(default_factory=dict)
+    seals: ContactRange = (1.0, 1.0)
+    friction_coefficient: ContactRange = (0.0, 0.0)
 
-    def drag(self, size: str, preload: str) -> Ends:
+    def drag(self, size: str, preload: str) -> ContactRange:
         """Return the Coulomb friction [N] of one carriage of a size, with a preload."""
         one, shares = self.sizes[size], self.preloads[preload]
         return tuple(
@@ -62,7 +62,7 @@ class Contact:
             for seal, coefficient, share in zip(self.seals, self.friction_coefficient, shares, strict=True)
         )  # type: ignore[return-value]
 
-    def ranges(self, coulomb: Ends, stiffness: Ends = (0.0, math.inf)) -> dict[str, Ends]:
+    def ranges(self, coulomb: ContactRange, stiffness: ContactRange = (0.0, math.inf)) -> dict[str, ContactRange]:
         """Return the ranges [SI] of the keys of [friction] for a range of Coulomb friction [N].
 
         A range of bristle `stiffness` [N/m] that something else shows cuts that of the contact. Static friction spans
@@ -82,10 +82,10 @@ class Contact:
 
 
 @cache
-def contacts(axis: str = LINEAR.name) -> dict[str, Contact]:
+def contacts(axis: str = LINEAR.name) -> dict[str, ContactKind]:
     """Return the kinds of contact of an axis, "linear" or "rotary", by name; the first one is any contact."""
     rows = tomllib.loads(files("friso").joinpath("contacts.toml").read_text(encoding="utf-8"))["contact"]
-    several = [Contact(**{key: _ends(value) for key, value in row.items()}) for row in rows]
+    several = [ContactKind(**{key: _ends(value) for key, value in row.items()}) for row in rows]
     return {one.name: one for one in several if one.axis == axis}
 
 
@@ -100,7 +100,7 @@ STRIBECK_EXPONENT = 2
 """Exponent of a guessed Stribeck curve, a Gaussian one."""
 
 
-def any_contact(axis: AxisKind) -> Contact:
+def any_contact(axis: AxisKind) -> ContactKind:
     """Return the ranges that hold for every contact on a kind of axis."""
     return next(iter(contacts(axis.name).values()))
 
@@ -133,17 +133,17 @@ def with_guess(tables: Mapping[str, Any], axis: AxisKind) -> dict[str, Any]:
     return {**tables, "friction": {**table, **added}, **({"unknown": ", ".join(unknown)} if unknown else {})}
 
 
-def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Ends]) -> dict[str, Ends]:
+def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, ContactRange]) -> dict[str, ContactRange]:
     """Return what similar machines have for some keys of [friction] that nobody knows, as ranges [SI] by key.
 
     They follow from Coulomb friction, or else from static friction, and from the contact that the stage's guess names;
     `bounds` cut them. A key has no range if nobody knows these either, or if nothing is usual for it.
     """
     flat, intervals, axis = stage.flat(), stage.uncertain(), stage.axis_kind
-    guess = getattr(stage.friction, "guess", "")
+    guess = getattr(stage.friction, "guess", None)
     contact = _understood(guess, axis)[0] if guess else any_contact(axis)
 
-    def known(key: str) -> Ends | None:
+    def known(key: str) -> ContactRange | None:
         """Return the range of a key's value; None if the stage has none, or if nobody knows it."""
         if key in keys or key not in flat:
             return None
@@ -158,18 +158,18 @@ def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Ends]
     return {key: cut(ranges[key], bounds.get(key, ranges[key])) for key in keys if key in ranges and key in flat}
 
 
-def cut(ends: Ends, other: Ends) -> Ends:
+def cut(ends: ContactRange, other: ContactRange) -> ContactRange:
     """Return the common part of two ranges, or the first one if they have none."""
     low, high = max(ends[0], other[0]), min(ends[1], other[1])
     return (low, high) if low < high else ends
 
 
-def written(ends: Ends, unit: str) -> str:
+def written(ends: ContactRange, unit: str) -> str:
     """Write a range for a stage file: "1.2 N .. 3 N"."""
-    return " .. ".join(f"{end:.3g} {unit}".rstrip() for end in ends)
+    return " .. ".join(f"{float(f'{end:.3g}'):.12g} {unit}".rstrip() for end in ends)
 
 
-def _stated(table: Mapping[str, Any], key: str, axis: AxisKind) -> Ends | None:
+def _stated(table: Mapping[str, Any], key: str, axis: AxisKind) -> ContactRange | None:
     """Return the range in which a table states a force [N]; None without one, or if it cannot be read."""
     text = getattr(table.get(key), "text", table.get(key))
     if text is None:
@@ -184,12 +184,12 @@ def _stated(table: Mapping[str, Any], key: str, axis: AxisKind) -> Ends | None:
     return value, value
 
 
-def _from_static(static: Ends | None, contact: Contact) -> Ends | None:
+def _from_static(static: ContactRange | None, contact: ContactKind) -> ContactRange | None:
     """Return the Coulomb friction [N] of a contact with a range of static friction."""
     return static and (static[0] / contact.ratio[1], static[1] / contact.ratio[0])
 
 
-def _understood(guess: str, axis: AxisKind) -> tuple[Contact, Ends | None]:
+def _understood(guess: str, axis: AxisKind) -> tuple[ContactKind, ContactRange | None]:
     """Return the contact that a guess names, and its Coulomb friction [N], or None if the guess has no size.
 
     Raises StageError for words that are not understood.

@@ -33,6 +33,7 @@ from friso.hunting import (
     Space,
     cannot_hunt,
     diagram,
+    is_moved_evenly,
     plane,
 )
 from friso.progress import Progress, silent
@@ -74,6 +75,8 @@ def boundary(
     if not rests(stage.flat()):
         actual = f'motion.kind = "{stage.flat()["motion.kind"]}", whose reference keeps moving'
         expected = "a reference that comes to stand, as there is a verdict on hunting only there"
+        if is_moved_evenly(stage):
+            expected += "; friso check and friso map tell at which speeds a ramp sticks and slips"
         raise InputError("motion", actual, expected, """--set 'motion={kind="hold", duration="20 s"}'""")
     for key in (*(swept.key for swept in ranges), *followers):
         if key.startswith("motion."):

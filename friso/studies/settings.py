@@ -70,6 +70,39 @@ class StudySettings(Settings):
     most_open_draws: float = setting(0.05, "")
     """Largest share of draws that hunt or have no certain verdict where the others decide: advice holds for 95 %."""
 
+    accelerations_of_friction: tuple[float, float] = setting((0.01, 10.0), "m/s^2")
+    """Range of Coulomb friction over mass that bearings have, from air-like to a preloaded screw on a light stage."""
+
+    levels_of_friction: int = setting(10, "")
+    """Levels of Coulomb friction tried over that range, a factor of two apart."""
+
+    machines_of_a_level: int = setting(32, "")
+    """Machines drawn at each level of Coulomb friction."""
+
+    periods_of_a_standing_log: float = setting(2.0, "")
+    """Periods of the predicted cycle for which a reference must stand before rest in a log contradicts it."""
+
+    ratio_of_alike_swings: float = setting(1.25, "")
+    """Largest ratio of swings, and of periods, that count as alike: friction of one machine differs by as much."""
+
+    noises_of_a_swing: float = setting(4.0, "")
+    """Smallest amplitude of a swing, in standard deviations of the position's noise."""
+
+    unevenness_of_a_swing: float = setting(0.4, "")
+    """Largest standard deviation of the amplitude of a swing, relative to its mean. Noise is less even."""
+
+    samples_of_a_swing: float = setting(10.0, "")
+    """Shortest period of a swing in samples."""
+
+    share_of_a_lasting_swing: float = setting(0.5, "")
+    """Smallest share of the time at which a reference stands that a lasting swing takes."""
+
+    reach_of_a_change: float = setting(8.0, "")
+    """Largest factor tried on keys of a stage to explain a log."""
+
+    changes_tried: int = setting(37, "")
+    """Factors tried on a key, 12 % apart, less than the difference that swings may have to be alike."""
+
     most_draws: int = setting(100_000, "")
     """Most draws. At the edge of hunting a draw takes 50 ms, so more take hours."""
 

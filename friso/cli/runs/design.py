@@ -16,7 +16,7 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     """Ask for a design. Raises typer.Exit with status 2 where there is none."""
     from friso.design_method.method import NoDesign
     from friso.interface.inputs import stage_of
-    from friso.questions.design.document import refused_document
+    from friso.questions.design.blocks import refused_document
     from friso.questions.design.question import specification_of
     from friso.questions.design.words import refusal
     from friso.shown.unknown import unknown_condition

@@ -30,7 +30,7 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
     """
     from friso.identification.sources import OpenQuestions
     from friso.interface.output_folder import OutputFolder
-    from friso.questions.identify.page import STAGE
+    from friso.questions.identify.blocks import STAGE
     from friso.shown.drawing.images import drawing_beside
 
     assert shown.out is not None  # the option has a default

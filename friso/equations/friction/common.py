@@ -165,7 +165,7 @@ class StribeckSection(FrictionSection):
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
     asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
     viscous_asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
-    guess: str = ""
+    guess: str | None = None
     """Contact whose usual friction stands for keys that nobody measured (see `friso.stage.contacts`)."""
     under_conditions: ClassVar[bool] = True
     rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)

@@ -12,8 +12,8 @@ import numpy as np
 
 from friso.frequency.bode import Bode, BodeCase, CascadeLoop
 from friso.frequency.crossover import COMFORTABLE_MARGIN
+from friso.questions.bode.numbers import decibels
 from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
-from friso.questions.bode.table import decibels
 from friso.shown.drawing.colours import ramp
 from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Markers, Panel, Series
 from friso.shown.drawing.palette import INK, LIGHT

@@ -12,9 +12,8 @@ from friso.frequency.bode import Bode, Unstable
 from friso.frequency.crossover import COMFORTABLE_MARGIN, Limits, Range
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
-from friso.interface.answer import AnswerTable
-from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, shown_states
-from friso.questions.bode.table import growth, rows
+from friso.questions.bode.numbers import growth
+from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place
 from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
 from friso.shown.says import Alternatives, Words, always, say, say_all
 
@@ -221,9 +220,3 @@ _MORE: Alternatives[Bode] = (
     ),
 )
 """Details: the worst settled state, what was checked, and what the crossover and a backlash mean for the analysis."""
-
-
-def tables(bode: Bode) -> list[AnswerTable]:
-    """Return the table of stability margins, with a column for each state."""
-    states = shown_states(bode)
-    return [AnswerTable(bode.stage.name, [item.label for item in states], rows(states))]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 from friso.axis import AxisKind
 from friso.equations.bandwidth import range_example
@@ -20,7 +20,6 @@ from friso.stage import Stage
 
 if TYPE_CHECKING:
     from friso.questions.boundary.words import ShownKey
-    from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
 
 
@@ -48,35 +47,19 @@ class BoundaryAnswer(Answer):
         varied = frozenset([*self.varied, *self.links])
         return tuple(replace(_in_its_unit(swept, text, self.axis_kind), varied=varied) for swept, text in ranges)
 
-    def sentences(self) -> Sequence[str]:
-        """Return where hunting is possible and where it ends."""
-        from friso.questions.boundary.words import answer
-
-        return answer(self.result, self.keys)
-
-    def details(self) -> Sequence[str]:
-        """Return a sentence on every branch or curve, and on flips, folds and other special points."""
-        from friso.questions.boundary.words import details
-
-        return details(self.result, self.keys)
-
-    def figures(self) -> Sequence[Figure]:
-        """Return the figure of the branches of cycles, or of the curves on which hunting ends."""
-        from friso.questions.boundary.figures import boundary_figure
-
-        return [boundary_figure(self.result, self.keys, self.stage.name, self.condition)]
-
-    def document(self) -> dict[str, Any]:
-        """Return points, branches and curves as a document."""
-        from friso.questions.boundary.document import boundary_document
-
-        return boundary_document(self.result, self.keys)
+    @property
+    def subject(self) -> BoundaryAnswer:
+        """Return the answer itself, which has the keys."""
+        return self
 
     def files(self) -> Files:
-        """Return the page, the figure, and the table of points."""
-        from friso.questions.boundary.page import boundary_files
+        """Return the page, the figure, and the table of points, named after the stage's file."""
+        from friso.questions.boundary.blocks import write_table
+        from friso.shown.files import image_files
 
-        return boundary_files(self.result, self.keys, self.stage, f"{self.name}_boundary")
+        stem, (figure,) = f"{self.name}_boundary", self.figures()
+        images = image_files(figure, stem)
+        return {f"{stem}.html": self.page().html(), **images, f"{stem}.csv": partial(write_table, self.result)}
 
 
 @question

@@ -1,12 +1,14 @@
-"""Show what machines drawn from uncertain keys do: in the table, sentences and a figure."""
+"""Show what machines drawn from uncertain keys do: in sentences, a table, a figure, and the JSON document."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
+from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.quantities import plain_factor
 from friso.shown.cases import case_labels
@@ -97,6 +99,8 @@ def _verdict(name: str, draws: Draws) -> str:
     doubt = f", {open_ones} of them not for certain" if open_ones else ""
     if open_ones == count:
         return f"{loop}what {count} machines drawn do is not certain."
+    if draws.split(name) and not attracted.probability:
+        return f"{loop}none of {count} machines drawn surely hunts{doubt.replace(' of them', '')}."
     if draws.split(name):
         does = f"may hunt: {share_with_interval(attracted)} of {count} machines drawn do{_swings(fates)}{doubt}"
         return f"{loop}{does}.{_hangs_on(fates, draws)}"
@@ -104,7 +108,9 @@ def _verdict(name: str, draws: Draws) -> str:
         rare = f"at most {percentage(attracted.high)} % of all such machines do"
         return f"{loop}does not hunt: none of {count} machines drawn does ({rare}{doubt})."
     always = after_this.probability == attracted.probability
+    never = "settles after this move, but another move or a kick makes it hunt"
     does = "hunts" if always else f"can hunt, and {share_with_interval(after_this)} of the machines do after this move"
+    does = does if after_this.probability else never
     return f"{loop}{does}{_swings(fates)} (all of {count} machines drawn{doubt})."
 
 
@@ -239,3 +245,43 @@ def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
     x_axis = Axis(key, draws.unit(key), (float(edges[0]), float(edges[-1])))
     title = f"{label}: all {bands[0].label}" if len(bands) == 1 else label  # a single band has no legend
     return Panel(title, x_axis, Axis("Draws", "", limits), bands=tuple(bands))
+
+
+def draws_document(draws: Draws, case: str) -> dict[str, Any]:
+    """Return the verdicts on the stages drawn, with the joint as given, locked or free."""
+    fates = draws.fates[case]
+    return {
+        "count": draws.sample.count,
+        "seed": draws.seed,
+        "left_out": draws.sample.left_out,
+        "hunts": asdict(fates.share(("hunts",))),
+        "attracting_cycle": asdict(fates.share(ATTRACTED)),
+        "criterion": VERDICT_CRITERION,
+        "verdicts": fates.counts,
+        "loop_unstable": int(fates.unstable.sum()),
+        "separation": fates.separations(draws.sample.keys),
+        "amplitude_m": _ends(fates.amplitudes),
+        "period_s": _ends(fates.periods),
+        "split": draws.split(case),
+        **_bandwidths(draws.bandwidths.get(case)),
+    }
+
+
+def _bandwidths(tried: DrawnBandwidths | None) -> dict[str, Any]:
+    """Return where hunting of the machines drawn ends, and at which faster bandwidths none of them hunts."""
+    edges = _ends(np.r_[tried.edges]) if tried else None
+    cure = list(tried.cure) if tried and tried.cure else None
+    own = tried.own if tried else None
+    return {
+        "tried_at_bandwidths": len(tried.hunts) if tried else 0,
+        "edge_factor": edges,
+        "edge_hz": [own * end for end in edges] if own and edges else None,
+        "cure_factor": cure,
+        "cure_hz": [own * end for end in cure] if own and cure else None,
+    }
+
+
+def _ends(values: np.ndarray) -> list[float] | None:
+    """Return the least and the largest finite value; None if no value is finite."""
+    finite = values[np.isfinite(values)]
+    return [float(finite.min()), float(finite.max())] if finite.size else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from friso.shown.drawing.prefixes import with_unit
 
@@ -24,3 +24,15 @@ def isolator_sentence(suggestion: Suggestion) -> str:
         return f"It would not surely stop hunting on {joint}, or on any shorter stroke tried."
     low = "" if suggestion.margin >= LITTLE_MARGIN else ", too little: the controller has to be tuned as well"
     return f"On {joint} it would not hunt; its modulus margin would be {suggestion.margin:.2f}{low} (friso tune)."
+
+
+def isolator_document(isolator: Suggestion) -> dict[str, Any]:
+    """Return the suggested isolator, and whether the stage settles on it."""
+    flat = isolator.stage.flat()
+    return {
+        "settles": isolator.settles,
+        "stiffness_n_per_m": flat["joint.stiffness"],
+        "stroke_m": flat["joint.stroke"],
+        "damping_ns_per_m": flat["joint.damping"],
+        "modulus_margin": isolator.margin,
+    }

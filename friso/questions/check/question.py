@@ -12,7 +12,7 @@ from friso.engine.simulate import SIMULATION_RTOL, simulate
 from friso.errors import InputError
 from friso.hunting import LONG_RUN_RTOL, Case, needed_kernels
 from friso.interface import inputs
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import LOGGER, Changes, Seed, StageLike, Tolerance, Whole
 from friso.platform.interrupts import answers_interrupts
 from friso.progress import Progress, silent
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from friso.hunting import LoopState, ParameterMargin
     from friso.hunting.criteria import Verdict
     from friso.remedies.catalogue import Suggestion
-    from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
+    from friso.studies.friction_levels import FrictionLevels
     from friso.studies.laws.verdicts import VerdictsByLaw
 
 
@@ -52,9 +52,23 @@ class CheckAnswer(Answer):
     cut: bool
 
     @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys over which machines were drawn."""
+        return [*self.draws.sample.keys] if self.draws else ()
+
+    @property
     def interrupted(self) -> bool:
         """Tell whether Ctrl-C ended the work before all machines were drawn."""
         return self.cut
+
+    @cached_property
+    def friction_levels(self) -> FrictionLevels | None:
+        """Return for which friction a stage would hunt whose stage file states none; None for any other."""
+        if self.stage.friction is not None:
+            return None
+        from friso.studies.friction_levels import friction_levels
+
+        return friction_levels(self.stage)
 
     @cached_property
     def isolator(self) -> Suggestion | None:
@@ -84,68 +98,14 @@ class CheckAnswer(Answer):
         away = any(case.runs_away for case in self.result.values())
         return "there is no verdict on hunting for a motion that runs away" if away else ""
 
-    def sentences(self) -> Sequence[str]:
-        """Return the verdicts, and the probabilities of hunting where keys are uncertain."""
-        from friso.questions.check.draws import draws_sentences
-        from friso.questions.check.isolator_words import isolator_sentence
-        from friso.questions.check.laws import laws_sentences
-        from friso.questions.check.words import answer
-        from friso.shown.motion_words import motion_sentences
-
-        suggested = [isolator_sentence(self.isolator)] if self.isolator else []
-        drawn = draws_sentences(self.draws) if self.draws else []
-        if self.cut and not self.draws:
-            drawn = ["Interrupted: no stages were drawn yet."]
-        notes = filter(None, [self.stage.controller.note(self.stage.flat()), self.stage.note])
-        short = [*motion_sentences(self.stage), *notes]
-        said = drawn if self.draws else [*drawn, *answer(self.result)]
-        return [*said, *short, *suggested, *(laws_sentences(self.laws) if self.laws else [])]
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return the numbers of each case, of the machines drawn, and across friction laws.
-
-        The cases are the stage as given, with its joint locked, and with its joint free.
-        """
-        from friso.questions.check.draws import draws_rows
-        from friso.questions.check.laws import laws_columns, laws_rows
-        from friso.questions.check.table import rows, rows_behind
-        from friso.shown.cases import case_labels, shown_cases
-
-        cases = shown_cases(self.result)
-        title = f"{self.stage.name}, at the centre of its ranges".removeprefix(", ") if self.draws else self.stage.name
-        tables = [AnswerTable(title, [item.label for item in cases], rows(cases))]
-        if self.draws:
-            title = f"{self.draws.sample.count} stages drawn from the uncertain keys, seed {self.draws.seed}"
-            tables.append(AnswerTable(title, [*case_labels(self.draws.stage).values()], draws_rows(self.draws)))
-        if self.laws:
-            tables.append(AnswerTable("Across friction laws", laws_columns(self.laws), laws_rows(self.laws)))
-        behind = AnswerTable("How that was computed", [item.label for item in cases], rows_behind(cases), behind=True)
-        return [*tables, behind]
-
-    def details(self) -> Sequence[str]:
-        """Return more on each case, what the search for the edge may miss, joint margins, and a doubt on friction.
-
-        The doubt is that a friction law may give energy back, which no friction does.
-        """
-        from friso.questions.check.draws import draws_details
-        from friso.questions.check.margin_words import joint_sentences
-        from friso.questions.check.words import activity_sentences, answer, between_surveyed, details_of
-        from friso.stage.tables import passive_where
-
-        activity = activity_sentences(passive_where(self.stage.flat()))
-        centre = [f"At the centre of the ranges: {text}" for text in answer(self.result)] if self.draws else []
-        return [
-            *centre,
-            *(draws_details(self.draws) if self.draws else []),
-            *details_of(self.result),
-            *between_surveyed(self.result),
-            *joint_sentences(self.joint_margins),
-            *activity,
-        ]
+    @property
+    def subject(self) -> CheckAnswer:
+        """Return the answer itself, which has more than the cases."""
+        return self
 
     def document_of_details(self) -> dict[str, Any]:
         """Return the margins in the joint's stroke and stiffness as a document."""
-        from friso.questions.check.document import joint_margins_document
+        from friso.questions.check.cases import joint_margins_document
 
         case = self.result.get("free", self.result["given"])
         return joint_margins_document(case.stage, self.joint_margins)
@@ -163,23 +123,9 @@ class CheckAnswer(Answer):
         """Return the cases with their time responses, which the figures show."""
         return {name: replace(case, trace=simulate(case.stage, case.solver.rtol)) for name, case in self.result.items()}
 
-    def figures(self) -> Sequence[Figure]:
-        """Return the figures of motion and hunting cycles, as given and with joint locked and free."""
-        from friso.questions.check.figures import check_figures
-
-        return check_figures(self.traced)
-
-    def document(self) -> dict[str, Any]:
-        """Return the cases with their verdicts as a document."""
-        from friso.questions.check.document import check_document
-
-        return check_document(self.result, self.draws, self.isolator, self.laws)
-
     def files(self) -> Files:
-        """Return the report with its figures."""
-        from friso.questions.check.page import check_files
-
-        return check_files(self.traced, self.draws, self.isolator, self.laws)
+        """Return the report, which is the only file."""
+        return {"report.html": self.page().html()}
 
 
 @question

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 
 from friso.interface import inputs
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, FrequencyLike, LengthLike, Seed, SettingName, StageLike
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
@@ -14,6 +14,11 @@ from friso.quantities import Quantity, positive
 
 class CompareAnswer(Answer):
     """Several options on the same machines; `result` is a `Comparison`."""
+
+    @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys over which machines are drawn."""
+        return [*self.result.stage.uncertain()]
 
     @property
     def interrupted(self) -> bool:
@@ -25,29 +30,6 @@ class CompareAnswer(Answer):
         """Say how many runs stopped early; empty if none did."""
         stopped = sum(result.failed for result in self.result.results)
         return f"{stopped} runs stopped early" if stopped else ""
-
-    def sentences(self) -> Sequence[str]:
-        """Say whether to buy a joint, then which options bring the machines to rest, at what cost."""
-        from friso.questions.compare.words import answer
-
-        return answer(self.result)
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return the options, and each compared with the first on the same machines."""
-        from friso.questions.compare.words import COLUMNS, PAIRED, paired_rows, table_rows
-
-        return [
-            AnswerTable(self.result.stage.name, self.axis_kind.named(COLUMNS), table_rows(self.result)),
-            AnswerTable("Compared with a, machine by machine", self.axis_kind.named(PAIRED), paired_rows(self.result)),
-        ]
-
-    def details(self) -> Sequence[str]:
-        """Return what each option is and does, how machines were drawn, and notes."""
-        from friso.questions.compare.words import details, options_rows, population
-
-        options = [f"{label}: {text}" for label, text in options_rows(self.result)]
-        notes = [f"note: {note}" for note in self.result.notes]
-        return [*options, *details(self.result), *population(self.result), *notes]
 
 
 @question

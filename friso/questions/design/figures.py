@@ -15,7 +15,7 @@ from friso.frequency.crossover import COMFORTABLE_MARGIN, Range
 from friso.questions.design.window import stiffest, view
 from friso.questions.design.words import hertz, size
 from friso.questions.flexure.figures import modes_figure
-from friso.questions.flexure.table import newtons_per
+from friso.questions.flexure.numbers import newtons_per
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.drawable import cell_edges
 from friso.shown.drawing.figure import Array, Axis, Band, Category, Dash, Figure, Limit, Map, Markers, Panel, Series

@@ -6,8 +6,8 @@ Leaf springs, stroke, crossover and gains follow from a specification.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from friso.design_method.prepare import assumed, by_rules, check_designable, offset_points, outline
 from friso.design_method.spec import Spec, load_spec, read_spec
@@ -18,6 +18,9 @@ from friso.platform.extras import need
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
 from friso.stage import Stage, numeric_keys
+
+if TYPE_CHECKING:
+    from friso.shown.files import Files
 
 
 class DesignAnswer(Answer):
@@ -46,16 +49,11 @@ class DesignAnswer(Answer):
         """Tell whether the design was not verified because Ctrl-C ended the work."""
         return self.unfinished and self.result.interrupted
 
-    def details(self) -> Sequence[str]:
-        """Return the steps of the method with their reasons; none of a design that was not verified."""
-        from friso.questions.design.steps import steps
-        from friso.questions.design.words import headline
+    def files(self) -> Files:
+        """Return all files of a design; of an unfinished one, the stage so far is the only file."""
+        from friso.questions.design.blocks import NOT_VERIFIED
 
-        if self.unfinished:
-            return ()
-        titled = [f"{step.title}: {' '.join(step.sentences)}" for step in steps(self.result)]
-        laws = [sentence for _, sentence in headline(self.result)[3:]]
-        return [*laws, *(f"{number}. {text}" for number, text in enumerate(titled, 1))]
+        return {NOT_VERIFIED: self.result.stage.to_toml()} if self.unfinished else super().files()
 
 
 @question

@@ -17,7 +17,7 @@ from friso.quantities import percent, plain_factor
 from friso.questions.design import words
 from friso.questions.design.window import CrossoverBound, comfortable, lower, upper
 from friso.questions.design.words import DesignStep, hertz, seconds, size, trimmed
-from friso.questions.flexure.table import megapascals, newtons_per
+from friso.questions.flexure.numbers import megapascals, newtons_per
 from friso.questions.flexure.words import assumptions
 from friso.shown.drawing.prefixes import listed
 

@@ -65,6 +65,11 @@ def isolator(fitted: LeavesAndCrossover, crossover: float) -> str:
 
 
 def headline(design: Design) -> list[tuple[str, str]]:
+    """Return the verdicts, and what friction laws change in them, each with its colour."""
+    return [*verdicts(design), *of_laws(design)]
+
+
+def verdicts(design: Design) -> list[tuple[str, str]]:
     """Return the verdicts with their colours: is an isolator needed, which one, do moves settle."""
     return [
         (ORANGE if design.needed else GREEN, need_words(design.need)),
@@ -74,6 +79,12 @@ def headline(design: Design) -> list[tuple[str, str]]:
             f"{isolator(design.fitted, design.controller.crossover)}.",
         ),
         _verified(design),
+    ]
+
+
+def of_laws(design: Design) -> list[tuple[str, str]]:
+    """Say with colours what friction laws change in the edges of hunting, and which were not tried."""
+    return [
         *([(GREEN, across_laws(design))] if len(design.by_law) > 1 else []),
         *([(ORANGE, lost_laws(design))] if design.lost else []),
     ]
@@ -296,13 +307,6 @@ def hertz(frequency: float) -> str:
 def seconds(time: float) -> str:
     """Write a settling time [s]; "never" if it is not finite."""
     return with_unit(time, "s") if math.isfinite(time) else "never"
-
-
-def sentences(design: Design | UnfinishedDesign) -> list[str]:
-    """Return the verdicts on the design; if it is unfinished, what is decided so far."""
-    if isinstance(design, UnfinishedDesign):
-        return so_far(design)
-    return [sentence for _, sentence in headline(design)[:3]]
 
 
 def next_steps(design: Design | UnfinishedDesign, files: Sequence[Path]) -> list[str]:

@@ -5,11 +5,16 @@ They come in the units of drives, and as the parameters of a kind of drive.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from friso.axis import speak_of
 from friso.drives.gains import gains_of
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, FormatName, StageLike, changes_of, choice, stage_of
 from friso.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from friso.shown.files import Files
 
 
 class ExportAnswer(Answer):
@@ -19,6 +24,11 @@ class ExportAnswer(Answer):
     def condition(self) -> str:
         """Return "": gains are told as they stand."""
         return ""
+
+    def files(self) -> Files:
+        """Return the page, and the parameter file if a kind of drive was named."""
+        kind = self.result.kind
+        return {"gains.html": self.page().html(), **({f"parameters{kind.suffix}": self.result.text} if kind else {})}
 
 
 @question

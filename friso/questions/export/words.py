@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from friso.drives.gains import Gains
-from friso.interface.answer import AnswerTable
 from friso.quantities import as_toml
+from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
 from friso.stage.section import numeric_fields
 
@@ -68,14 +68,15 @@ def _with_unit(value: tuple[float, str]) -> str:
     return f"{rounded:.10g} {unit}".rstrip()
 
 
-def tables(gains: Gains) -> list[AnswerTable]:
-    """Return the table of gains with symbols and values."""
-    return [AnswerTable(title(gains), COLUMNS, rows(gains))]
-
-
-def blocks(gains: Gains) -> list[str]:
-    """Return the drawing of the loop, and the parameters of a drive."""
-    return [text for text in (gains.diagram, gains.text) if text]
+def blocks(gains: Gains) -> list[AnswerBlock]:
+    """Return the blocks: what to type in, the loop to which the gains belong, the gains, and a drive's parameters."""
+    parameters = [AnswerBlock(title="Parameters", text=gains.text)] if gains.text else []
+    return [
+        AnswerBlock(sentences=sentences(gains), numbers=lambda: export_document(gains)),
+        AnswerBlock(title="The loop that these gains belong to", text=gains.diagram),
+        AnswerBlock(title=title(gains), columns=COLUMNS, rows=rows(gains)),
+        *parameters,
+    ]
 
 
 def export_document(gains: Gains) -> dict[str, Any]:

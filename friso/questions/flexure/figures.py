@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels
 from friso.leaf_springs.evaluation import Evaluation, Mode
@@ -99,7 +98,7 @@ def _lines(
 
 def _odd(x: Array, y: Array, at: Array) -> Array:
     """Interpolate an odd function y(x), sampled at x from 0 upwards, at `at` by a cubic spline."""
-    return CubicSpline(np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]))(at)
+    return _spline(np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]), at)
 
 
 def _even_falling(x: Array, y: Array, at: Array) -> Array:
@@ -107,7 +106,14 @@ def _even_falling(x: Array, y: Array, at: Array) -> Array:
 
     The inverse is interpolated, since it grows about as the square of x.
     """
-    return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
+    return 1 / _spline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]), at)
+
+
+def _spline(x: Array, y: Array, at: Array) -> Array:
+    """Interpolate y(x) at `at` by a cubic spline."""
+    from scipy.interpolate import CubicSpline  # 0.3 s to import
+
+    return CubicSpline(x, y)(at)
 
 
 def _deflection(flexure: BothModels) -> Axis:
@@ -278,7 +284,7 @@ def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
     Returns the positions along the leaf [m], and the displacement at each.
     """
     reported, fine = (np.linspace(0.0, float(mechanism.length), count) for count in (len(leaf), LEAF_POINTS))
-    return fine, CubicSpline(reported, leaf)(fine)
+    return fine, _spline(reported, leaf, fine)
 
 
 def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from friso.interface.answer import AnswerTable
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import AXES, STANDARD_GRAVITY
 from friso.quantities import percent
-from friso.questions.flexure.table import megapascals, newtons_per, rows
+from friso.questions.flexure.numbers import megapascals, newtons_per
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage import Stage
 
@@ -25,11 +24,6 @@ def sentences(flexure: BothModels) -> list[str]:
     """Return all sentences on the leaf springs: what they can do, warnings, and assumptions."""
     joint, *further = findings(flexure)
     return [joint, *warnings(flexure), *further, *assumptions(flexure.stage)]
-
-
-def tables(flexure: BothModels) -> list[AnswerTable]:
-    """Return the table of stiffness, modes, stress and buckling by both models."""
-    return [AnswerTable(flexure.stage.name, list(flexure.models), rows(flexure))]
 
 
 def findings(flexure: BothModels) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Keyed
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from friso.axis import LINEAR, speak_of
@@ -17,7 +18,7 @@ from friso.identification.method import Prediction, around, axis_of_all, check_p
 from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_usable
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface import inputs
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import (
     LOGGER,
     Changes,
@@ -42,8 +43,8 @@ if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
     from friso.identification.method import Identification
     from friso.questions.check.question import CheckAnswer
-    from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
+    from friso.shown.pages import Report
+    from friso.studies.contradiction import Contradiction
 
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
@@ -56,12 +57,15 @@ class IdentifyAnswer(Answer):
 
     `result` is an `Identification` with the estimates, and with a `stage` if the logs describe a whole machine.
     `inputs` are the files read, and `predictions` the predictions of other logs. `checked` is the answer of `friso
-    check` on the stage; None unless that was asked for.
+    check` on the stage; None unless that was asked for. `compared` has, by log, whether it contradicts the stage
+    `suspect`, if that was asked for.
     """
 
     inputs: Sequence[LogFile]
     predictions: Sequence[Prediction]
     checked: CheckAnswer | None
+    compared: Keyed[str, Contradiction] = MappingProxyType({})
+    suspect: Stage | None = None
 
     @property
     def condition(self) -> str:
@@ -73,29 +77,15 @@ class IdentifyAnswer(Answer):
         """Say that a model does not describe its log; empty if all do."""
         return "a model does not describe its log" if self.result.failed else ""
 
-    def sentences(self) -> Sequence[str]:
-        """Return what was identified, how well other logs are predicted, and notes.
+    @property
+    def subject(self) -> IdentifyAnswer:
+        """Return the answer itself, which has the logs and the predictions."""
+        return self
 
-        The sentences of a check follow, if the identified stage was checked.
-        """
-        from friso.questions.identify.words import sentences
-
-        verdicts = [] if self.checked is None else self.checked.sentences()
-        return [*sentences(self.result, self.predictions), *verdicts]
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return the table of estimates with their intervals."""
-        from friso.questions.identify.words import COLUMNS, estimate_rows
-
-        rows = [(first, rest) for first, *rest in (row.texts for row in estimate_rows(self.result))]
-        checked = [] if self.checked is None else self.checked.tables()
-        return [*([AnswerTable("", COLUMNS[1:], rows)] if rows else []), *checked]
-
-    def details(self) -> Sequence[str]:
-        """Return the experiments behind the estimates, and what was read."""
-        from friso.questions.identify.words import details
-
-        return details(self.result, self.inputs)
+    def page(self) -> Report:
+        """Return the page, named after the logs if there is no stage."""
+        page = super().page()
+        return page if self.result.stage else replace(page, name=", ".join(file.path.name for file in self.inputs))
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that checks the identified stage.
@@ -106,25 +96,6 @@ class IdentifyAnswer(Answer):
             return []
         draws = " --draws 1000" if self.result.stage.uncertain() else ""
         return [f"friso check {shell_word(str(files[0]))}{draws}"]
-
-    def figures(self) -> Sequence[Figure]:
-        """Return the figures of logs beside what the models predict."""
-        from friso.questions.identify.figures import identify_figures
-
-        return identify_figures(self.result, self.predictions)
-
-    def document(self) -> dict[str, Any]:
-        """Return estimates, experiments and logs as a document."""
-        from friso.questions.identify.document import identify_document
-
-        document = identify_document(self.result, self.inputs, self.predictions)
-        return document if self.checked is None else {**document, "check": self.checked.document()}
-
-    def files(self) -> Files:
-        """Return the stage file, the correlations, the page and the figures."""
-        from friso.questions.identify.page import identify_files
-
-        return identify_files(self.result, self.inputs, self.predictions)
 
 
 @question
@@ -144,6 +115,7 @@ def identify(
     band: FrequencyBand | None = None,
     period: TimeLike | None = None,
     check: bool = False,
+    against: StageLike | None = None,
     folder: Path = Path(),
     keep: MappingKeeper | None = None,
     progress: Progress = silent,
@@ -169,6 +141,9 @@ def identify(
         Period of a periodic excitation, "5 s" or a number [s].
     check : bool
         Also say whether the identified stage hunts, as friso check does of the stage file that is written.
+    against : Stage, path or dict, optional
+        A stage whose verdict the logs may contradict: do they hunt as it does, and which change would explain it.
+        Without `stage`, it is also what is known beforehand.
     folder : Path
         Where what was said of channels is looked for, if not beside the logs.
     keep : callable, optional
@@ -193,6 +168,7 @@ def identify(
         first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
         wanted = "a stage whose keys to override"
         raise InputError("set", str(first), wanted, "--stage stage.toml (in Python stage=...)")
+    stage = against if stage is None else stage
     tables = {} if stage is None else inputs.tables_of(stage)
     lacking = [name for name in TOLD_BY_LOGS if name not in tables] if "controller" in tables else []
     assumed = None if stage is None or lacking else inputs.stage_of(stage, set)
@@ -230,7 +206,30 @@ def identify(
         from friso.questions.check.question import checked_stage
 
         checked = checked_stage(result.stage, result.correlations, progress=progress)
-    return IdentifyAnswer(result, inputs=held, predictions=predictions, axis_kind=axis_kind, checked=checked)
+    suspect = None if against is None else inputs.stage_of(against, None)
+    compared = {} if suspect is None else _compared(suspect, [log for log, _ in sources if isinstance(log, Log)])
+    return IdentifyAnswer(
+        result,
+        inputs=held,
+        predictions=predictions,
+        axis_kind=axis_kind,
+        checked=checked,
+        compared=compared,
+        suspect=suspect,
+    )
+
+
+def _compared(stage: Stage, logs: Sequence[Log]) -> dict[str, Contradiction]:
+    """Compare what the logs show at rest with the verdict on a stage, by the names of the logs.
+
+    Raises InputError if no log has position and reference.
+    """
+    from friso.studies.contradiction import contradiction, standing_of
+
+    usable = [log for log in logs if "reference" in log and "position" in log]
+    if not usable:
+        raise InputError("against", "no log with position and reference", "one of both", "--map reference=CHANNEL")
+    return {log.name: contradiction(stage, standing_of(log)) for log in usable}
 
 
 def _worth_keeping(file: LogFile, result: Identification) -> Mapping:

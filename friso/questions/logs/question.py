@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
     from friso.shown.files import Files
+    from friso.shown.pages import Report
 
 LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 """A file of logs, or several."""
@@ -35,11 +37,13 @@ class LogsAnswer(Answer):
         """Say what is wrong with the files that cannot be read; empty if all can."""
         return str(unreadable(self.errors)) if self.errors else ""
 
+    def page(self) -> Report:
+        """Return the page, named after the files."""
+        return replace(super().page(), name=", ".join(content.path.name for content in self.result))
+
     def files(self) -> Files:
         """Return the page with its figures; nothing if no file could be read."""
-        from friso.questions.logs.page import logs_files
-
-        return logs_files(self.result) if self.result else {}
+        return super().files() if self.result else {}
 
 
 def options_of(

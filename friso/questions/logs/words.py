@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from friso.identification.contents import ChannelContent, LogContent
-from friso.interface.answer import AnswerTable
 from friso.platform.system import shell_word
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.palette import GREEN, ORANGE
@@ -25,19 +24,13 @@ PLAIN_BELOW = 1e7
 _BLOCKS = "▁▂▃▄▅▆▇█"
 
 
-def sentences(contents: Sequence[LogContent]) -> list[str]:
-    """Say what each file is, and what is still open about it."""
-    lines = []
-    for content in contents:
-        lines += [sentence for _, sentence in conclusions(content)]
-        lines += [f"open: {line}" for line in open_questions(content)]
-        lines += [f"note: {line}" for line in (*content.lost, *content.warnings)]
-    return lines
-
-
-def tables(contents: Sequence[LogContent]) -> list[AnswerTable]:
-    """Return a table of the channels of each file."""
-    return [AnswerTable(item.path.name, COLUMNS, channel_rows(item)) for item in contents if item.channels]
+def file_sentences(content: LogContent) -> list[str]:
+    """Say what a file is, and what is still open about it."""
+    return [
+        *(sentence for _, sentence in conclusions(content)),
+        *(f"open: {line}" for line in open_questions(content)),
+        *(f"note: {line}" for line in (*content.lost, *content.warnings)),
+    ]
 
 
 def next_steps(contents: Sequence[LogContent], files: Sequence[Path]) -> list[str]:

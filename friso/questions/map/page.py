@@ -67,8 +67,8 @@ def map_html(
         stage_file=runs.attrs.get("stage", ""),
         version=runs.attrs.get("friso", ""),
         scripted=True,
+        condition=_condition(runs),
         values={
-            "condition": _condition(runs),
             "headline": headline(runs, metric),
             "own_place": own_place(runs, metric),
             "peak_rule": PEAK_RULE,

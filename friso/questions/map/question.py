@@ -17,6 +17,7 @@ import numpy as np
 
 from friso.axis import speak_of
 from friso.errors import InputError, StoreError
+from friso.hunting import is_moved_evenly
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import LOGGER, Address, AxisPoints, Changes, Links, MetricName, StageLike, Tolerance
@@ -50,6 +51,7 @@ from friso.studies.sweep import fill, run_in_memory
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.shown.blocks import AnswerBlock
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Content, Files
 
@@ -91,18 +93,22 @@ class SweepAnswer(Answer):
         parts = [int(part) for number in numbers for part in str(number).split()]
         return self.study.cell_stage(parts)
 
-    def sentences(self) -> Sequence[str]:
-        """Return which share of the map swings or hunts, and where."""
-        from friso.questions.map.findings import sentences
+    def blocks(self) -> Sequence[AnswerBlock]:
+        """Return which share of the map swings or hunts, and where; with the map, unless it has too many cells."""
+        from friso.questions.map.document import map_document
+        from friso.questions.map.figures import map_figure
+        from friso.questions.map.findings import details, sentences
+        from friso.shown.blocks import AnswerBlock
 
-        texts = sentences(self.result, self.study, self.metric)
-        return texts if self.store is None else [*texts, f"store: {self.store}"]
+        def draw() -> list[Figure]:
+            """Draw the map, with the condition under which it holds."""
+            figures = [map_figure(self.result, self.metric)] if self.drawable else []
+            return [replace(figure, note=self.condition + figure.note) for figure in figures]
 
-    def details(self) -> Sequence[str]:
-        """Return the number of cells with every word, and why cells have no result."""
-        from friso.questions.map.findings import details
-
-        return details(self.result, self.study, self.metric)
+        says = [*sentences(self.result, self.study, self.metric), *([f"store: {self.store}"] if self.store else [])]
+        numbers = partial(map_document, self.result, self.study, self.store, self.metric)
+        more = partial(details, self.result, self.study, self.metric)
+        return [AnswerBlock(sentences=says, long_details=more, draw=draw, numbers=numbers)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that runs the cell with the largest swing at its end.
@@ -114,19 +120,6 @@ class SweepAnswer(Answer):
         swings = np.nan_to_num(self.result["peak_to_peak"].to_numpy(), nan=-np.inf)
         cell = " ".join(map(str, np.unravel_index(swings.argmax(), swings.shape)))
         return [f"friso simulate --cell {shell_word(str(self.store))} {cell}"]
-
-    def figures(self) -> Sequence[Figure]:
-        """Return the map, unless it has too many cells."""
-        from friso.questions.map.figures import map_figure
-
-        figures = [map_figure(self.result, self.metric)] if self.drawable else []
-        return [replace(figure, note=self.condition + figure.note) for figure in figures]
-
-    def document(self) -> dict[str, Any]:
-        """Return the axes and the results."""
-        from friso.questions.map.document import map_document
-
-        return map_document(self.result, self.study, self.store, self.metric)
 
     def files(self, progress: Progress = silent) -> Files:
         """Return the figure in all formats and the page, by name."""
@@ -165,19 +158,18 @@ class StoreAnswer(Answer):
         state = self.result
         return "the store is not whole" if state.damaged or state.files or state.unreadable else ""
 
-    def sentences(self) -> Sequence[str]:
-        """Return how many blocks are done, and which are damaged."""
+    def blocks(self) -> Sequence[AnswerBlock]:
+        """Return how many blocks of cells are done, and which are damaged or unreadable."""
+        from friso.shown.blocks import AnswerBlock
+
         state, damaged = self.result, ", ".join([*self.result.damaged, *self.result.files])
         again = f"friso map {shell_word(str(self.store))} recomputes the damaged blocks"
         unread = f"; may not be read: {', '.join(state.unreadable)}" if state.unreadable else ""
         damage = f"damaged: {damaged} ({again})" if damaged else "nothing is damaged"
-        return [f"{self.store}: blocks done: {state.done} of {state.blocks}; {damage}{unread}"]
-
-    def document(self) -> dict[str, Any]:
-        """Return the number of blocks, those done, and those damaged or unreadable."""
-        state = self.result
-        damage = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
-        return {"store": str(self.store), "blocks": state.blocks, "done": state.done, **damage}
+        says = f"{self.store}: blocks done: {state.done} of {state.blocks}; {damage}{unread}"
+        lost = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
+        numbers = {"store": str(self.store), "blocks": state.blocks, "done": state.done, **lost}
+        return [AnswerBlock(sentences=[says], numbers=lambda: numbers)]
 
     def files(self) -> Files:
         """Return nothing: a check of a store writes no file."""
@@ -295,6 +287,8 @@ def sweep(
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else CONFIRMED_FROM)
         else:
+            if metric is None and not confirm and is_moved_evenly(inputs.read_stage(stage, set)):
+                metric = "stick_slip"
             metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
             chosen = inputs.read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
             if runs_as_built(chosen, [metric]):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 from friso.axis import speak_of
 from friso.equations.as_built import whole_samples
 from friso.interface import inputs
@@ -11,6 +14,9 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.virtual_rig.run import as_built_keys
+
+if TYPE_CHECKING:
+    from friso.shown.pages import Report
 
 LEAST_DELAY = 4
 """Smallest delay, in samples, that is mentioned."""
@@ -24,6 +30,10 @@ class RigAnswer(Answer):
         """Say how many logs end early; empty if none does."""
         failed = sum(bool(log.failure) for log in self.result.logs)
         return f"{failed} of {len(self.result.logs)} logs end where the run stopped" if failed else ""
+
+    def page(self) -> Report:
+        """Return the page of the experiment."""
+        return replace(super().page(), command=f"rig {self.result.experiment}")
 
 
 @question

@@ -31,11 +31,6 @@ def _failures(outcome: Outcome) -> list[str]:
     ]
 
 
-def details(outcome: Outcome) -> list[str]:
-    """Return the seed of the noise, and notes on the experiment."""
-    return [f"seed of the noise: {outcome.seed}", *(f"note: {note}" for note in outcome.notes)]
-
-
 def rig_document(outcome: Outcome) -> dict[str, Any]:
     """Return the results of an experiment, and its logs with the seeds of their noise."""
     logs = [{**entries(log, "name", "seed", "interval_s"), "failure": log.failure or None} for log in outcome.logs]

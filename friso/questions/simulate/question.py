@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from friso.hunting import Dwell
-    from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
     from friso.studies.study import Study
 
@@ -78,37 +77,14 @@ class SimulateAnswer(Answer):
         done = self.result.attrs["status"] == Status.DONE.text
         return "" if done else "the computation could not be completed; see the status above"
 
-    def sentences(self) -> Sequence[str]:
-        """Say what the run does, how it settles at each standstill, and if its moves are too short."""
-        from friso.equations.motion import ends_evenly, rests
-        from friso.questions.simulate.words import built_sentence, conclusion
-        from friso.shown.motion_words import dwell_sentences, motion_sentences
-
-        deviation = (self.result["position"] - self.result["reference"]).to_numpy()
-        name, flat = self.name if self.of_cell else self.stage.name or self.name, self.stage.flat()
-        does = conclusion(name, self.measures, deviation, moves_on=not rests(flat), evenly=ends_evenly(flat))
-        says = [does, *dwell_sentences(self.dwells), *motion_sentences(self.stage)]
-        return [*says, *([built_sentence(self.stage)] if self.as_built else [])]
-
-    def details(self) -> Sequence[str]:
-        """Return how many steps the solver took."""
-        return [f"{self.result.attrs['steps']} steps of the solver, {self.result.attrs['rejected']} rejected"]
-
-    def figures(self) -> Sequence[Figure]:
-        """Return the figure of the response."""
-        from friso.questions.check.figures import response_figure
-
-        return [response_figure(self.result)]
-
-    def document(self) -> dict[str, Any]:
-        """Return what the run does, and how the solver fared, as a document."""
-        from friso.questions.simulate.words import simulate_document
-
-        return simulate_document(self.result, self.measures, self.stage.name, self.sentences()[0], self.dwells)
+    @property
+    def subject(self) -> SimulateAnswer:
+        """Return the answer itself, which measures the response."""
+        return self
 
     def files(self) -> Files:
         """Return NetCDF, CSV and the figure; for a cell, its stage file as well."""
-        from friso.questions.simulate.page import simulate_files
+        from friso.questions.simulate.blocks import simulate_files
 
         files = simulate_files(self.result, f"{self.name}_response")
         return {**files, f"{self.name}.toml": self.stage.to_toml()} if self.of_cell else files

@@ -9,18 +9,12 @@ from friso.remedies.verified import RemedyOutcome
 
 
 def gain_lines(tuning: Advice) -> list[str]:
-    """Return the gains to type in for the least change, and for the fastest remedy."""
-    listed = [outcome for outcome in (tuning.least, tuning.fastest) if outcome]
+    """Return the gains to type in for every remedy that works."""
     return [
         f'The gains to type in for "{outcome.remedy.name}" are {gains} (friso export gains).'
-        for number, outcome in enumerate(listed)
-        if outcome not in listed[:number] and (gains := gains_to_type_in(outcome, tuning))
+        for outcome in tuning.working
+        if (gains := gains_to_type_in(outcome, tuning))
     ]
-
-
-def gain_facts(tuning: Advice) -> list[tuple[str, str]]:
-    """Return the name of every remedy that works, with its gains in words."""
-    return [(outcome.remedy.name, gains) for outcome in tuning.working if (gains := gains_to_type_in(outcome, tuning))]
 
 
 def gains_to_type_in(outcome: RemedyOutcome, tuning: Advice) -> str:

@@ -46,6 +46,11 @@ class TuneAnswer(Answer):
     status = 2
 
     @property
+    def varied(self) -> Sequence[str]:
+        """Return the keys over which machines are drawn."""
+        return [*self.result.stage.uncertain()]
+
+    @property
     def failure(self) -> str:
         """Say that a change is needed and none surely works; empty otherwise."""
         if not self.result.needed or self.result.working:
@@ -66,7 +71,7 @@ class TuneAnswer(Answer):
         There are none if `friso design` does not know the controller.
         """
         from friso.design_method.prepare import check_designable
-        from friso.questions.tune.page import NOT_SURE, OF_LEAVES
+        from friso.questions.tune.blocks import NOT_SURE, OF_LEAVES
 
         try:
             check_designable(self.result.stage)
@@ -155,9 +160,9 @@ def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
     if outcome.certainty != "works" or outcome.stage is None or outcome.measured is None:
         return
     changed = listed(changes(stage, outcome.stage), "and")
-    when = slowest_time(outcome.measured, goal)
+    when, condition = slowest_time(outcome.measured, goal), unknown_condition(stage, [*stage.uncertain()])
     LOGGER.info(
-        f"{unknown_condition(stage)}this works: {changed}, in position after {when}; others are tried",
+        f"{condition}this works: {changed}, in position after {when}; others are tried",
         extra={"meanwhile": True},
     )
 

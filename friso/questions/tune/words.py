@@ -15,15 +15,12 @@ from friso.axis import axis_shown
 from friso.design_method.geometry import Geometry
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.frequency.crossover import loop_bandwidth
-from friso.interface.answer import AnswerTable
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
-from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
-from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.remedies.machines import Goal
 from friso.remedies.method import Advice
 from friso.remedies.search import TriedPoints
@@ -199,7 +196,7 @@ _SAYS: Sequence[Alternatives[Advice]] = (
     ),
     (
         (lambda of: not of.needed, "The stage meets the goal as it is: {brings}."),
-        (lambda of: of.working, "Set {changes}: the least change that works{for_all}{so_far} ({name})."),
+        (lambda of: of.working, "Set {changes}: the cheapest change that works{for_all}{so_far} ({name})."),
         (
             lambda of: of.for_large_moves,
             "For moves of {from} and more alone: set {changes} ({name}); no change works for all moves.",
@@ -570,24 +567,3 @@ _ASSUMED: Alternatives[Advice] = (
     (lambda of: of.machines.left_out, "{left_out} draws that no stage may have were replaced by others."),
 )
 """Sentences on what was not tried, what the model holds, and which machines were drawn."""
-
-
-def sentences(tuning: Advice) -> list[str]:
-    """Return the answer: what to change, and what it brings and costs."""
-    return answer(tuning)
-
-
-def tables(tuning: Advice) -> list[AnswerTable]:
-    """Return the table in which remedies and the stage as it is stand side by side."""
-    return [AnswerTable(tuning.stage.name, axis_shown().named(COLUMNS), rows(tuning))]
-
-
-def details(tuning: Advice) -> list[str]:
-    """Return the changes in full, what does not work, gains for drives, what matters most, and assumptions."""
-    return [
-        *explained(tuning),
-        *failing(tuning),
-        *gain_lines(tuning),
-        *sensitivity_sentences(tuning),
-        *assumptions(tuning),
-    ]

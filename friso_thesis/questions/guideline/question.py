@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from friso.interface.answer import Answer, question
 from friso.progress import Progress, silent
 from friso_thesis.studies.guideline.compute import FIT_SAMPLES
+
+if TYPE_CHECKING:
+    from friso.shown.blocks import AnswerBlock
+    from friso.shown.files import Files
 
 
 class GuidelineAnswer(Answer):
@@ -16,6 +23,22 @@ class GuidelineAnswer(Answer):
     def interrupted(self) -> bool:
         """Tell whether Ctrl-C ended the sweeps, so that it rests on fewer samples."""
         return bool(self.result.interrupted)
+
+    def blocks(self) -> Sequence[AnswerBlock]:
+        """Return how accurately both laws predict the edge of hunting, with all charts."""
+        from friso.shown.blocks import AnswerBlock
+        from friso_thesis.questions.guideline.document import guideline_document
+        from friso_thesis.questions.guideline.figures import guideline_figures
+        from friso_thesis.questions.guideline.words import sentences
+
+        draw, numbers = partial(guideline_figures, self.result), partial(guideline_document, self.result)
+        return [AnswerBlock(sentences=sentences(self.result), draw=draw, numbers=numbers)]
+
+    def files(self) -> Files:
+        """Return the page in Markdown, the table of edges, and the charts."""
+        from friso_thesis.questions.guideline.page import guideline_files
+
+        return guideline_files(self.result)
 
 
 @question

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import ClaimName, StudyName, Tolerance, tolerance_of
 from friso.platform.extras import need
 from friso.progress import Progress, silent
@@ -15,7 +15,7 @@ from friso_thesis.studies.thesis.plausible import DRAW_COUNT
 from friso_thesis.studies.thesis.reproduce import MAP_POINTS
 
 if TYPE_CHECKING:
-    from friso.shown.drawing.figure import Figure
+    from friso.shown.blocks import AnswerBlock
     from friso.shown.files import Files
     from friso_thesis.studies.thesis.laws import ConclusionsByLaw
 
@@ -35,25 +35,13 @@ class ReproduceAnswer(Answer):
 
         return reproduce_document(self.result, self.laws)
 
-    def sentences(self) -> Sequence[str]:
-        """Say how many claims hold, which open values fit best, and what survives other laws."""
-        from friso_thesis.questions.reproduce.words import fit_sentence, laws_sentences
+    def blocks(self) -> Sequence[AnswerBlock]:
+        """Return the claims, and the conclusions under each friction law if they were asked for."""
+        from friso.shown.blocks import AnswerBlock
+        from friso_thesis.questions.reproduce.figures import reproduction_figures
+        from friso_thesis.questions.reproduce.words import TITLE, fit_sentence, laws_rows, laws_sentences
 
-        fit = fit_sentence(self.result.plausible)
-        return [
-            self._document["conclusion"],
-            *([fit] if fit else []),
-            *(laws_sentences(self.laws) if self.laws else []),
-        ]
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return the table of conclusions under each friction law; empty unless laws were asked for."""
-        from friso_thesis.questions.reproduce.words import TITLE, laws_rows
-
-        return [AnswerTable(TITLE, self.laws.laws, laws_rows(self.laws))] if self.laws else []
-
-    def details(self) -> Sequence[str]:
-        """Return every claim with its judgement, and the cycles behind the maps."""
+        fit, laws = fit_sentence(self.result.plausible), self.laws
         claims = [
             f"{claim['id']:5} {claim['judgement']:14} {_drawn(claim['space'])}{claim['number']}"
             for claim in self._document["claims"]
@@ -64,17 +52,16 @@ class ReproduceAnswer(Answer):
             f"attracts; in {cells['attracted_only']} none are counted although one does"
             for name, cells in self._document["cycles"].items()
         ]
-        return [*claims, *cycles]
-
-    def figures(self) -> Sequence[Figure]:
-        """Return the figures of the thesis."""
-        from friso_thesis.questions.reproduce.figures import reproduction_figures
-
-        return [*reproduction_figures(self.result).values()]
-
-    def document(self) -> dict[str, Any]:
-        """Return the claims with their judgements."""
-        return self._document
+        reproduced = AnswerBlock(
+            sentences=[self._document["conclusion"], *([fit] if fit else [])],
+            details=[*claims, *cycles],
+            draw=lambda: [*reproduction_figures(self.result).values()],
+            numbers=lambda: self._document,
+        )
+        if not laws:
+            return [reproduced]
+        by_law = AnswerBlock(title=TITLE, sentences=laws_sentences(laws), columns=laws.laws, rows=laws_rows(laws))
+        return [reproduced, by_law]
 
     def files(self) -> Files:
         """Return the page, the claims, the figures."""

@@ -14,6 +14,7 @@ class RestingAnswer(Answer):
     """The distance: `result` is a number [m]."""
 
     stage: Stage
+    templates = "friso_resting"
 
     @property
     def subject(self) -> RestingAnswer:

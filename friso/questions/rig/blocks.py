@@ -1,4 +1,4 @@
-"""Write the page and the logs of an experiment of the rig."""
+"""Give the blocks of `friso rig`, and write the logs of an experiment."""
 
 from __future__ import annotations
 
@@ -10,33 +10,45 @@ import numpy as np
 
 from friso.axis import LINEAR, unit_shown
 from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
-from friso.questions.rig.words import rig_figures, sentences
+from friso.questions.rig.words import rig_document, rig_figures, sentences
+from friso.shown.blocks import AnswerBlock
 from friso.shown.files import Content
-from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.studies.rig.outcome import Outcome, RigLog
 
 
-def rig_files(outcome: Outcome) -> dict[str, Content]:
-    """Return the page, the logs and how to read them, and every figure in all formats.
+def blocks(outcome: Outcome) -> list[AnswerBlock]:
+    """Return the blocks of the answer: the results, and the logs with the seeds of their noise."""
+    return [
+        AnswerBlock(
+            title=outcome.stage.name,
+            sentences=sentences(outcome),
+            details=[f"seed of the noise: {outcome.seed}", *(f"note: {note}" for note in outcome.notes)],
+            draw=partial(rig_figures, outcome),
+            numbers=partial(rig_document, outcome),
+        ),
+        AnswerBlock(
+            title="The logs",
+            columns=("Kind", "Seed", "Sample time", "Ended"),
+            rows=[
+                (log.name, [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"])
+                for log in outcome.logs
+            ],
+            behind=True,
+        ),
+    ]
 
-    The truth behind the logs goes into a folder of its own.
-    """
-    logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}
+
+def basis(outcome: Outcome) -> str:
+    """Say on what the experiment ran, and how many logs it wrote."""
     counted = "1 log" if len(outcome.logs) == 1 else f"{len(outcome.logs)} logs"
-    return Report.of_stage(
-        f"rig {outcome.experiment}",
-        outcome.stage,
-        rig_figures(outcome),
-        sentences=sentences(outcome),
-        notes=outcome.notes,
-        columns=("Kind", "Seed", "Sample time", "Ended"),
-        rows=[
-            (log.name, [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"])
-            for log in outcome.logs
-        ],
-        computed=f" on a drive as built, seed {outcome.seed}; {counted}",
-    ).files({**logs, "truth/stage.toml": stage_text(outcome.stage, outcome.seed)})
+    return f" on a drive as built, seed {outcome.seed}; {counted}"
+
+
+def further_files(outcome: Outcome) -> dict[str, Content]:
+    """Return the logs and how to read them; the truth behind them goes into a folder of its own."""
+    logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}
+    return {**logs, "truth/stage.toml": stage_text(outcome.stage, outcome.seed)}
 
 
 UNITS = {"force": "N", "disturbance": "N", "velocity": "m/s", "cart_velocity": "m/s"}

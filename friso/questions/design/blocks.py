@@ -1,14 +1,13 @@
-"""Build the JSON document of a design, in SI with the unit as suffix of each key.
-
-Numbers that are unknown or not finite become null.
-"""
+"""Give the one block of `friso design`, the drawing of its leaf springs, and its stage files."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from friso.design_method.choice import Candidate, Confirmed
 from friso.design_method.geometry import Geometry
@@ -18,11 +17,66 @@ from friso.design_method.requirements import Relaxation
 from friso.design_method.settings import settings
 from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.materials import materials
+from friso.questions.design.figures import design_figures
+from friso.questions.design.steps import requirement_rows, steps
 from friso.questions.design.window import lower, upper
-from friso.questions.design.words import need_words, refusal, so_far
+from friso.questions.design.words import need_words, of_laws, refusal, so_far, verdicts
+from friso.questions.flexure.drawing import drawing_svg
+from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json, unit_suffix
+from friso.shown.files import Content
 from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
+
+LEAVES_STEP = 2
+"""Number of the step that shows the drawing and the requirements."""
+
+NOT_VERIFIED = "design-not-verified.toml"
+"""Name of the stage file of an unfinished design."""
+
+
+def blocks(design: Design | UnfinishedDesign) -> list[AnswerBlock]:
+    """Return the block of the answer: verdicts and steps, or what is decided of an unfinished design."""
+    numbers = partial(design_document, design)
+    if isinstance(design, UnfinishedDesign):
+        return [AnswerBlock(sentences=so_far(design), numbers=numbers)]
+    colours, sentences = zip(*verdicts(design), strict=True)
+    laws = [sentence for _, sentence in of_laws(design)]
+    titled = [f"{step.title}: {' '.join(step.sentences)}" for step in steps(design)]
+    details = [*laws, *(f"{number}. {text}" for number, text in enumerate(titled, 1))]
+    draw = partial(design_figures, design)
+    return [AnswerBlock(sentences=sentences, colours=colours, details=details, draw=draw, numbers=numbers)]
+
+
+def page_values(design: Design) -> dict[str, Any]:
+    """Return the steps that the page shows, with the drawing and how much of each requirement is used."""
+    return {
+        "spec": design.spec,
+        "laws": of_laws(design),
+        "steps": steps(design),
+        "leaves": LEAVES_STEP,
+        "drawing": Markup(_drawing(design)),
+        "requirements": requirement_rows(design),
+    }
+
+
+def further_files(design: Design) -> dict[str, Content]:
+    """Return the drawing, and the stage files: the design, and the worst machine that was tried with it."""
+    return {
+        NOT_VERIFIED: None,
+        "design.toml": design.stage.to_toml(),
+        "worst.toml": design.verification.worst.to_toml(),
+        "design_drawing.svg": _drawing(design),
+    }
+
+
+def _drawing(design: Design) -> str:
+    """Return the dimensioned drawing of the leaf springs as SVG."""
+    choice = design.fitted.choice
+    data = materials()[choice.geometry.sheet.material]
+    material = f"{data.name}, {data.grade}"
+    return drawing_svg(choice.beams.mechanism, design.fitted.task.stroke, title=design.stage.name, material=material)
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:

@@ -1,16 +1,46 @@
-"""Build the JSON document of `friso bode`."""
+"""Give the one block of `friso bode`: stability, margins and Bode plots."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from friso.frequency.bode import Bode
 from friso.frequency.crossover import Limits
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
-from friso.questions.bode.states import has_limiter, side
-from friso.questions.bode.words import sentences
+from friso.questions.bode.figures import bode_figures
+from friso.questions.bode.numbers import rows
+from friso.questions.bode.states import has_limiter, shown_states, side
+from friso.questions.bode.words import details, sentences
+from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
+from friso.shown.drawing.palette import GREEN, VERMILLION
+
+
+def basis(bode: Bode) -> str:
+    """Say from what the margins were computed, and how they are defined."""
+    return (
+        f" from the equations of the simulation, linearised in {len(bode.scan.members)} states. Margins follow their "
+        "definitions: how much gain, phase or delay takes the loop to the edge of stability; phase margins count both "
+        "lag and lead"
+    )
+
+
+def blocks(bode: Bode) -> list[AnswerBlock]:
+    """Return the block of the answer."""
+    states = shown_states(bode)
+    block = AnswerBlock(
+        title=bode.stage.name,
+        sentences=sentences(bode),
+        colours=[GREEN if bode.settled[1].stable else VERMILLION],
+        columns=states,
+        rows=rows(states),
+        details=details(bode),
+        draw=partial(bode_figures, bode),
+        numbers=partial(bode_document, bode),
+    )
+    return [block]
 
 
 def bode_document(bode: Bode) -> dict[str, Any]:

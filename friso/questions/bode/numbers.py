@@ -1,4 +1,4 @@
-"""Write the table of a linear analysis.
+"""Write the numbers of a linear analysis as texts for the table.
 
 Each row names a quantity and has its text for each state.
 """

@@ -1,17 +1,70 @@
-"""Build the JSON document of `friso compare`: isolator or firmware."""
+"""Give the blocks of `friso compare`: the options, what the numbers are, and the machines."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
-from friso.questions.compare.words import sentences
+from friso.quantities import percent
+from friso.questions.compare import words
+from friso.questions.compare.figures import compare_figures
+from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
-from friso.studies.compare.study import Comparison, OptionResult
+from friso.studies.compare.options import DEADBAND_SHARE, MODEL_ERROR
+from friso.studies.compare.study import LONGER_FACTOR, Comparison, OptionResult
+
+UNSHAKEN = (
+    "The stage file has no [floor]: the in-position RMS shows whether the machines are at rest, not how still they "
+    "would stand in a real room. "
+)
+
+
+def basis(comparison: Comparison) -> str:
+    """Say on which machines the options were compared, and with which deadband and model error."""
+    return (
+        f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND_SHARE:g} tolerances, model error "
+        f"{percent(MODEL_ERROR)}"
+    )
+
+
+def blocks(comparison: Comparison) -> list[AnswerBlock]:
+    """Return the blocks of the answer, the recommendation first."""
+    meanings = (
+        "Probabilities have 95 % intervals (Clopper, Pearson). Times, root mean squares and margins are medians over "
+        "the machines, with intervals from order statistics. Settling times count from the last corner of the "
+        "reference; there and back, it is the longer one of both ends, and none where a machine is not in position "
+        "when it returns; the in-position RMS is that of the last quarter of the run, the force RMS that of the whole "
+        f'run. {"" if comparison.shaken else UNSHAKEN}Margins are those of linear loops without the cable. "Later" '
+        f"is the last half of a run {LONGER_FACTOR} times as long, on the first machines."
+    )
+    return [
+        AnswerBlock(
+            title=comparison.stage.name,
+            sentences=words.answer(comparison),
+            columns=axis_shown().named(words.COLUMNS),
+            rows=words.table_rows(comparison),
+            draw=partial(compare_figures, comparison),
+            numbers=partial(compare_document, comparison),
+        ),
+        AnswerBlock(
+            title="The options", details=[f"{label}: {text}" for label, text in words.options_rows(comparison)]
+        ),
+        AnswerBlock(title="What the numbers are", caption=meanings, details=words.details(comparison)),
+        AnswerBlock(
+            title="Compared with a, machine by machine",
+            columns=axis_shown().named(words.PAIRED),
+            rows=words.paired_rows(comparison),
+        ),
+        AnswerBlock(
+            title="The machines",
+            details=[*words.population(comparison), *(f"note: {note}" for note in comparison.notes)],
+        ),
+    ]
 
 
 def compare_document(comparison: Comparison) -> dict[str, Any]:
@@ -20,7 +73,7 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
     A time that is infinite, because a machine never settles, becomes null.
     """
     machines = comparison.machines
-    conclusion, *details = sentences(comparison)
+    conclusion, *details = words.sentences(comparison)
     return plain_json(
         {
             "conclusion": conclusion,

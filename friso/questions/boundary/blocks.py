@@ -1,16 +1,75 @@
-"""Build the JSON document of `friso boundary`."""
+"""Give the blocks of `friso boundary`, and the table of points that it writes."""
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import repeat
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friso.hunting import Diagram, Meeting, Plane
-from friso.questions.boundary.words import ShownKey, conclusion
+from friso.questions.boundary.words import ShownKey, answer, conclusion, details
+from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
 from friso.studies import boundary
-from friso.studies.boundary import Line
+from friso.studies.boundary import Line, lines
+
+if TYPE_CHECKING:
+    from friso.questions.boundary.question import BoundaryAnswer
+    from friso.shown.drawing.figure import Figure
+
+
+def blocks(boundaries: BoundaryAnswer) -> list[AnswerBlock]:
+    """Return the blocks: where hunting ends, and every point, branch or curve."""
+    traced, keys = boundaries.result, boundaries.keys
+    return [
+        AnswerBlock(
+            title=boundaries.stage.name,
+            sentences=answer(traced, keys),
+            draw=lambda: [_figure(boundaries)],
+            numbers=lambda: boundary_document(traced, keys),
+        ),
+        AnswerBlock(title="Points and curves", details=details(traced, keys)),
+    ]
+
+
+def _figure(boundaries: BoundaryAnswer) -> Figure:
+    """Draw the branches of cycles, or the curves on which hunting ends with the place of the stage between them."""
+    from friso.questions.boundary.figures import boundary_figure  # 0.9 s to import
+    from friso.questions.map.places import SHOWN, with_places
+
+    figure = boundary_figure(boundaries.result, boundaries.keys, boundaries.stage.name, boundaries.condition)
+    if isinstance(boundaries.result, Plane):
+        return with_places(figure, [(SHOWN, boundaries.stage)], [key.key for key in boundaries.keys])
+    return figure
+
+
+def write_table(traced: Diagram | Plane, path: Path) -> None:
+    """Write a CSV table with one row per point of a branch or curve.
+
+    Flips, folds and other special points also have a kind and an error.
+    """
+    import pandas as pd
+
+    keys = [f"{swept.key} [{swept.unit}]" if swept.unit else swept.key for swept in traced.space.ranges]
+    header = ["line", "cycle", "kind", *keys, *(f"error of {key}" for key in keys)]
+    rows = [
+        row
+        for number, line in enumerate(lines(traced))
+        for row in zip(
+            repeat(number),
+            repeat(line.shape),
+            line.kinds,
+            *line.at.T,
+            *line.error.T,
+            line.amplitude,
+            line.period,
+            line.multiplier,
+        )
+    ]
+    table = pd.DataFrame(rows, columns=[*header, "amplitude [m]", "period [s]", "multiplier"])
+    table.to_csv(path, index=False)
 
 
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:

@@ -1,0 +1,72 @@
+"""Say whether a log contradicts the verdict on a stage, and which single change would explain it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from friso.quantities import plain_factor
+from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
+from friso.stage import Stage
+from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange
+
+MOST_EXPLANATIONS = 3
+"""Largest number of changes that are told."""
+
+
+def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[str]:
+    """Say what the log called `name` shows, whether the stage does so, and which change would explain a difference."""
+    standing = result.standing
+    machine = (
+        f"hunts, {_swing(standing.swing, standing.period)}"
+        if standing.hunts
+        else f"rests for {with_unit(standing.time, 's')} while its reference stands"
+    )
+    does = f"hunts, {_swing(result.swing, result.period)}" if result.attracts else "does not hunt"
+    doubt = "" if result.certain else " (not certain)"
+    if result.agrees and result.attracts and not standing.hunts:
+        return [f"{name} does not tell: the machine {machine}, too briefly to see that the stage {does}{doubt}."]
+    if result.agrees:
+        return [f"{name} agrees with the stage: the machine {machine}; the stage {does}{doubt}."]
+    says = f"{name} contradicts the stage: the machine {machine}; the stage {does}{doubt}."
+    nearest = result.explanations[:MOST_EXPLANATIONS]
+    if not nearest:
+        return [says, "No single change of friction, masses or the controller's speed explains that."]
+    changes = listed([_change(stage, one) for one in nearest], "or")
+    return [says, f"One change would explain that, the smallest first: {changes}."]
+
+
+def _swing(swing: float | None, period: float | None) -> str:
+    """Write the size [m] and period [s] of a swing."""
+    return f"{plus_minus(swing or 0.0, 'm')} every {with_unit(period or 0.0, 's')}"
+
+
+def _change(stage: Stage, change: ExplainingChange) -> str:
+    """Write a change by its factor, and by the value of its key if it has a single one."""
+    times = f"{change.name} {plain_factor(change.factor)} times"
+    keys, flat = CHANGES[change.name], stage.flat()
+    if len(keys) != 1:
+        return times
+    return f"{times} ({with_unit(change.factor * flat[keys[0]], stage.numeric_keys()[keys[0]].unit)})"
+
+
+def against_document(name: str, result: Contradiction) -> dict[str, Any]:
+    """Return what a log shows, what the stage does, and the changes that explain a difference."""
+    changes: Sequence[dict[str, Any]] = [
+        {"change": one.name, "factor": one.factor, "swing_m": one.swing, "period_s": one.period}
+        for one in result.explanations
+    ]
+    standing = result.standing
+    return {
+        "log": name,
+        "machine": {"hunts": standing.hunts, "swing_m": standing.swing, "period_s": standing.period},
+        "stands_s": standing.time,
+        "stage": {
+            "hunts": result.attracts,
+            "certain": result.certain,
+            "swing_m": result.swing,
+            "period_s": result.period,
+        },
+        "agrees": result.agrees,
+        "explanations": changes,
+    }

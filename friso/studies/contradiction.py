@@ -1,0 +1,179 @@
+"""Ask whether a log contradicts the verdict on a stage, and which single change of the stage would explain the log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.errors import InputError
+from friso.hunting import sketch_attractors
+from friso.identification.experiments.hunting import swings_of
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import noise_of
+from friso.stage import Stage
+from friso.studies.settings import settings
+
+CHANGES: Mapping[str, tuple[str, ...]] = {
+    "friction.static": ("friction.static",),
+    "all friction": ("friction.static", "friction.coulomb"),
+    "friction.stribeck_velocity": ("friction.stribeck_velocity",),
+    "friction.bristle_stiffness": ("friction.bristle_stiffness",),
+    "friction.viscous": ("friction.viscous",),
+    "masses": ("masses.cart", "masses.stage"),
+    "controller speed": (),
+}
+"""Changes that are tried, by name, each with the keys that it multiplies; the speed has those of its controller."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What a machine does while its reference stands still for longest in a log.
+
+    `swing` is half of peak to peak [m] and `period` [s] of its lasting swing; both are None for a machine at rest.
+    `time` [s] is how long the reference stands.
+    """
+
+    time: float
+    swing: float | None
+    period: float | None
+
+    @property
+    def hunts(self) -> bool:
+        """Tell whether the machine keeps swinging."""
+        return self.swing is not None
+
+
+@dataclass(frozen=True)
+class ExplainingChange:
+    """A change that makes the stage do what the log shows: its name, and the factor on its keys.
+
+    `swing` [m] and `period` [s] are those of the changed stage, None if it rests.
+    """
+
+    name: str
+    factor: float
+    swing: float | None
+    period: float | None
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """What a log shows, what the stage does, and what would explain a difference.
+
+    `swing` [m] and `period` [s] are those of the stage's largest attractor, None if nothing attracts it for certain.
+    """
+
+    standing: Standing
+    attracts: bool
+    certain: bool
+    swing: float | None
+    period: float | None
+    explanations: tuple[ExplainingChange, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Tell whether log and stage agree on hunting, and on swing and period within a quarter."""
+        if self.standing.hunts != self.attracts:
+            return not self.standing.hunts and self.short
+        return not self.attracts or alike(self.standing, self.swing, self.period)
+
+    @property
+    def short(self) -> bool:
+        """Tell whether the reference stands too briefly for hunting of the stage to be seen."""
+        return self.period is not None and self.standing.time < settings.periods_of_a_standing_log * self.period
+
+
+def alike(standing: Standing, swing: float | None, period: float | None) -> bool:
+    """Tell whether a swing [m] and its period [s] are those of a log within the tolerance of such a comparison."""
+    if standing.swing is None or standing.period is None or swing is None or period is None:
+        return False
+    off = max(abs(np.log(swing / standing.swing)), abs(np.log(period / standing.period)))
+    return bool(off < np.log(settings.ratio_of_alike_swings))
+
+
+def standing_of(log: Log) -> Standing:
+    """Return what a machine does where its reference stands for longest.
+
+    Raises InputError for a log without position and reference.
+    """
+    for channel in ("position", "reference"):
+        if channel not in log:
+            raise InputError(channel, "nothing", f"a log with its {channel}", f"--map {channel}=CHANNEL", log.name)
+    first, last = _longest_stand(log["reference"])
+    rows = slice(first, last)
+    time = log.time[rows] - log.time[first]
+    signals = {name: values[rows] for name, values in log.signals.items()}
+    part = Log(log.name, time, log.sample_time, signals, (slice(0, last - first),))
+    whole = float(time[-1])
+    try:
+        swings = swings_of(part)
+    except InputError:
+        return Standing(whole, None, None)
+    seen = swings.amplitude > settings.noises_of_a_swing * noise_of(signals["position"])
+    even = swings.amplitude_deviation < settings.unevenness_of_a_swing * swings.amplitude
+    slow = swings.period > settings.samples_of_a_swing * log.sample_time
+    lasts = swings.count * swings.period > settings.share_of_a_lasting_swing * whole
+    if seen and even and slow and lasts:
+        return Standing(whole, swings.amplitude, swings.period)
+    return Standing(whole, None, None)
+
+
+def _longest_stand(reference: np.ndarray) -> tuple[int, int]:
+    """Return the first sample and the end of the longest stretch at which a reference does not change."""
+    moves = np.abs(np.diff(reference)) > np.finfo(np.float32).eps * max(float(np.ptp(reference)), 1e-12)
+    ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
+    longest = int(np.argmax(np.diff(ends)))
+    return int(ends[longest]), int(ends[longest + 1])
+
+
+def contradiction(stage: Stage, standing: Standing) -> Contradiction:
+    """Compare what a log shows with what attracts the stage, and look for single changes that explain a difference."""
+    flat = stage.flat()
+    factors = np.geomspace(1 / settings.reach_of_a_change, settings.reach_of_a_change, settings.changes_tried)
+    own = _attracted(flat, np.ones(1))
+    swing, period = (values[0] if own[0][0] else None for values in own[2:])
+    plain = Contradiction(standing, bool(own[0][0]), bool(own[1][0]), swing, period, ())
+    if plain.agrees:
+        return plain
+    explanations = []
+    for name, keys in CHANGES.items():
+        held = [key for key in keys if key in flat]
+        if (keys and not held) or (not keys and stage.controller is None):
+            continue
+        changed = faster(flat, factors) if not keys else {**flat, **{key: flat[key] * factors for key in held}}
+        if explanation := _nearest(name, standing, factors, _attracted(_valid(changed), factors)):
+            explanations.append(explanation)
+    ordered = sorted(explanations, key=lambda one: abs(np.log(one.factor)))
+    return Contradiction(standing, plain.attracts, plain.certain, swing, period, tuple(ordered))
+
+
+def _valid(flat: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return keys of a stage in which static friction is nowhere below Coulomb friction."""
+    if "friction.static" not in flat:
+        return flat
+    return {**flat, "friction.static": np.maximum(flat["friction.static"], flat["friction.coulomb"])}
+
+
+def _attracted(flat: Mapping[str, Any], factors: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return which stages have an attractor, for which that is certain, and its swing [m] and period [s]."""
+    sketch = sketch_attractors(flat, len(factors))
+    return sketch.attracts, sketch.certain, sketch.amplitude, sketch.period
+
+
+def _nearest(
+    name: str, standing: Standing, factors: np.ndarray, attracted: tuple[np.ndarray, ...]
+) -> ExplainingChange | None:
+    """Return the change with the smallest factor that makes the stage do what the log shows; None without one."""
+    attracts, certain, swings, periods = attracted
+    for number in np.argsort(abs(np.log(factors))):
+        if not certain[number]:
+            continue
+        swing, period = (float(values[number]) if attracts[number] else None for values in (swings, periods))
+        fits = alike(standing, swing, period) if standing.hunts else not attracts[number]
+        if fits:
+            return ExplainingChange(name, float(factors[number]), swing, period)
+    return None
