@@ -40,6 +40,8 @@ _VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
     ("depends", "depends on what the thesis leaves open", "depend on what the thesis leaves open"),
     ("holds in part", "holds in part", "hold in part"),
     ("differs", "does not hold", "do not hold"),
+    ("not decided enough", "is not decided by enough draws", "are not decided by enough draws"),
+    ("not decided yet", "is not decided yet", "are not decided yet"),
     ("cannot be decided", "cannot be decided", "cannot be decided"),
     ("not yet covered", "is not covered", "are not covered"),
 )
@@ -130,6 +132,7 @@ def _space(space: ClaimInSpace) -> dict[str, Any]:
     return {
         "draws": space.draws,
         "undecided": space.undecided,
+        "decided": space.decided,
         "failures": {str(number): text for number, text in space.failures.items()},
         "holds": space.count,
         "share": _share(space.holds),

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLION
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, MAUVE, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.files import Content, pictures
 from friso.shown.pages import Report, print_image
 from friso.version import VERSION
@@ -35,6 +35,8 @@ COLOURS = {
     "depends": BLUE,
     "holds in part": ORANGE,
     "differs": VERMILLION,
+    "not decided enough": SKY,
+    "not decided yet": MAUVE,
     "cannot be decided": PINK,
     "not yet covered": GREY,
 }

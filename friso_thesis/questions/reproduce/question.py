@@ -55,7 +55,7 @@ class ReproduceAnswer(Answer):
     def details(self) -> Sequence[str]:
         """Return every claim with its judgement, and the cycles behind the maps."""
         claims = [
-            f"{claim['id']:5} {claim['judgement']:14} {_drawn(claim['space'])}{claim['number']}"
+            f"{claim['id']:5} {claim['judgement']:18} {_drawn(claim['space'])}{claim['number']}"
             for claim in self._document["claims"]
             if claim["judgement"] != "not yet covered"
         ]
@@ -85,7 +85,7 @@ class ReproduceAnswer(Answer):
 
 def _drawn(space: dict[str, Any] | None) -> str:
     """Say for how many random choices of the open values a claim holds; "" without any."""
-    return f"[{space['holds']} of {space['draws']} draws] " if space else ""
+    return f"[{space['holds']} of {space['decided']} draws that decide] " if space else ""
 
 
 @question

@@ -78,6 +78,8 @@ AGREEMENT = {
     "depends": "depends",
     "holds in part": "in part",
     "differs": "contradicts",
+    "not decided enough": "not decided enough",
+    "not decided yet": "not decided yet",
     "cannot be decided": "not decidable",
     "not yet covered": "not computed",
 }
@@ -110,15 +112,16 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """Say for how many random choices of the open values a claim holds, with an interval.
+    """Say in how many of the draws that decide a claim holds, with the interval that judges it.
 
-    The text is empty if no such choices were tried.
+    The text is empty if no draw was made.
     """
     if verdict.space is None:
         return ""
     space = verdict.space
     interval = f"{percent(space.holds.low)} to {percent(space.holds.high)}".replace(" %", "\u00a0%")
-    return f"{space.count} of {space.draws} ({interval})"
+    undecided = f"; {space.undecided} undecided" if space.undecided else ""
+    return f"{space.count} of {space.decided} ({interval}{undecided})"
 
 
 def in_draws(verdict: ClaimVerdict, part: int) -> str:

@@ -69,10 +69,11 @@ class MetPart:
 class ClaimInSpace:
     """How a claim of the thesis fares over random choices (draws) of the open values.
 
-    `seeds` identifies each draw by (random seed, number of the draw). `holds` is the fraction, and `count` the number,
-    of draws in which the claim holds; `parts` has the fraction for each part of the claim. `hangs_on` lists the values
-    that decide whether the claim holds, the most decisive first. A draw counts as `undecided` if no criterion fails but
-    one is open, or if the claim could not be computed; `failures` has the reasons for the latter by number of the draw.
+    `seeds` identifies each draw by (random seed, number of the draw). `count` is the number of draws in which the claim
+    holds, and `holds` their fraction of the draws that decide; `parts` has the fraction for each part of the claim.
+    `hangs_on` lists the values that decide whether the claim holds, the most decisive first. A draw counts as
+    `undecided` if no criterion fails but one is open, or if the claim could not be computed; `failures` has the reasons
+    for the latter by number of the draw.
     """
 
     seeds: tuple[tuple[int, int], ...]
@@ -89,9 +90,14 @@ class ClaimInSpace:
         return len(self.seeds)
 
     @property
+    def decided(self) -> int:
+        """Return how many random choices of the open values decide whether the claim holds."""
+        return self.draws - self.undecided
+
+    @property
     def misses(self) -> int:
         """Return for how many random choices of the open values the claim does not hold."""
-        return self.draws - self.undecided - self.count
+        return self.decided - self.count
 
     def met(self, part: int) -> int:
         """Return for how many random choices of the open values a part of the claim holds."""
@@ -230,7 +236,7 @@ def _in_space(
     holds = np.array([finding.judgement == "holds" for _, finding in decided], bool)
     return ClaimInSpace(
         tuple((DRAW_SEED, one.number) for one, _ in tried),
-        _share(holds, len(tried)),
+        _share(holds, len(holds)),
         int(holds.sum()),
         tuple(_met(column, len(tried)) for column in zip(*(finding.pattern for _, finding in findings), strict=True)),
         tuple(_separations(entry, [one for one, _ in decided], holds)),

@@ -34,5 +34,20 @@ class JudgeSettings(Settings):
     exact_share: float = setting(1e-9, "")
     """Largest relative difference between numbers that follow from one equation. Rounding is far smaller."""
 
+    half_share: float = setting(0.5, "")
+    """Share of the draws in which a claim must hold to agree; the whole interval must lie above it. With less, a claim
+    could fail in most of what the thesis leaves open."""
+
+    rare_share: float = setting(0.25, "")
+    """Largest share of the draws in which a claim that fails at friso's choice may hold, and still fail. The upper end
+    of the interval counts: thirteen draws without one that holds show it, and one of 48 does not turn it."""
+
+    stray_share: float = setting(0.05, "")
+    """Share that the lower end of an interval must exceed to say that a claim holds in more than stray draws. It is
+    that of “few” cells of a map. Twice as much would need ten of 48 draws."""
+
+    least_decided: int = setting(6, "draws")
+    """Least number of decided draws. With fewer, even if all agree, the interval of the share reaches below a half."""
+
 
 settings = JudgeSettings.live()
