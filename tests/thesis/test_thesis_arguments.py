@@ -10,7 +10,15 @@ from made_maps import Cells, made
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Response, by_attraction, registered
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.judges import arguments, control_law
-from friso_thesis.studies.thesis.judges.arguments import HEAVIEST, HEAVY, HIGH_ALPHA, LIGHT, LOW_ALPHA, ArguedCycle
+from friso_thesis.studies.thesis.judges.arguments import (
+    HEAVIEST,
+    HEAVY,
+    HIGH_ALPHA,
+    LIGHT,
+    LOW_ALPHA,
+    ArguedCycle,
+    cycle_of,
+)
 from friso_thesis.studies.thesis.judges.control_law import K_P, TAU_I, TAU_Z, judged_crossovers, judged_forms, rewritten
 from friso_thesis.studies.thesis.judges.influence import judged_ranks
 from friso_thesis.studies.thesis.judges.leaf_springs import (
@@ -216,6 +224,16 @@ def test_the_steps_of_the_arguments(claim: str, cycles: Any, pattern: Any, monke
     still = xr.Dataset({"count": 0.0})
     responses = {name: Response(still, name) for name in cycles}  # type: ignore[arg-type]
     assert registered()[claim].judge(Evidence({}, responses)).pattern == pattern
+
+
+def test_the_build_up_is_read_after_the_initial_overshoot() -> None:
+    """Before 6 s the integral action changes by 10 N/s, from then on by 1 N/s; the return ends at 5.1 s."""
+    time = np.arange(0.0, 20.0, 0.01)
+    force_i = np.where(time < 6.0, 10 * time, 60 + (time - 6.0))
+    signals = {"force_i": force_i, "force": 1 + force_i, "friction_force": force_i, "cart_velocity": 0 * time}
+    signals |= {"position": 0 * time, "reference": np.clip(5.1 - time, 0.0, 0.1)}
+    trace = xr.Dataset({name: ("time", values) for name, values in signals.items()}, {"time": time})
+    assert cycle_of(Response(xr.Dataset(), trace)).build_up == pytest.approx(1.0)
 
 
 def test_periods_and_peaks_of_maps() -> None:

@@ -290,10 +290,6 @@ OTHER_REASON = (
         "friction that falls with the speed makes it unstable at low speeds.",
     ),
     Remark(
-        "S41M", 0, False,
-        "More mass ends hunting, but after this move not because the integral action builds up more slowly.",
-    ),
-    Remark(
         "S342F", 0, False,
         "A higher crossover settles sooner, but the loop is also stable within a factor of 3 of the first "
         "eigenfrequency.",
