@@ -183,7 +183,8 @@ class Evidence:
     """Evidence that a judge, a function that judges a claim, may use.
 
     Evidence has maps by study name, responses by name, the linear analysis of the rig, and its identification by
-    experiments, each None if not made. The rig itself is included, too.
+    experiments, each None if not made. The rig itself is included, too. `force_noise` is the noise of the drive's force
+    over what rounding makes.
     """
 
     maps: Mapping[str, xr.Dataset]
@@ -191,6 +192,7 @@ class Evidence:
     linear: Linear | None = None
     identified: Experiments | None = None
     rig: Stage = field(default_factory=thesis_rig)
+    force_noise: float = 1.0
 
     @property
     def analysis(self) -> Linear:

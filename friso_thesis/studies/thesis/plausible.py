@@ -7,7 +7,7 @@ depends, and which draw fits the printed numbers best.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +21,7 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
-from friso_thesis.studies.thesis.space import DRAW_SEED, OPEN, Draw, baseline, draw, enters
+from friso_thesis.studies.thesis.space import DRAW_SEED, FORCE_NOISE, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
 
 DRAW_COUNT, ANALYSED_EVERY = 48, 3
@@ -204,6 +204,7 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
     needs = {need for entry in entries.values() for need in entry.needs}
     try:
         base = evidence(needs, MAP_POINTS, DRAW_RTOL, changes=one.changes)
+        base = replace(base, force_noise=one.values[FORCE_NOISE])
     except _SHOWS_NOTHING as error:
         return {f"{name} {FAILED}": _failure(error) for name in entries}
     findings: Findings = {}
