@@ -662,11 +662,8 @@ def test_the_gains_of_the_design_method_are_those_of_the_stage() -> None:
 def test_values_that_do_not_enter_are_not_ranked() -> None:
     needs = {claim: entry.needs for claim, entry in registered().items()}
     entering = {claim: {v.name for v in OPEN if enters(v, own, RESPONSES, PARTS)} for claim, own in needs.items()}
-    assert entering["F28"] == {value.name for value in OPEN} - {
-        "acceleration",
-        "distance",
-        "cruise over acceleration time",
-    }
+    path = {"acceleration", "distance", "cruise over acceleration time"}
+    assert entering["F28"] == {value.name for value in OPEN} - path
     every = {value.name for value in OPEN} - {FORCE_NOISE}
     control = {"alpha", "beta", "low-pass on the derivative alone"}
     assert entering["E1"] == entering["F7"] == every - control - path

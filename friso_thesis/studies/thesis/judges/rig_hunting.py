@@ -267,8 +267,11 @@ def _at_noise(standstill: InPosition, noise: float) -> NoisyStandstill:
     """Return the standstill with a noise of the force between those simulated, interpolated in logarithms."""
     factors = np.log([*standstill.louder])
     locked, free, recovered = np.array([(s.locked, s.free, s.recovered) for s in standstill.louder.values()]).T
-    peaks = (float(np.exp(np.interp(np.log(noise), factors, np.log(values)))) for values in (locked, free))
-    return NoisyStandstill(*peaks, float(np.interp(np.log(noise), factors, recovered)))
+
+    def between(values: np.ndarray) -> float:
+        return float(np.interp(np.log(noise), factors, values))
+
+    return NoisyStandstill(np.exp(between(np.log(locked))), np.exp(between(np.log(free))), between(recovered))
 
 
 def _tenfold(standstill: InPosition) -> float:
