@@ -35,10 +35,10 @@ from friso.studies.store_files import kept_arrays
 from friso.studies.study import _DECISIVE
 from friso_thesis.questions.reproduce.document import reproduce_document
 from friso_thesis.questions.reproduce.figures import reproduction_figures
-from friso_thesis.questions.reproduce.page import COLOURS, reproduce_files, reproduce_html
+from friso_thesis.questions.reproduce.page import COLOURS, claims_markdown, reproduce_files, reproduce_html
 from friso_thesis.questions.reproduce.questions import QUESTIONS
 from friso_thesis.questions.reproduce.summary import summary_sheet
-from friso_thesis.questions.reproduce.words import SHORT_FORM, details, in_order, reasons, short
+from friso_thesis.questions.reproduce.words import SHORT_FORM, details, in_order, met, reasons, short
 from friso_thesis.studies.thesis import experiments
 from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso_thesis.studies.thesis.claims import (
@@ -629,9 +629,18 @@ def test_the_rig_moves_as_prescribed_whatever_is_drawn() -> None:
 def test_claims_asked_for_have_a_page_and_conclusions_of_their_own() -> None:
     """Under the thesis's own law alone: the others take long."""
     asked = reproduce(only=["E1", "S35"], points=3, with_cycles=False, draws=0)
-    judged = {entry["id"] for entry in reproduce_document(asked)["claims"] if entry["parts"]}
+    document = reproduce_document(asked)
+    judged = {entry["id"] for entry in document["claims"]}
     assert judged == {"E1", "S35"}
-    page = str(reproduce_files(asked)["reproduction.html"])
+    assert document["conclusion"] == "Of 2 claims of the thesis 2 hold."
+    files = reproduce_files(asked)
+    page = str(files["reproduction.html"])
+    assert [
+        claim.id for claim in claims() if (f"| {claim.id} |" in str(files["claims.md"])) != (claim.id in judged)
+    ] == []
+    assert "not computed" not in page.replace("not computed in this run", "")
+    alone = replace(asked, verdicts=asked.verdicts[:1])
+    assert reproduce_document(alone)["conclusion"] == "Claim E1 of the thesis holds."
     assert [claim for claim in judged if f'id="claim-{claim}"' not in page] == []
     assert "default-src 'none'" in page
     with patched({module("laws"): {"kept_laws": lambda rig: ((None,), {})}}):
@@ -918,6 +927,26 @@ def test_the_command_writes_its_page_and_claims(
     written = {claim["id"]: claim for claim in json.loads((tmp_path / "rep" / "claims.json").read_text())["claims"]}
     assert written["F15A"]["judgement"] in ("holds", "holds in part", "differs")
     assert written["F11A"]["judgement"] == "not yet covered"
+
+
+def test_table_and_section_have_equal_intervals_and_whole_reasons(thorough_study: Reproduction) -> None:
+    """The evidence page; F19 has its sharp result: 11 Hz and 0.75 kg are (2 pi 11 Hz)^2 0.75 kg."""
+    lines = claims_markdown(thorough_study).replace("\u00a0", " ").splitlines()
+    rows = {line.split(" | ")[0].removeprefix("| "): line for line in lines if line.startswith("| ")}
+    for item in thorough_study.verdicts:
+        if item.space and item.space.decided:
+            (interval,) = re.findall(r"\(([^();]* to [^();]*)", rows[item.claim.id].rsplit(" | ", 1)[1])
+            assert f"({interval})" in item.dependence
+    sections = "\n".join(lines)
+    of_f19 = sections[sections.index("## F19") :]
+    assert (2 * np.pi * 11) ** 2 * 0.75 == pytest.approx(3583, abs=1)
+    assert "11 Hz and 0.75 kg that the thesis measured give 3.58 N/mm, not 2.9" in of_f19
+    assert "Why: Simulation cannot decide this: cables, misalignment" in of_f19
+
+
+def test_criteria_that_are_undecided_are_counted_as_such() -> None:
+    assert met(verdict(claims()[0], "1", Finding((OPEN_PART, BEYOND, NO)))) == "0 of 3, 2 undecided"
+    assert met(verdict(claims()[0], "1", Finding((YES, NO)))) == "1 of 2"
 
 
 def test_the_summary_has_every_text_whole_on_one_sheet() -> None:

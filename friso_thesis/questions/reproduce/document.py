@@ -25,13 +25,16 @@ if TYPE_CHECKING:
 
 
 def conclusion(reproduction: Reproduction) -> str:
-    """Say how many claims of the thesis hold."""
+    """Say how many claims of the thesis hold, or whether the only one that was asked for does."""
     counts = Counter(verdict.judgement for verdict in reproduction.verdicts)
     parts = [
         f"{counts[judgement]} {singular if counts[judgement] == 1 else plural}"
         for judgement, singular, plural in _VERBS
         if counts[judgement]
     ]
+    if len(reproduction.verdicts) == 1:
+        (only,) = reproduction.verdicts
+        return f"Claim {only.claim.id} of the thesis {parts[0].removeprefix('1 ')}."
     return f"Of {len(reproduction.verdicts)} claims of the thesis {listed(parts, 'and')}."
 
 

@@ -126,7 +126,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
 
 
 def claims_markdown(reproduction: Reproduction) -> str:
-    """Return all claims as a Markdown page, in which the documentation shows a finished run."""
+    """Return all claims with their reasons as a Markdown page, in which the documentation shows a finished run."""
     heads = ("Claim", "Where", "What the thesis claims, in short", "By its count", "By what attracts", "Holds in draws")
     rows = [heads, ("---",) * len(heads)]
     rows += [
@@ -149,6 +149,8 @@ def claims_markdown(reproduction: Reproduction) -> str:
             said = f"{item.claim.text[:1].upper()}{item.claim.text[1:]} ({item.claim.where})."
             lines = [f"## {item.claim.id}: {words.AGREEMENT[item.judgement]}", "", said, ""]
             lines += [f"- {words.criterion_word(part)}: {part.number}" for part in item.finding.stated]
+            reason = words.whole_reasons(item)
+            lines += ["", f"Why: {reason}"] if reason else []
             parts.append("\n".join([*lines, "", item.dependence]))
     return "\n\n".join(parts) + "\n"
 

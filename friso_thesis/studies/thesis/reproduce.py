@@ -72,7 +72,8 @@ class Reproduction:
       this run needs it. `experimented` names the experiments made.
     - The map of Fig. 14B by relative tolerance. The fractions of its cells with peaks at one tolerance only, and with a
       different peak count (NaN if not computed).
-    - A verdict per claim, and the claims over the joint draws of the values that the thesis leaves open.
+    - A verdict per claim, or per claim that was asked for, and the claims over the joint draws of the values that the
+      thesis leaves open.
     - The hunting cycles behind each map, by study name.
     - Values per axis of the maps (`points`), and of those judged (`judged_points`).
     """
@@ -107,7 +108,7 @@ def reproduce(
     """Run the studies `names` (default: all of Table 3), and judge the claims.
 
     Maps have `points` values per axis, and for judging at least `JUDGED_POINTS`. With `only`, just these claims are
-    judged, with what they need; a claim that is left out is "not yet covered". `with_cycles` also computes the hunting
+    judged, with what they need, and the result has no others. `with_cycles` also computes the hunting
     cycles behind every map, and adds to each judgement what attracts the stages. With `draws`, every claim is judged in
     as many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not computed
     again. `progress` is called with steps done, steps in all and what comes next. Raises InputError for an unknown
@@ -178,6 +179,7 @@ def reproduce(
         if claim.id in entries
         else _left_out(claim, chosen)
         for claim in claims()
+        if asked is None or claim.id in asked
     )
     curves = bode(thesis_rig(), SHOWN_FREQUENCIES, series=True) if base.linear is not None else None
     judged = by_way(base, by_peak_count)
@@ -202,7 +204,7 @@ def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
     if entry is None:
         return not_covered(claim, "no judge decides on it")
     missing = sorted({need for need in entry.needs if need in STUDIES} - chosen.keys())
-    return not_covered(claim, f"not computed in this run: {', '.join(missing) or 'this claim was not asked for'}")
+    return not_covered(claim, f"not computed in this run: {', '.join(missing)}")
 
 
 def _by_attraction(

@@ -19,7 +19,15 @@ class JudgeSettings(Settings):
     peaks."""
 
     far_crossover_factor: float = setting(3.0, "")
-    """Factor of “significantly larger” or “smaller” than an eigenfrequency: half a decade, as “far” in all claims."""
+    """Factor of “significantly larger” or “smaller” for a tuned crossover: half a decade, as “far” in all claims. It is
+    the other reading of Sec. 3.4.2, whose own 8 Hz then lie too near, though their loop crosses 0 dB at 24 Hz."""
+
+    lowest_crossover_ratio: float = setting(0.03, "")
+    """Lowest crossover tried over the first eigenfrequency: 0.3 Hz, low enough that the resonance stays below 0 dB
+    while the cart slides. From 0.8 Hz on it reaches 0 dB, and the loop crosses there."""
+
+    crossovers_tried: int = setting(31, "")
+    """Number of crossovers tried beside the first eigenfrequency, 19 % apart, finer than “about” by far."""
 
     tuned_masses: int = setting(9, "")
     """Number of masses for which the controller is tuned, from the stage's to the whole mass. More show the same
@@ -33,6 +41,10 @@ class JudgeSettings(Settings):
 
     exact_share: float = setting(1e-9, "")
     """Largest relative difference between numbers that follow from one equation. Rounding is far smaller."""
+
+    first_response: float = setting(0.3, "s")
+    """Time for which the initial response lasts, five times that of the move: its overshoot of 28 mm has turned and
+    come back by then, and the stage has not stuck yet."""
 
     build_up_after: float = setting(6.0, "s")
     """Time after which the build-up of the integral action is read, one second after the return begins. By then the
