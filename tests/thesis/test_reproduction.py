@@ -75,9 +75,10 @@ from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
 from friso_thesis.studies.thesis.kept import SOURCES, Kept, kept_findings, put_together, taken_apart
 from friso_thesis.studies.thesis.laws import conclusions_by_law
 from friso_thesis.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
-from friso_thesis.studies.thesis.plausible import PARTS, _in_space, plausible
+from friso_thesis.studies.thesis.plausible import PARTS, _in_space, plausible, work_of
 from friso_thesis.studies.thesis.reading import OTHERWISE, OWN, others_of, read_as, reading, words_read
 from friso_thesis.studies.thesis.reproduce import Reproduction, _changed, reproduce
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import FORCE_NOISE, OPEN, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES, rig_gains, thesis_rig
 from friso_thesis.studies.thesis.verdicts import not_covered, verdict
@@ -801,6 +802,17 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         file.write_bytes(content)
     kept.clear()
     assert kept.count == 0
+
+
+def test_the_work_is_that_of_what_the_claims_need() -> None:
+    """F13 needs two runs in time a draw, and S342F one map and the linear analysis: 40 s, where 34 min were told."""
+    assert dict(settings.experiment_work).keys() == _RUNS.keys()
+    entries = registered()
+    assert work_of({"F13": entries["F13"]}, 48) == 49 * 2 * settings.response_work
+    both = work_of({name: entries[name] for name in ("F13", "S342F")}, 48)
+    assert both - work_of({"F13": entries["F13"]}, 48) == 16 * (settings.linear_work + 21**2)
+    assert both < 60_000  # milliseconds
+    assert work_of(entries, 0) == 0
 
 
 def test_few_points_are_shown_and_not_judged_on() -> None:

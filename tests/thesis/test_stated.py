@@ -93,4 +93,5 @@ def test_the_noise_of_the_appendix() -> None:
     inside = np.where((rates >= 10) & (rates <= 80), 0.1, 0.01)
     identified = cast(Any, SimpleNamespace(locked_line=line(inside)))
     assert judged("A1", identified=identified).pattern == (Y, N)
-    assert judged_noise(line(np.where(rates <= 20, 0.1, 0.01))).pattern == (N, N)  # from 5 Hz on
+    assert judged_noise(line(np.where(rates <= 5, 0.1, 0.01))).pattern == (N, N)  # at 5 Hz
+    assert judged_noise(line(0.1 + 0 * rates)).pattern == (N, N)  # everywhere

@@ -21,6 +21,7 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import DRAW_SEED, FORCE_NOISE, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
 
@@ -33,9 +34,6 @@ MAP_POINTS = 21
 
 DRAW_RTOL = 1e-5
 """Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
-
-MAP_WORK, COSTLY_WORK = MAP_POINTS**2 * len(STUDIES), 6 * MAP_POINTS**2 * len(STUDIES)
-"""Progress steps for the maps of a draw, and for its linear analysis and experiments."""
 
 CHANCE_PROBABILITY = 0.05
 """Probability of a chance separation above which it is not reported, for all values of a claim together."""
@@ -158,8 +156,8 @@ def plausible(
     own: dict[str, Finding] = {}
     by_claim_tried: dict[str, list[tuple[Draw, Finding | None]]] = {name: [] for name in (*cheap, *costly)}
     failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
-    pieces = [(one, cheap, MAP_WORK) for one in (*drawn, baseline()) if drawn and cheap]
-    pieces += [(one, costly, COSTLY_WORK) for one in drawn[ANALYSED_EVERY - 1 :: ANALYSED_EVERY] if costly]
+    pieces = [(one, cheap, _work(cheap)) for one in (*drawn, baseline()) if drawn and cheap]
+    pieces += [(one, costly, _work(costly)) for one in drawn[ANALYSED_EVERY - 1 :: ANALYSED_EVERY] if costly]
 
     def judged(one: Draw, group: Mapping[str, Registered], work: int) -> Findings:
         about = ("draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
@@ -186,9 +184,18 @@ def plausible(
 
 def work_of(entries: Mapping[str, Registered], draws: int) -> int:
     """Return the amount of work for `draws` random rigs, in units of the progress tally."""
-    cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
-    costly = any(entry.needs & PARTS.keys() for entry in entries.values())
-    return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // ANALYSED_EVERY) * COSTLY_WORK
+    cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
+    costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
+    return (draws + bool(draws)) * _work(cheap) + draws // ANALYSED_EVERY * _work(costly)
+
+
+def _work(entries: Mapping[str, Registered]) -> int:
+    """Return the work of judging these claims in one draw, in units of the progress tally."""
+    needs = {need for entry in entries.values() for need in entry.needs}
+    maps = len(needs & STUDIES.keys()) * MAP_POINTS**2
+    experiments = sum(work for name, work in settings.experiment_work if name in needs)
+    linear = settings.linear_work * bool(needs & NEEDS.keys())
+    return maps + experiments + linear + settings.response_work * len(needs & RESPONSES.keys())
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:

@@ -32,6 +32,7 @@ from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS, Linear
 from friso_thesis.studies.thesis.plausible import DRAW_COUNT, PARTS, Plausible, counted, plausible, work_of
 from friso_thesis.studies.thesis.reading import others_of, read_as, words_read
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
 
@@ -57,9 +58,8 @@ TIGHT_RTOL = 1e-8
 SHOWN_FREQUENCIES = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
-PART_WORK, LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 6000, 5000, 65_000
-"""Progress steps, in units of a run's processor time: for a part of the linear analysis or an experiment, and for the
-survey of a map with the joint locked and free."""
+LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 5000, 65_000
+"""Progress steps, in units of a run's processor time, for the survey of a map with the joint locked and free."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def reproduce(
     parts = sorted(needs & PARTS.keys())
     judged_points = max(points, JUDGED_POINTS)
     half = -(-judged_points // 2)
-    total = len(studies) * (judged_points**2 + half**2) + PART_WORK * len(parts) + work_of(entries, draws)
+    total = len(studies) * (judged_points**2 + half**2) + sum(map(_part_work, parts)) + work_of(entries, draws)
     total += with_cycles * sum(map(_survey_work, studies.values())) + 2 * points**2 * ("isolator-damping" in studies)
     tally = Tally(progress, total)
     tally.add(0, "responses")
@@ -144,7 +144,7 @@ def reproduce(
     for part in parts:
         if part in EXPERIMENTS:
             getattr(base.experiments, part)
-        tally.add(PART_WORK, part.replace("_", " "))
+        tally.add(_part_work(part), part.replace("_", " "))
 
     def behind(study: ThesisStudy) -> tuple[Surveyed, CyclesOnMap]:
         surveyed = survey(maps[study.name], kept)
@@ -191,6 +191,11 @@ def reproduce(
         frozenset(parts) & EXPERIMENTS.keys(), tolerances,
         _changed(tolerances), verdicts, space, cycles, points, judged_points, rtol,
     )  # fmt: skip
+
+
+def _part_work(part: str) -> int:
+    """Return the progress steps that a part of the linear analysis, or an experiment, takes."""
+    return dict(settings.experiment_work).get(part, settings.linear_work)
 
 
 def _survey_work(study: ThesisStudy) -> int:

@@ -51,6 +51,30 @@ class JudgeSettings(Settings):
     initial overshoot, of up to 29 mm, is over and the bearing has stuck, at 5.2 to 5.5 s with 1.7 to 5.1 kg; from the
     end of the return on, at 5.06 s, the overshoot would decide."""
 
+    response_work: int = setting(40, "runs")
+    """Work of a run in time, in runs of a map, for the progress: 40 ms of processor time against 1 ms."""
+
+    linear_work: int = setting(2500, "runs")
+    """Work of the linear analysis of a rig, in runs of a map: 2.5 s of processor time."""
+
+    experiment_work: tuple[tuple[str, int], ...] = setting(
+        (
+            ("locked_line", 900),
+            ("joint_steps", 200),
+            ("slow_motion", 200),
+            ("constant_speed", 6000),
+            ("rig_loops", 1800),
+            ("moves", 7000),
+            ("grid", 12_000),
+            ("cycles", 4500),
+            ("standstill", 4000),
+            ("traces", 1000),
+        ),
+        "runs",
+    )
+    """Work of each experiment on a drawn rig, in runs of a map: as measured on two drawn rigs, in milliseconds of
+    processor time. Equal work for all told half an hour for claims of half a minute."""
+
     half_share: float = setting(0.5, "")
     """Share of the draws in which a claim must hold to agree; the whole interval must lie above it. With less, a claim
     could fail in most of what the thesis leaves open."""

@@ -222,15 +222,17 @@ def noisy_range(evidence: Evidence) -> Finding:
 def judged_noise(line: LockedLine) -> Finding:
     """Judge whether the scatter of a `line` lies in the range of A.1, and whether both ranges are the same."""
     rates, scatter = np.array(RESPONSE_FREQUENCIES), line.scatter
-    large = rates[scatter >= words.half * np.nanmax(scatter)]
     low, high = APPENDIX_RANGE
+    worst, most = float(rates[np.nanargmax(scatter)]), float(np.nanmax(scatter))
+    above = float(np.nanmax(scatter[rates >= words.about * high]))
     return Finding.of(
         Part(
-            f"identifications at different places scatter most between {low:g} and {high:g} Hz (at least "
-            f"{percent(words.half)} of their largest scatter of the phase nowhere else)",
-            bool(large.min() >= low and large.max() <= high),
-            f"from {large.min():.3g} to {large.max():.3g} Hz, of those computed",
-            why="The scatter reaches farther.",
+            f"as in Fig. 17, identifications at different places differ most between {low:g} and {high:g} Hz, by more "
+            f"than {words.about:g} times as much as from {words.about * high:g} Hz",
+            bool(low <= worst <= high and most > words.about * above),
+            f"the phase scatters most at {worst:.3g} Hz, by {np.degrees(most):.2g} degrees, and by "
+            f"{np.degrees(above):.2g} above",
+            why="The scatter lies elsewhere.",
         ),
         Part(
             "A.1 and Sec. 4.2.1 name the same range",
