@@ -169,11 +169,12 @@ def thesis_solver() -> dict[str, float]:
 
 
 def other_solvers() -> dict[str, float]:
-    """Return the results of three solvers at the thesis's tolerance, with no largest step.
+    """Return the results of three solvers at the thesis's tolerance, without its largest step, and of two with it.
 
     They are peaks, swing over the last quarter [m], steps and evaluations of the equations of ode23s, of backward
     differentiation of variable order (the method of ode15s) and of Dormand and Prince's (ode45), with the joint locked
-    and free. An example of a name is `locked_ode45_evaluations`.
+    and free. Examples of names are `locked_ode45_evaluations` and, with the largest step,
+    `locked_ode45_held_evaluations`.
     """
     from friso_thesis.studies.thesis.studies import thesis_rig
 
@@ -181,9 +182,12 @@ def other_solvers() -> dict[str, float]:
     for joint in ("locked", "free"):
         flat = thesis_rig().replace({"joint.locked": joint == "locked"}).flat()
         numbers, end = parameters(flat), flat["motion.duration"]
-        position, steps, rejected = ode23s(numbers, end, RTOL, ATOL, end, SAMPLE)
-        runs = {"ode23s": (position, steps, (STATES + 3) * steps + 2 * rejected)}
-        runs |= {name: _of_scipy(name, numbers, end) for name in ("ode15s", "ode45")}
+        runs = {}
+        for held, largest in (("", end), ("_held", LARGEST)):
+            position, steps, rejected = ode23s(numbers, end, RTOL, ATOL, largest, SAMPLE)
+            runs[f"ode23s{held}"] = position, steps, (STATES + 3) * steps + 2 * rejected
+            for name in ("ode45",) if held else ("ode15s", "ode45"):
+                runs[f"{name}{held}"] = _of_scipy(name, numbers, end, largest)
         for name, (position, steps, evaluations) in runs.items():
             swing = float(np.ptp(position[3 * len(position) // 4 :]))
             shown = {"peaks": counted_peaks(position), "swing_m": swing, "steps": steps, "evaluations": evaluations}
@@ -191,7 +195,7 @@ def other_solvers() -> dict[str, float]:
     return values
 
 
-def _of_scipy(name: str, numbers: np.ndarray, end: float) -> tuple[np.ndarray, int, int]:
+def _of_scipy(name: str, numbers: np.ndarray, end: float, largest: float) -> tuple[np.ndarray, int, int]:
     """Return samples of the stage's position, steps, and evaluations with Jacobians."""
     from scipy.integrate import BDF, RK45
 
@@ -201,7 +205,7 @@ def _of_scipy(name: str, numbers: np.ndarray, end: float) -> tuple[np.ndarray, i
         return out
 
     method = {"ode15s": BDF, "ode45": RK45}[name]
-    solver = method(derivative, 0.0, np.zeros(STATES), end, rtol=RTOL, atol=ATOL, first_step=1e-6)
+    solver = method(derivative, 0.0, np.zeros(STATES), end, rtol=RTOL, atol=ATOL, first_step=1e-6, max_step=largest)
     times = np.arange(round(end / SAMPLE) + 1) * SAMPLE
     position, steps = np.zeros(len(times)), 0
     while solver.status == "running":

@@ -8,7 +8,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
 from friso.studies.rig.experiments.frf import MeasuredLoop, Plant
 from friso.studies.rig.moves_on_rails import RailRuns
-from friso_thesis.studies.rig.in_position import InPosition, Standstill
+from friso_thesis.studies.rig.in_position import InPosition, NoisyStandstill, Standstill
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import CyclesOnRails, MovesOnRails, RailTraces, RigLoops
 
@@ -54,21 +54,21 @@ def cycles(even: dict[str, Any] | None = None, **rails: Any) -> CyclesOnRails:
                   rail_runs([HUNTS], **SLOW))  # fmt: skip
 
 
-def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, tenfold: float = 0.6) -> InPosition:
-    """Peaks [m], ratio of the RMS, and the share of its difference that ten times the damping takes away."""
-    rms = 3e-8 * np.array([1.0, ratio])
+def standstill(locked: float = 1e-7, free: float = 1e-6, recovered: float = 0.6) -> InPosition:
+    """Peaks [m], which grow with the noise, and the share of the difference that the bearing's damping takes away."""
+    rms = 3e-8 * np.array([1.0, 10.0])
 
     def still(*true: list[float]) -> Standstill:
         both = np.array(true)
         return Standstill(both, both, np.zeros(len(both)), np.zeros((len(both), 2)))
 
     runs = {("locked", "all"): still([rms[0], locked]), ("free", "all"): still([rms[1], free])}
-    damped = still(*([rms[1] - share * (rms[1] - rms[0]), free] for share in (0.0, tenfold, 0.99)))
+    damped = still(*([rms[1] - share * (rms[1] - rms[0]), free] for share in (0.0, 0.1, 0.99)))
     damping = np.array([0.5, 5.0, 50.0])
     time = np.linspace(0.0, 12.0, 50)
     drawn = {case: (time, size * np.sin(time)) for case, size in (("locked", locked), ("free", free))}
-    noises = {factor: (factor * locked, factor * free) for factor in (0.1, 1.0, 10.0)}
-    return InPosition(16.0, 7e-3, False, np.array([1.0, 2.0]), runs, {}, damping, 0.5, damped, drawn, noises)
+    noises = {k: NoisyStandstill(k * locked, k * free, recovered) for k in (0.1, 1.0, 10.0)}
+    return InPosition(16.0, 7e-3, False, np.array([1.0, 2.0]), runs, {}, damping, 0.5, damped, drawn, noises, 316.0)
 
 
 def traces() -> RailTraces:

@@ -74,8 +74,9 @@ def test_standstill_adds_up_and_stiffness_holds() -> None:
         standstill, kept = in_position.in_position(RIG, 1, silent, noises=(1.0, 3.0))
     assert set(kept) == {"locked", "free"}
     alike = [standstill.runs[case, "all"].true[0, 1] for case in in_position.CASES]
-    assert standstill.louder[1.0] == pytest.approx(alike)
-    assert standstill.louder[3.0][1] > 2 * alike[1]
+    assert [standstill.louder[1.0].locked, standstill.louder[1.0].free] == pytest.approx(alike)
+    assert 0.1 < standstill.louder[3.0].recovered < 1.0  # by the damping of the bearing's bristles
+    assert standstill.louder[3.0].free > 2 * alike[1]
     for case in in_position.CASES:
         alone = [standstill.runs[case, source].true[0, 0] ** 2 for source in in_position.SOURCES[:-1]]
         assert standstill.runs[case, "all"].true[0, 0] ** 2 == pytest.approx(sum(alone), rel=0.2)

@@ -10,8 +10,24 @@ from made_maps import Cells, made
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Response, by_attraction, registered
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.judges import arguments, control_law
-from friso_thesis.studies.thesis.judges.arguments import HEAVIEST, HEAVY, HIGH_ALPHA, LIGHT, LOW_ALPHA, ArguedCycle
-from friso_thesis.studies.thesis.judges.control_law import K_P, TAU_I, TAU_Z, judged_crossovers, judged_forms, rewritten
+from friso_thesis.studies.thesis.judges.arguments import (
+    HEAVIEST,
+    HEAVY,
+    HIGH_ALPHA,
+    LIGHT,
+    LOW_ALPHA,
+    ArguedCycle,
+    cycle_of,
+)
+from friso_thesis.studies.thesis.judges.control_law import (
+    K_P,
+    TAU_I,
+    TAU_Z,
+    TunedLoop,
+    judged_crossovers,
+    judged_forms,
+    rewritten,
+)
 from friso_thesis.studies.thesis.judges.influence import judged_ranks
 from friso_thesis.studies.thesis.judges.leaf_springs import (
     evaluated,
@@ -149,8 +165,8 @@ def test_two_forms_of_the_controller() -> None:
     [(0.0, 0.3, 0.9, -0.9, (Y, Y, Y)), (0.2, 0.3, 0.1, 0.2, (N, N, N)), (0.0, 0.0, 0.9, np.nan, (N, Y, N))],
 )
 def test_the_crossover_and_the_first_mode(near: float, far: float, force: float, settling: float, pattern: Any) -> None:
-    margins = {0.2: far, 0.9: 0.5, 1.5: near, 5.0: 0.6}
-    assert judged_crossovers(margins, 10.0, force, settling).pattern == pattern
+    tried = TunedLoop(0.05, 0.05, far), TunedLoop(0.3, 1.2, 0.5), TunedLoop(0.4, 1.4, near), TunedLoop(0.7, 2.2, 0.6)
+    assert judged_crossovers(tried, 10.0, force, settling).pattern == pattern
 
 
 def test_the_motor_constant(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,15 +195,27 @@ def test_the_ranks_of_influence() -> None:
     assert judged_ranks({**locked, "mass": 0.9}, {**free, "x": -0.6}).pattern == (N, N)
 
 
+def test_a_loop_tuned_to_the_eigenfrequency_crosses_far_above_it() -> None:
+    """Sec. 3.4.2: 8 Hz, tuned for the whole mass, crosses 0 dB about 20 Hz with the joint free (Fig. 23)."""
+    tried = control_law.loops_over_crossover(thesis_rig().to_toml(), 11.0)
+    at = min(tried, key=lambda loop: abs(loop.tuned - 8.0 / 11.0))
+    assert 1.9 < at.crossing < 2.5
+    assert tried[0].crossing == pytest.approx(tried[0].tuned, rel=0.02)  # and a slow one where it is tuned
+    finding = judged_crossovers(tried, 11.0, 0.9, -0.9)
+    assert finding.pattern == (N, Y, Y)
+
+
 def test_other_solvers() -> None:
     own = {"peaks": 6, "swing_m": 1e-3, "steps": 100, "evaluations": 1000}
-    runs = [f"{joint}_{name}" for joint in ("locked", "free") for name in ("ode23s", "ode15s", "ode45")]
-    values = {f"{run}_{key}": value for run in runs for key, value in own.items()}
-    slow = {f"{joint}_ode15s_evaluations": 2000 for joint in ("locked", "free")}
+    solvers = [f"{name}{held}" for name in ("ode23s", "ode15s", "ode45") for held in ("", "_held")]
+    values = {f"{joint}_{name}_{key}": number for joint in ("locked", "free") for name in solvers
+              for key, number in own.items()}  # fmt: skip
     for changes, pattern in (
-        (slow, (Y, N)),
-        ({"locked_ode45_peaks": 0}, (N, Y)),
-        ({"locked_ode45_swing_m": 2e-3}, (N, Y)),
+        ({f"{joint}_ode15s_evaluations": 2000 for joint in ("locked", "free")}, (Y, N)),
+        ({f"{joint}_ode45_held_evaluations": 1300 for joint in ("locked", "free")}, (N, Y)),
+        ({"locked_ode45_held_peaks": 0}, (N, Y)),
+        ({"locked_ode45_held_swing_m": 2e-3}, (N, Y)),
+        ({"locked_ode45_held_evaluations": 1300, "locked_ode45_peaks": 0}, (N, N)),
     ):
         assert judged_solvers(values | changes).pattern == pattern
 
@@ -216,6 +244,16 @@ def test_the_steps_of_the_arguments(claim: str, cycles: Any, pattern: Any, monke
     still = xr.Dataset({"count": 0.0})
     responses = {name: Response(still, name) for name in cycles}  # type: ignore[arg-type]
     assert registered()[claim].judge(Evidence({}, responses)).pattern == pattern
+
+
+def test_the_build_up_is_read_after_the_initial_overshoot() -> None:
+    """Before 6 s the integral action changes by 10 N/s, from then on by 1 N/s; the return ends at 5.1 s."""
+    time = np.arange(0.0, 20.0, 0.01)
+    force_i = np.where(time < 6.0, 10 * time, 60 + (time - 6.0))
+    signals = {"force_i": force_i, "force": 1 + force_i, "friction_force": force_i, "cart_velocity": 0 * time}
+    signals |= {"position": 0 * time, "reference": np.clip(5.1 - time, 0.0, 0.1)}
+    trace = xr.Dataset({name: ("time", values) for name, values in signals.items()}, {"time": time})
+    assert cycle_of(Response(xr.Dataset(), trace)).build_up == pytest.approx(1.0)
 
 
 def test_periods_and_peaks_of_maps() -> None:

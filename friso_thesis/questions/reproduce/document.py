@@ -25,13 +25,16 @@ if TYPE_CHECKING:
 
 
 def conclusion(reproduction: Reproduction) -> str:
-    """Say how many claims of the thesis hold."""
+    """Say how many claims of the thesis hold, or whether the only one that was asked for does."""
     counts = Counter(verdict.judgement for verdict in reproduction.verdicts)
     parts = [
         f"{counts[judgement]} {singular if counts[judgement] == 1 else plural}"
         for judgement, singular, plural in _VERBS
         if counts[judgement]
     ]
+    if len(reproduction.verdicts) == 1:
+        (only,) = reproduction.verdicts
+        return f"Claim {only.claim.id} of the thesis {parts[0].removeprefix('1 ')}."
     return f"Of {len(reproduction.verdicts)} claims of the thesis {listed(parts, 'and')}."
 
 
@@ -40,6 +43,8 @@ _VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
     ("depends", "depends on what the thesis leaves open", "depend on what the thesis leaves open"),
     ("holds in part", "holds in part", "hold in part"),
     ("differs", "does not hold", "do not hold"),
+    ("not decided enough", "is not decided by enough draws", "are not decided by enough draws"),
+    ("not decided yet", "is not decided yet", "are not decided yet"),
     ("cannot be decided", "cannot be decided", "cannot be decided"),
     ("not yet covered", "is not covered", "are not covered"),
 )
@@ -130,6 +135,7 @@ def _space(space: ClaimInSpace) -> dict[str, Any]:
     return {
         "draws": space.draws,
         "undecided": space.undecided,
+        "decided": space.decided,
         "failures": {str(number): text for number, text in space.failures.items()},
         "holds": space.count,
         "share": _share(space.holds),

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLION
+from friso.shown.drawing.palette import BLUE, GREEN, GREY, MAUVE, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.files import Content, pictures
 from friso.shown.pages import Report, print_image
 from friso.version import VERSION
@@ -35,6 +35,8 @@ COLOURS = {
     "depends": BLUE,
     "holds in part": ORANGE,
     "differs": VERMILLION,
+    "not decided enough": SKY,
+    "not decided yet": MAUVE,
     "cannot be decided": PINK,
     "not yet covered": GREY,
 }
@@ -124,7 +126,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
 
 
 def claims_markdown(reproduction: Reproduction) -> str:
-    """Return all claims as a Markdown page, in which the documentation shows a finished run."""
+    """Return all claims with their reasons as a Markdown page, in which the documentation shows a finished run."""
     heads = ("Claim", "Where", "What the thesis claims, in short", "By its count", "By what attracts", "Holds in draws")
     rows = [heads, ("---",) * len(heads)]
     rows += [
@@ -147,6 +149,8 @@ def claims_markdown(reproduction: Reproduction) -> str:
             said = f"{item.claim.text[:1].upper()}{item.claim.text[1:]} ({item.claim.where})."
             lines = [f"## {item.claim.id}: {words.AGREEMENT[item.judgement]}", "", said, ""]
             lines += [f"- {words.criterion_word(part)}: {part.number}" for part in item.finding.stated]
+            reason = words.whole_reasons(item)
+            lines += ["", f"Why: {reason}"] if reason else []
             parts.append("\n".join([*lines, "", item.dependence]))
     return "\n\n".join(parts) + "\n"
 

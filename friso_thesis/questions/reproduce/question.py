@@ -43,7 +43,7 @@ class ReproduceAnswer(Answer):
 
         fit, laws = fit_sentence(self.result.plausible), self.laws
         claims = [
-            f"{claim['id']:5} {claim['judgement']:14} {_drawn(claim['space'])}{claim['number']}"
+            f"{claim['id']:5} {claim['judgement']:18} {_drawn(claim['space'])}{claim['number']}"
             for claim in self._document["claims"]
             if claim["judgement"] != "not yet covered"
         ]
@@ -72,7 +72,7 @@ class ReproduceAnswer(Answer):
 
 def _drawn(space: dict[str, Any] | None) -> str:
     """Say for how many random choices of the open values a claim holds; "" without any."""
-    return f"[{space['holds']} of {space['draws']} draws] " if space else ""
+    return f"[{space['holds']} of {space['decided']} draws that decide] " if space else ""
 
 
 @question

@@ -78,6 +78,8 @@ AGREEMENT = {
     "depends": "depends",
     "holds in part": "in part",
     "differs": "contradicts",
+    "not decided enough": "not decided enough",
+    "not decided yet": "not decided yet",
     "cannot be decided": "not decidable",
     "not yet covered": "not computed",
 }
@@ -102,23 +104,25 @@ def numbers(verdict: ClaimVerdict) -> str:
 
 
 def met(verdict: ClaimVerdict) -> str:
-    """Return how many criteria of a claim are met; "" if the claim was not judged."""
+    """Return how many criteria of a claim are met, and are undecided; "" if the claim was not judged."""
     if verdict.finding is None:
         return ""
-    decided = [holds for holds in verdict.finding.pattern if holds is not None]
-    return f"{sum(decided)} of {len(decided)}" if decided else "none decidable"
+    pattern = verdict.finding.pattern
+    undecided = f", {pattern.count(None)} undecided" if None in pattern else ""
+    return f"{pattern.count(True)} of {len(pattern)}{undecided}"
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """Say for how many random choices of the open values a claim holds, with an interval.
+    """Say in how many of the draws that decide a claim holds, with the interval that judges it.
 
-    The text is empty if no such choices were tried.
+    The text is empty if no draw was made.
     """
     if verdict.space is None:
         return ""
     space = verdict.space
     interval = f"{percent(space.holds.low)} to {percent(space.holds.high)}".replace(" %", "\u00a0%")
-    return f"{space.count} of {space.draws} ({interval})"
+    undecided = f"; {space.undecided} undecided" if space.undecided else ""
+    return f"{space.count} of {space.decided} ({interval}{undecided})"
 
 
 def in_draws(verdict: ClaimVerdict, part: int) -> str:
@@ -162,6 +166,12 @@ def reasons(verdict: ClaimVerdict) -> list[str]:
     return [f"Criteri{'a' if len(of) > 1 else 'on'} {listed(of, 'and')}: {why}" for why, of in places.items()]
 
 
+def whole_reasons(verdict: ClaimVerdict) -> str:
+    """Return all reasons for which criteria are not met or undecided, whole; "" if there are none."""
+    parts = verdict.finding.stated if verdict.finding else ()
+    return " ".join(dict.fromkeys(text for part in parts if (text := _why(part))))
+
+
 def _why(part: Part) -> str:
     """Return why a criterion is not met, or is undecided; "" if it is met."""
     return part.open or ("" if part.holds else part.why)
@@ -181,8 +191,9 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     rows = [
         (f"Criterion {place}", part.number) for place, part in enumerate(parts, 1) if short(part.number) != part.number
     ]
-    whole = " ".join(dict.fromkeys(text for part in parts if (text := _why(part))))
-    rows += [("Reason", whole)] if any(_first_sentence(_why(part)) != _why(part) for part in parts) else []
+    rows += (
+        [("Reason", whole_reasons(verdict))] if any(_first_sentence(_why(part)) != _why(part) for part in parts) else []
+    )
     if verdict.attracts:
         rows += [
             (f"Criterion {place}, by what attracts", f"{criterion_word(part)}: {part.number}")
@@ -287,17 +298,14 @@ OTHER_REASON = (
         "friction that falls with the speed makes it unstable at low speeds.",
     ),
     Remark(
-        "S41M", 0, False,
-        "More mass ends hunting, but after this move not because the integral action builds up more slowly.",
-    ),
-    Remark(
         "S342F", 0, False,
-        "A higher crossover settles sooner, but the loop is also stable within a factor of 3 of the first "
+        "A higher crossover settles sooner, but the loop is also stable where it crosses 0 dB about the first "
         "eigenfrequency.",
     ),
     Remark(
         "S323C", 1, False,
-        "ode23s is the cheaper solver, but ode45 is not unstable: it costs more, and is right.",
+        "ode23s serves, but ode45 would too: with the thesis's steps it is stable, right and cheaper, and without a "
+        "largest step only dearer.",
     ),
 )  # fmt: skip
 """Remarks on statements that are right, but for another reason than the thesis gives."""
@@ -340,7 +348,7 @@ def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[
     """
     rows = []
     for remark in of:
-        finding = verdicts[remark.claim].finding
+        finding = verdicts[remark.claim].finding if remark.claim in verdicts else None
         if finding and remark.part < len(finding.stated) and finding.stated[remark.part].holds == remark.met:
             rows.append(RemarkRow(remark, short(finding.stated[remark.part].number)))
     return rows

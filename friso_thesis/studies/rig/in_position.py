@@ -72,12 +72,25 @@ class Standstill(ArrayColumns):
 
 
 @dataclass(frozen=True)
+class NoisyStandstill:
+    """Standstill with another noise of the force: largest deviations [m] with the joint locked and free.
+
+    `recovered` is the fraction of the RMS difference, free to locked, that the joint recovers with as much damping as
+    the bristles of the bearing have.
+    """
+
+    locked: float
+    free: float
+    recovered: float
+
+
+@dataclass(frozen=True)
 class InPosition:
     """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance.
 
     There is one run for each, and one for each louder noise of the force. `frequencies` [Hz] belong to the spectra.
     `damped` has runs with a free joint and all disturbances, by `damping` [N s/m]; `own_damping` is the joint's.
-    `louder` has the largest deviations [m] locked and free, by the factor on the force noise. `amplifier` is the
+    `louder` has standstills by the factor on the force noise. `amplifier` is the
     RMS [N] of the force noise; `own_floor` says whether the stage states the floor. `after_move` has, by case, runs
     with all disturbances after the move, as long after it as other runs after their start.
     """
@@ -92,7 +105,9 @@ class InPosition:
     own_damping: float
     damped: Standstill
     traces: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    louder: Mapping[float, tuple[float, float]] = field(default_factory=dict)
+    louder: Mapping[float, NoisyStandstill] = field(default_factory=dict)
+    bearing_damping: float = 0.0
+    """Damping [N s/m] of the bearing's bristles, which holds the locked stage."""
 
     def ratio(self, source: str) -> float:
         """Return the RMS with the joint free over the RMS with it locked, for one `source`."""
@@ -139,9 +154,9 @@ def in_position(
                 recordings[case] = (recorded, fixed)
                 after[case] = _standstill(_recorded(fixed, after_move, seed), SETTLING_TIME)
     progress(len(CASES), len(CASES) + 1, "joint free, more and less damping")
-    peaks = {key: float(stands.true[0, 1]) for key, stands in runs.items()}
-    louder = {factor: (peaks["locked", _louder(factor)], peaks["free", _louder(factor)]) for factor in noises}
     flat = stage.flat()
+    bearing = float(flat.get("friction.bristle_damping", 0.0))
+    louder = _over_noise(shaken, noisy, seed, bearing, runs, noises)
     damping = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"]) * np.array(DAMPING_RATIOS)
     damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING_TIME)
     progress(len(CASES) + 1, len(CASES) + 1, "done")
@@ -150,8 +165,33 @@ def in_position(
     frequencies = np.fft.rfftfreq(segment(logged_each), logged_each)
     return InPosition(
         FASTER_CROSSOVER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
-        float(flat["joint.damping"]), damped, traces, louder,
+        float(flat["joint.damping"]), damped, traces, louder, bearing,
     ), recordings  # fmt: skip
+
+
+def _over_noise(
+    stage: Stage,
+    task: MoveTask,
+    seed: int,
+    damping: float,
+    runs: Mapping[tuple[str, str], Standstill],
+    noises: tuple[float, ...],
+) -> dict[float, NoisyStandstill]:
+    """Return standstills by the factor on the force noise, free also with a `damping` [N s/m] of the joint.
+
+    `runs` has the others, by case and source.
+    """
+    if not noises:
+        return {}
+    louder = replace(task, injected=np.outer(noises, task.injected))
+    changes = {"joint.damping": np.full(len(noises), damping)}
+    damped = _standstill(_recorded(stage, louder, seed, changes, len(noises)), SETTLING_TIME).true[:, 0]
+    every = {}
+    for factor, rest in zip(noises, damped, strict=True):
+        locked, free = (runs[case, _louder(factor)].true[0] for case in CASES)
+        recovered = (free[0] - rest) / (free[0] - locked[0])
+        every[factor] = NoisyStandstill(float(locked[1]), float(free[1]), float(recovered))
+    return every
 
 
 def _louder(factor: float) -> str:

@@ -27,9 +27,19 @@ if TYPE_CHECKING:
     from friso_thesis.studies.thesis.experiments import Experiments
     from friso_thesis.studies.thesis.linear import Linear
 
-ClaimJudgement = Literal["holds", "depends", "holds in part", "differs", "cannot be decided", "not yet covered"]
+ClaimJudgement = Literal[
+    "holds",
+    "depends",
+    "holds in part",
+    "differs",
+    "not decided enough",
+    "not decided yet",
+    "cannot be decided",
+    "not yet covered",
+]
 """Judgement of a claim. "depends": it holds for some plausible values of what the thesis leaves open, and not for
-others. "cannot be decided": no simulation shows it, or a number lies beside its threshold."""
+others. "not decided enough": too few draws of these values decide. "not decided yet": a number lies beside its
+threshold, within its error, and more work would decide. "cannot be decided": no simulation shows it."""
 
 
 @dataclass(frozen=True)
@@ -137,15 +147,17 @@ class Finding:
         """Return the judgement that follows from the criteria of the claim, without those beyond simulation.
 
         The judgement is "holds" if all are met, "differs" if none is, and "holds in part" if some are met and some are
-        not. If there are no criteria, or one that is undecided could turn "holds" or "differs", it is "cannot be
-        decided".
+        not. If one that is undecided could turn "holds" or "differs", it is "not decided yet". If there are no criteria
+        but those beyond simulation, it is "cannot be decided".
         """
         criteria = [part for part in self.stated if not part.beyond]
         decided = {part.holds for part in criteria if not part.undecided}
         if len(decided) == 2:
             return "holds in part"
-        if not criteria or any(part.undecided for part in criteria):
+        if not criteria:
             return "cannot be decided"
+        if any(part.undecided for part in criteria):
+            return "not decided yet"
         return "holds" if decided == {True} else "differs"
 
 
@@ -171,7 +183,8 @@ class Evidence:
     """Evidence that a judge, a function that judges a claim, may use.
 
     Evidence has maps by study name, responses by name, the linear analysis of the rig, and its identification by
-    experiments, each None if not made. The rig itself is included, too.
+    experiments, each None if not made. The rig itself is included, too. `force_noise` is the noise of the drive's force
+    over what rounding makes.
     """
 
     maps: Mapping[str, xr.Dataset]
@@ -179,6 +192,7 @@ class Evidence:
     linear: Linear | None = None
     identified: Experiments | None = None
     rig: Stage = field(default_factory=thesis_rig)
+    force_noise: float = 1.0
 
     @property
     def analysis(self) -> Linear:

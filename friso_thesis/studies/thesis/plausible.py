@@ -7,7 +7,7 @@ depends, and which draw fits the printed numbers best.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +21,8 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
-from friso_thesis.studies.thesis.space import DRAW_SEED, OPEN, Draw, baseline, draw, enters
+from friso_thesis.studies.thesis.settings import settings
+from friso_thesis.studies.thesis.space import DRAW_SEED, FORCE_NOISE, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
 
 DRAW_COUNT, ANALYSED_EVERY = 48, 3
@@ -33,9 +34,6 @@ MAP_POINTS = 21
 
 DRAW_RTOL = 1e-5
 """Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
-
-MAP_WORK, COSTLY_WORK = MAP_POINTS**2 * len(STUDIES), 6 * MAP_POINTS**2 * len(STUDIES)
-"""Progress steps for the maps of a draw, and for its linear analysis and experiments."""
 
 CHANCE_PROBABILITY = 0.05
 """Probability of a chance separation above which it is not reported, for all values of a claim together."""
@@ -69,10 +67,11 @@ class MetPart:
 class ClaimInSpace:
     """How a claim of the thesis fares over random choices (draws) of the open values.
 
-    `seeds` identifies each draw by (random seed, number of the draw). `holds` is the fraction, and `count` the number,
-    of draws in which the claim holds; `parts` has the fraction for each part of the claim. `hangs_on` lists the values
-    that decide whether the claim holds, the most decisive first. A draw counts as `undecided` if no criterion fails but
-    one is open, or if the claim could not be computed; `failures` has the reasons for the latter by number of the draw.
+    `seeds` identifies each draw by (random seed, number of the draw). `count` is the number of draws in which the claim
+    holds, and `holds` their fraction of the draws that decide; `parts` has the fraction for each part of the claim.
+    `hangs_on` lists the values that decide whether the claim holds, the most decisive first. A draw counts as
+    `undecided` if no criterion fails but one is open, or if the claim could not be computed; `failures` has the reasons
+    for the latter by number of the draw.
     """
 
     seeds: tuple[tuple[int, int], ...]
@@ -89,9 +88,14 @@ class ClaimInSpace:
         return len(self.seeds)
 
     @property
+    def decided(self) -> int:
+        """Return how many random choices of the open values decide whether the claim holds."""
+        return self.draws - self.undecided
+
+    @property
     def misses(self) -> int:
         """Return for how many random choices of the open values the claim does not hold."""
-        return self.draws - self.undecided - self.count
+        return self.decided - self.count
 
     def met(self, part: int) -> int:
         """Return for how many random choices of the open values a part of the claim holds."""
@@ -152,8 +156,8 @@ def plausible(
     own: dict[str, Finding] = {}
     by_claim_tried: dict[str, list[tuple[Draw, Finding | None]]] = {name: [] for name in (*cheap, *costly)}
     failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
-    pieces = [(one, cheap, MAP_WORK) for one in (*drawn, baseline()) if drawn and cheap]
-    pieces += [(one, costly, COSTLY_WORK) for one in drawn[ANALYSED_EVERY - 1 :: ANALYSED_EVERY] if costly]
+    pieces = [(one, cheap, _work(cheap)) for one in (*drawn, baseline()) if drawn and cheap]
+    pieces += [(one, costly, _work(costly)) for one in drawn[ANALYSED_EVERY - 1 :: ANALYSED_EVERY] if costly]
 
     def judged(one: Draw, group: Mapping[str, Registered], work: int) -> Findings:
         about = ("draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
@@ -180,9 +184,18 @@ def plausible(
 
 def work_of(entries: Mapping[str, Registered], draws: int) -> int:
     """Return the amount of work for `draws` random rigs, in units of the progress tally."""
-    cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
-    costly = any(entry.needs & PARTS.keys() for entry in entries.values())
-    return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // ANALYSED_EVERY) * COSTLY_WORK
+    cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
+    costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
+    return (draws + bool(draws)) * _work(cheap) + draws // ANALYSED_EVERY * _work(costly)
+
+
+def _work(entries: Mapping[str, Registered]) -> int:
+    """Return the work of judging these claims in one draw, in units of the progress tally."""
+    needs = {need for entry in entries.values() for need in entry.needs}
+    maps = len(needs & STUDIES.keys()) * MAP_POINTS**2
+    experiments = sum(work for name, work in settings.experiment_work if name in needs)
+    linear = settings.linear_work * bool(needs & NEEDS.keys())
+    return maps + experiments + linear + settings.response_work * len(needs & RESPONSES.keys())
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:
@@ -198,6 +211,7 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
     needs = {need for entry in entries.values() for need in entry.needs}
     try:
         base = evidence(needs, MAP_POINTS, DRAW_RTOL, changes=one.changes)
+        base = replace(base, force_noise=one.values[FORCE_NOISE])
     except _SHOWS_NOTHING as error:
         return {f"{name} {FAILED}": _failure(error) for name in entries}
     findings: Findings = {}
@@ -230,7 +244,7 @@ def _in_space(
     holds = np.array([finding.judgement == "holds" for _, finding in decided], bool)
     return ClaimInSpace(
         tuple((DRAW_SEED, one.number) for one, _ in tried),
-        _share(holds, len(tried)),
+        _share(holds, len(holds)),
         int(holds.sum()),
         tuple(_met(column, len(tried)) for column in zip(*(finding.pattern for _, finding in findings), strict=True)),
         tuple(_separations(entry, [one for one, _ in decided], holds)),

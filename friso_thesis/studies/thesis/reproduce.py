@@ -32,6 +32,7 @@ from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS, Linear
 from friso_thesis.studies.thesis.plausible import DRAW_COUNT, PARTS, Plausible, counted, plausible, work_of
 from friso_thesis.studies.thesis.reading import others_of, read_as, words_read
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
 
@@ -57,9 +58,8 @@ TIGHT_RTOL = 1e-8
 SHOWN_FREQUENCIES = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
-PART_WORK, LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 6000, 5000, 65_000
-"""Progress steps, in units of a run's processor time: for a part of the linear analysis or an experiment, and for the
-survey of a map with the joint locked and free."""
+LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 5000, 65_000
+"""Progress steps, in units of a run's processor time, for the survey of a map with the joint locked and free."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,8 @@ class Reproduction:
       this run needs it. `experimented` names the experiments made.
     - The map of Fig. 14B by relative tolerance. The fractions of its cells with peaks at one tolerance only, and with a
       different peak count (NaN if not computed).
-    - A verdict per claim, and the claims over the joint draws of the values that the thesis leaves open.
+    - A verdict per claim, or per claim that was asked for, and the claims over the joint draws of the values that the
+      thesis leaves open.
     - The hunting cycles behind each map, by study name.
     - Values per axis of the maps (`points`), and of those judged (`judged_points`).
     """
@@ -107,7 +108,7 @@ def reproduce(
     """Run the studies `names` (default: all of Table 3), and judge the claims.
 
     Maps have `points` values per axis, and for judging at least `JUDGED_POINTS`. With `only`, just these claims are
-    judged, with what they need; a claim that is left out is "not yet covered". `with_cycles` also computes the hunting
+    judged, with what they need, and the result has no others. `with_cycles` also computes the hunting
     cycles behind every map, and adds to each judgement what attracts the stages. With `draws`, every claim is judged in
     as many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not computed
     again. `progress` is called with steps done, steps in all and what comes next. Raises InputError for an unknown
@@ -126,7 +127,7 @@ def reproduce(
     parts = sorted(needs & PARTS.keys())
     judged_points = max(points, JUDGED_POINTS)
     half = -(-judged_points // 2)
-    total = len(studies) * (judged_points**2 + half**2) + PART_WORK * len(parts) + work_of(entries, draws)
+    total = len(studies) * (judged_points**2 + half**2) + sum(map(_part_work, parts)) + work_of(entries, draws)
     total += with_cycles * sum(map(_survey_work, studies.values())) + 2 * points**2 * ("isolator-damping" in studies)
     tally = Tally(progress, total)
     tally.add(0, "responses")
@@ -143,7 +144,7 @@ def reproduce(
     for part in parts:
         if part in EXPERIMENTS:
             getattr(base.experiments, part)
-        tally.add(PART_WORK, part.replace("_", " "))
+        tally.add(_part_work(part), part.replace("_", " "))
 
     def behind(study: ThesisStudy) -> tuple[Surveyed, CyclesOnMap]:
         surveyed = survey(maps[study.name], kept)
@@ -178,6 +179,7 @@ def reproduce(
         if claim.id in entries
         else _left_out(claim, chosen)
         for claim in claims()
+        if asked is None or claim.id in asked
     )
     curves = bode(thesis_rig(), SHOWN_FREQUENCIES, series=True) if base.linear is not None else None
     judged = by_way(base, by_peak_count)
@@ -191,6 +193,11 @@ def reproduce(
     )  # fmt: skip
 
 
+def _part_work(part: str) -> int:
+    """Return the progress steps that a part of the linear analysis, or an experiment, takes."""
+    return dict(settings.experiment_work).get(part, settings.linear_work)
+
+
 def _survey_work(study: ThesisStudy) -> int:
     """Return the progress steps that the survey of a map takes."""
     return LOCKED_SURVEY_WORK if study.changes.get("joint.locked") else FREE_SURVEY_WORK
@@ -202,7 +209,7 @@ def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
     if entry is None:
         return not_covered(claim, "no judge decides on it")
     missing = sorted({need for need in entry.needs if need in STUDIES} - chosen.keys())
-    return not_covered(claim, f"not computed in this run: {', '.join(missing) or 'this claim was not asked for'}")
+    return not_covered(claim, f"not computed in this run: {', '.join(missing)}")
 
 
 def _by_attraction(

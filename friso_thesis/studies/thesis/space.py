@@ -15,6 +15,9 @@ from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy
 if TYPE_CHECKING:
     from friso_thesis.studies.thesis.linear import PartNeeded
 
+FORCE_NOISE = "force noise over that of rounding"
+"""Name of the noise of the drive's force, which is no key of the stage file."""
+
 LIMITER_PULLS = "joint.limiter_pulls"
 
 DRAW_SEED = 1
@@ -28,7 +31,8 @@ class OpenValue:
     """A value that the thesis leaves open, from `low` to `high` [unit].
 
     `scale` tells how it is sampled: evenly, in its logarithm, or as one of the two ends. Stored as well are the keys of
-    the stage file that the value sets, and why it may lie anywhere in the range. `baseline` is friso's own choice.
+    the stage file that the value sets, and why it may lie anywhere in the range. `baseline` is friso's own choice. A
+    value `only_in` one experiment sets no key, and matters for no other.
     """
 
     name: str
@@ -39,6 +43,7 @@ class OpenValue:
     keys: frozenset[str]
     reason: str
     baseline: float
+    only_in: str = ""
 
     def at(self, share: float) -> float:
         """Return the value at a fraction of the way through its range."""
@@ -60,14 +65,25 @@ class OpenValue:
         return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
 
     def touches_part(self, need: PartNeeded) -> bool:
-        """Tell whether the value may change a part of the linear analysis, or an experiment."""
+        """Tell whether the value may change a part of the linear analysis, or an experiment.
+
+        The noise of the force is asked for by name, see `enters`.
+        """
         return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
 
 
 def _value(
-    name: str, low: float, high: float, unit: str, scale: str, keys: tuple[str, ...], baseline: float, reason: str
+    name: str,
+    low: float,
+    high: float,
+    unit: str,
+    scale: str,
+    keys: tuple[str, ...],
+    baseline: float,
+    reason: str,
+    only_in: str = "",
 ) -> OpenValue:
-    return OpenValue(name, low, high, unit, scale, frozenset(keys), reason, baseline)
+    return OpenValue(name, low, high, unit, scale, frozenset(keys), reason, baseline, only_in)
 
 
 _TIMES = ("motion.acceleration", "motion.acceleration_time")
@@ -121,6 +137,12 @@ OPEN: tuple[OpenValue, ...] = (
     _value(
         "limiter cannot pull", 0.0, 1.0, "", "either", (LIMITER_PULLS,), 0.0,
         "Sec. 3.5: a bolt and a locking nut, which touch without being joined; Fig. 3 draws a spring and a damper",
+    ),
+    _value(
+        FORCE_NOISE, 0.1, 10.0, "", "log", (), 1.0,
+        "for Fig. 28 none is printed: from a filtered current to an amplifier with ten times the noise of rounding to "
+        "14 bits",
+        only_in="standstill",
     ),
 )  # fmt: skip
 """All values that the thesis leaves open."""
@@ -192,6 +214,8 @@ def enters(value: OpenValue, needs: frozenset[str], responses: Mapping[str, Mapp
     Needs are names of maps, responses and parts of the analysis. `responses` says what each response changes in the
     rig.
     """
+    if value.only_in:
+        return value.only_in in needs
     for name in needs:
         if name in STUDIES:
             touched = value.touches(STUDIES[name])

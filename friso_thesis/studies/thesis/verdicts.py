@@ -7,14 +7,10 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from friso.quantities import percent
-from friso.shares import Share
 from friso_thesis.studies.thesis.claims import Claim, ClaimJudgement, Finding
 from friso_thesis.studies.thesis.plausible import ClaimInSpace
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import OPEN
-
-ROBUST_SHARE = 0.25
-"""Largest fraction of the space in which a claim may hold while its contradiction counts as robust. Thirteen draws in
-which it does not hold show that."""
 
 NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
 
@@ -46,29 +42,36 @@ class ClaimVerdict:
     def judgement(self) -> ClaimJudgement:
         """Return the judgement, at friso's own choice of the open values and at random ones.
 
-        A claim "holds" if it holds at friso's choice and in at least half of the draws that decide on it. It "depends"
-        on the values left open if it holds at friso's choice or in some draw, but not so often. It "cannot be decided"
-        if no draw decides, or if a criterion at friso's choice is open and none fails.
+        One rule serves all claims: the 95 % interval of the share in which a claim holds, of the draws that decide. If
+        these are fewer than `least_decided`, or the interval is too wide for any other word, the claim is "not decided
+        enough". It "holds" if it holds at friso's choice and the interval lies above `half_share`. If it fails at
+        friso's choice and the interval ends below `rare_share`, it fails as it does there, in part or wholly. It
+        "depends" if it holds somewhere (at friso's choice, or in more than stray draws) and fails somewhere.
         """
         if self.finding is None:
             return "not yet covered"
         own, space = self.finding.judgement, self.space
-        if space is None or (own == "cannot be decided" and False not in self.finding.pattern):
+        holds, fails = own == "holds", False in self.finding.pattern
+        if space is None or not (holds or fails):
             return own
-        if own == "holds":
-            decided = space.count + space.misses
-            return "cannot be decided" if not decided else "holds" if 2 * space.count >= decided else "depends"
-        return "depends" if space.count else own
+        low, high, stray = space.holds.low, space.holds.high, settings.stray_share
+        if space.decided < settings.least_decided:
+            return "not decided enough"
+        if holds and low > settings.half_share:
+            return own
+        if fails and high <= settings.rare_share:
+            return own
+        return "depends" if (holds or low > stray) and (fails or high < 1 - stray) else "not decided enough"
 
     @property
     def robust(self) -> bool:
         """Tell whether a claim fails for every plausible choice of what is left open.
 
-        The claim holds in no draw of the open values, and there are enough draws: the upper end of the 95 % interval of
-        the fraction in which it holds is at most `ROBUST_SHARE`. No assumption outside the draws decides on it.
+        The claim holds in no draw of the open values, and enough draws decide (see `judgement`). No assumption outside
+        the draws decides on it.
         """
         fails = self.judgement in ("holds in part", "differs")
-        return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST_SHARE)
+        return bool(fails and self.space and not self.undrawn and not self.space.count)
 
     @property
     def dependence(self) -> str:
@@ -80,15 +83,13 @@ class ClaimVerdict:
             return ""
         if self.space is None:
             sentence = "No joint draws of the values that the thesis leaves open were made for this claim."
-        elif self.space.undecided == self.space.draws:
-            sentence = f"None of {self.space.draws} joint draws of the unstated values decides on it."
+        elif not self.space.decided:
+            sentence = f"None of {self.space.draws} joint draws of the unstated values decides on it.{self._too_few}"
         else:
-            sentence = f"It holds in {draws_text(self.space.holds, self.space.count, self.space.draws)}"
-            sentence += (
-                f", {percent(self.space.undecided / self.space.draws)} undecided" if self.space.undecided else ""
-            )
+            sentence = f"It holds in {draws_text(self.space)}"
             sentence += f"; that depends on {_listed(self.space)}." if self.space.hangs_on else "."
             sentence += " No choice of the unstated values that was tried makes it hold." if self.robust else ""
+            sentence += self._too_few
         if self.turned:
             sentence += f" With {' and with '.join(self.turned)} a criterion is judged otherwise."
         if self.reread:
@@ -97,6 +98,15 @@ class ClaimVerdict:
         if self.undrawn:
             sentence += f" It depends also on what is assumed and not drawn: {self.undrawn}."
         return sentence
+
+    @property
+    def _too_few(self) -> str:
+        """Say that too few draws decide, or that they leave the share too uncertain; "" if they do not."""
+        if self.space is None or self.judgement != "not decided enough":
+            return ""
+        if self.space.decided < settings.least_decided:
+            return f" That is not enough: at least {settings.least_decided} are needed."
+        return " The interval is too wide to judge by: more draws are needed."
 
     @property
     def depends_on(self) -> str:
@@ -115,12 +125,14 @@ class ClaimVerdict:
         return finding.judgement if finding.judgement != own else f"still {own}"
 
 
-def draws_text(share: Share, count: int, draws: int) -> str:
-    """Write for which fraction of the random choices of open values a claim holds.
-
-    `count` is the number for which it holds, of `draws` choices.
-    """
-    return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
+def draws_text(space: ClaimInSpace) -> str:
+    """Write in how many of the decided joint draws a claim holds, with the interval of that share."""
+    counted = f"{space.count} of {space.draws} joint draws of the unstated values"
+    if space.undecided:
+        counted = (
+            f"{space.count} of the {space.decided} that decide, of {space.draws} joint draws of the unstated values"
+        )
+    return f"{counted} ({percent(space.holds.low)} to {percent(space.holds.high)})"
 
 
 def _listed(space: ClaimInSpace) -> str:

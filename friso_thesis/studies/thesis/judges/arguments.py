@@ -275,8 +275,8 @@ class ArguedCycle:
     """A motion after the return, reduced to the quantities of the thesis's arguments.
 
     `overshoot` [m] is that of the cycle beyond the reference (NaN without a cycle). `build_up` [N/s] is the mean rate
-    at which the integral action changes until peaks are counted. `stick` describes the sticks that end in
-    break-away.
+    at which the integral action changes after the initial overshoot, until peaks are counted. `stick` describes the
+    sticks that end in break-away.
     """
 
     overshoot: float
@@ -292,7 +292,7 @@ def cycle_of(response: Response) -> ArguedCycle:
     trace = response.trace
     time, integral = (np.asarray(trace[name].values) for name in ("time", "force_i"))
     deviation = (trace["position"] - trace["reference"]).values
-    still = (time > _end_of_motion(trace)) & (time < COUNTED_AFTER)
+    still = (time > max(_end_of_motion(trace), settings.build_up_after)) & (time < COUNTED_AFTER)
     rate = float(np.abs(np.diff(integral[still])).sum() / np.ptp(time[still]))
     sticks = sticking(response)
     late = np.abs(deviation[time >= COUNTED_AFTER])
@@ -309,7 +309,8 @@ def heavier_mass_step_by_step(evidence: Evidence) -> Finding:
     counted = int(evidence.responses[HEAVIEST].cell["count"])
     return Finding.of(
         Part(
-            "after the return the integral action builds up more slowly with the heavier mass, until peaks count",
+            f"after the initial overshoot, from {settings.build_up_after:g} s on until peaks count, the integral "
+            "action builds up more slowly with the heavier mass",
             heavy.build_up < light.build_up,
             _compared(light.build_up, heavy.build_up, "N/s", (LIGHT, HEAVIEST)),
             why="It does not.",
@@ -340,7 +341,8 @@ def larger_gap_larger_overshoot(evidence: Evidence) -> Finding:
             undecided=undecided,
         ),
         Part(
-            "with the larger gap the integral action builds up faster after the return",
+            "with the larger gap the integral action builds up faster after the initial overshoot, from "
+            f"{settings.build_up_after:g} s on until peaks count",
             wide.build_up > narrow.build_up,
             _compared(wide.build_up, narrow.build_up, "N/s", (WIDE, NARROW)),
             why="It builds up more slowly.",

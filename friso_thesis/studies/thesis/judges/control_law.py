@@ -7,6 +7,7 @@ plant.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
@@ -15,7 +16,8 @@ import sympy as sp
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, as_gains, numbers
 from friso.frequency.crossover import COMFORTABLE_MARGIN, settled_margin
 from friso.frequency.family import loops
-from friso.frequency.members import in_series, member
+from friso.frequency.margins import margins
+from friso.frequency.members import in_series, limit_cases, member
 from friso.quantities import percent
 from friso.stage import loads
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
@@ -23,7 +25,7 @@ from friso_thesis.studies.thesis.judges.identified_in_time import CONSTANTS
 from friso_thesis.studies.thesis.linear import PLANT
 from friso_thesis.studies.thesis.linear.plants import Springs
 from friso_thesis.studies.thesis.maps import trend, trend_text, verdict_table
-from friso_thesis.studies.thesis.reading import words
+from friso_thesis.studies.thesis.reading import about, words
 from friso_thesis.studies.thesis.settings import settings
 
 K_F, K_J = sp.symbols("k_f k_j", positive=True)
@@ -153,17 +155,34 @@ def _written(expression: sp.Expr) -> str:
     return str(sp.factor(expression)).replace("**", "^").replace("*", " ")
 
 
-@lru_cache(maxsize=256)
-def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
-    """Return the least modulus margin with the joint free, by crossover; 0 if not stable.
+@dataclass(frozen=True)
+class TunedLoop:
+    """A loop with the joint free: tuned crossover, and where it crosses 0 dB, both in first eigenfrequencies.
 
-    Crossovers are relative to the `first` eigenfrequency [Hz]. The margin is that of the limit cases, and of all states
-    stuck under a bias force.
+    `margin` is the least modulus margin of the limit cases, and of all states stuck under a bias force; 0 if not
+    stable.
+    """
+
+    tuned: float
+    crossing: float
+    margin: float
+
+
+@lru_cache(maxsize=256)
+def loops_over_crossover(stage_file: str, first: float) -> tuple[TunedLoop, ...]:
+    """Return the loops with the joint free, tuned to crossovers on both sides of the `first` eigenfrequency [Hz].
+
+    A loop crosses 0 dB, the cart sliding, at the last crossing below the parasitic mode.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
-    reach = 2 * settings.far_crossover_factor
-    ratios = np.geomspace(1 / reach, reach, 25)
-    return {float(ratio): settled_margin({**flat, CROSSOVER: float(ratio) * first}) for ratio in ratios}
+    highest = 2 * settings.far_crossover_factor
+    tried = []
+    for ratio in np.geomspace(settings.lowest_crossover_ratio, highest, settings.crossovers_tried):
+        tuned = {**flat, CROSSOVER: float(ratio) * first}
+        crossings = margins(tuned, limit_cases(tuned)["sliding"]).crossovers
+        last = max((f for f in crossings if f < (1 - words.close) * flat["parasitic.frequency"]), default=np.nan)
+        tried.append(TunedLoop(float(ratio), last / first, settled_margin(tuned)))
+    return tuple(tried)
 
 
 @judges("S342F", figure="Sec. 3.4.2, crossover and first mode", needs=(PLANT, "isolator-crossover"), of_runs=True)
@@ -181,26 +200,33 @@ def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
         values = np.where(settled, runs[name].transpose(CROSSOVER, "joint.stroke").values, np.nan)
         by_stroke = np.array([trend(crossover, column) for column in values.T])
         trends.append(float(np.nanmean(by_stroke)) if np.isfinite(by_stroke).any() else np.nan)
-    return judged_crossovers(margins_over_crossover(evidence.rig.to_toml(), first), first, *trends)
+    return judged_crossovers(loops_over_crossover(evidence.rig.to_toml(), first), first, *trends)
 
 
-def judged_crossovers(margins: dict[float, float], first: float, force: float, settling: float) -> Finding:
+def judged_crossovers(tried: tuple[TunedLoop, ...], first: float, force: float, settling: float) -> Finding:
     """Judge where the crossover may lie beside the first eigenfrequency `first` [Hz].
 
-    `margins` has the least modulus margin by crossover, in first eigenfrequencies. `force` and `settling` are the rank
-    correlations of force and settling time with the crossover.
+    `tried` are loops tuned to several crossovers. `force` and `settling` are the rank correlations of force and
+    settling time with the crossover.
     """
     far = settings.far_crossover_factor
-    near = {ratio: margin for ratio, margin in margins.items() if 1 / far < ratio < far}
-    worst = min(near, key=lambda ratio: near[ratio])
-    apart = min(margin for ratio, margin in margins.items() if ratio not in near)
+    near = [loop for loop in tried if about(loop.crossing, 1.0)]
+    apart = [loop.margin for loop in tried if loop not in near]
+    tuned_near = [loop.margin for loop in tried if 1 / far < loop.tuned < far]
+    worst = min(near, key=lambda loop: loop.margin, default=None)
     return Finding.of(
         Part(
-            f"a crossover within a factor of {far:g} of the first eigenfrequency is not stable somewhere, and "
-            "farther from it every one is",
-            near[worst] <= 0 < apart,
-            f"first eigenfrequency {first:.3g} Hz; least modulus margin {near[worst]:.2g} within, at "
-            f"{worst * first:.3g} Hz, {apart:.2g} farther off ({COMFORTABLE_MARGIN:g} is comfortable)",
+            f"a loop that crosses 0 dB about the first eigenfrequency (within a factor of {words.about:g}) is not "
+            "stable somewhere, and every one that crosses farther from it is",
+            bool(worst and worst.margin <= 0 < min(apart, default=0.0)),
+            f"first eigenfrequency {first:.3g} Hz; "
+            + (
+                f"least modulus margin {worst.margin:.2g} about it, tuned to {worst.tuned * first:.3g} Hz, "
+                if worst
+                else "no loop crosses about it, "
+            )
+            + f"{min(apart, default=np.nan):.2g} farther off ({COMFORTABLE_MARGIN:g} is comfortable); of all loops "
+            f"tuned within a factor of {far:g} of it, the other reading, {min(tuned_near, default=np.nan):.2g}",
             why="The lead of the controller keeps the loop stable there too.",
         ),
         Part(

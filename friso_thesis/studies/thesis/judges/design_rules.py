@@ -20,8 +20,8 @@ from friso_thesis.studies.thesis.studies import LOCKED, masses, thesis_rig
 LEAST_STROKE, FRICTION_GAP, PARASITIC_RATIO = 0.3e-3, 1.0, 10.0
 """Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
 
-ISOLATED_WORKS, LOCKED_WORKS = 5.25, 15.0
-"""Crossovers [Hz] above which the isolated rig works (middle of 5 and 5.5 Hz), and the locked rig."""
+ISOLATED_WORKS, LOCKED_WORKS = (5.0, 5.5), 15.0
+"""Crossovers [Hz] above which the isolated rig works (Sec. 6, and Sec. 4.3.3), and the locked rig."""
 
 _MOVING_MASS, WEIGHED_MASS = 2.5, 1.7
 """Moving mass [kg] of the rig to which the abstract ties the crossovers, and the weighed mass of the simulations."""
@@ -181,12 +181,12 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
     locked, weighed = (locked_limit(evidence, mass) for mass in (_MOVING_MASS, WEIGHED_MASS))
     return (
         Part(
-            f"with the isolator, at strokes of {LEAST_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 "
-            "to 5.5 "
-            f"Hz on (within a factor of {words.about:g})",
-            about(free, ISOLATED_WORKS),
+            f"with the isolator, at strokes of {LEAST_STROKE * 1e3:g} mm and more, nothing keeps moving from about "
+            f"{ISOLATED_WORKS[0]:g} Hz (Sec. 6), and about {ISOLATED_WORKS[1]:g} Hz (Sec. 4.3.3), on (within a factor "
+            f"of {words.about:g} of both)",
+            all(about(free, works) for works in ISOLATED_WORKS),
             f"{free:.3g} Hz on average",
-            printed=ISOLATED_WORKS,
+            printed=ISOLATED_WORKS[1],
             read=free,
         ),
         Part(

@@ -12,7 +12,7 @@ import numpy as np
 from friso.quantities import percent
 from friso.shares import share_interval
 from friso.studies.rig.moves_on_rails import RailRuns
-from friso_thesis.studies.rig.in_position import FORCE_BITS, InPosition
+from friso_thesis.studies.rig.in_position import FORCE_BITS, InPosition, NoisyStandstill
 from friso_thesis.studies.rig.measured_cycles import MOTORS
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, RELEASE_DISTANCES, CyclesOnRails, MovesOnRails
@@ -218,42 +218,44 @@ def _weak_motor(cycles: CyclesOnRails) -> str:
 _COMPARED = ("period", "swing")
 
 
-@judges("F28", figure="28", needs=(STANDSTILL,), undrawn="the noise of the drive's force")
+@judges("F28", figure="28", needs=(STANDSTILL,))
 def free_joint_stands_less_still(evidence: Evidence) -> Finding:
     """Judge whether the rig stands less still with its joint free, and what damping recovers."""
-    return judged_standstill(evidence.experiments.standstill)
+    return judged_standstill(evidence.experiments.standstill, evidence.force_noise)
 
 
-def judged_standstill(standstill: InPosition) -> Finding:
-    """Judge whether the stage stands less still with its joint free, and what damping recovers."""
-    peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
-    ratio = standstill.ratio("all")
+def judged_standstill(standstill: InPosition, noise: float = 1.0) -> Finding:
+    """Judge whether the stage stands less still with its joint free, and what damping recovers.
+
+    `noise` is that of the drive's force, over what rounding makes.
+    """
+    at = _at_noise(standstill, noise)
     expected = PEAK_DEVIATIONS[1] / PEAK_DEVIATIONS[0]
-    tenfold = float(np.interp(np.log(10 * standstill.own_damping), np.log(standstill.damping), standstill.recovered))
     assumed = (
-        f"Assumed: {standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {FORCE_BITS} "
-        "bits), a "
-        "quiet laboratory's floor"
+        f"Assumed: {noise * standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force ({noise:.2g} times "
+        f"that of rounding to {FORCE_BITS} bits), a quiet laboratory's floor"
     )
     return Finding.of(
         Part(
             f"locked the deviation is of the order of {PEAK_DEVIATIONS[0] * 1e6:g} um, free of "
             f"{PEAK_DEVIATIONS[1] * 1e6:g} um",
-            _sized((peaks[0], peaks[1])),
-            f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
-            beyond=f"Simulation cannot decide this. {_over_noise(standstill)}",
+            _sized(at),
+            f"peaks {at.locked * 1e6:.2g} and {at.free * 1e6:.2g} um. {assumed}",
+            why=f"The noise of the force decides. {_over_noise(standstill)}",
         ),
         Part(
             f"free it is of the order of {expected:g} times as large as locked",
-            about(ratio, expected, words.order),
-            f"ratio of RMS values: {number_text(ratio, '.2g')}",
-            undecided=_turned_by_noise(standstill),
+            about(at.free / at.locked, expected, words.order),
+            f"ratio of the peaks {number_text(at.free / at.locked, '.2g')}; of RMS values, with the noise of rounding, "
+            f"{number_text(standstill.ratio('all'), '.2g')}",
+            why="Without noise of the force the floor moves both, and the free one hardly more.",
         ),
         Part(
-            f"the joint lacks damping: ten times as much removes at least {percent(words.half)} of the difference",
-            tenfold >= words.half,
-            f"{percent(tenfold)} at {10 * standstill.own_damping:g} N s/m, "
-            f"{percent(standstill.recovered.max())} at the most tried",
+            "the joint lacks the damping of the friction: as much as the bearing's bristles have removes at least "
+            f"{percent(words.half)} of the difference",
+            at.recovered >= words.half,
+            f"{percent(at.recovered)} at {standstill.bearing_damping:.3g} N s/m; ten times the joint's own, "
+            f"{10 * standstill.own_damping:g} N s/m, which friso assumes, {percent(_tenfold(standstill))}",
             why="The sticking bearing holds the locked stage with its stiff bristles, the free one is held "
             "only by the joint and the controller.",
         ),
@@ -261,37 +263,47 @@ def judged_standstill(standstill: InPosition) -> Finding:
     )
 
 
-def _sized(peaks: tuple[float, float]) -> bool:
-    return all(about(peak, size, words.order) for peak, size in zip(peaks, PEAK_DEVIATIONS, strict=True))
+def _at_noise(standstill: InPosition, noise: float) -> NoisyStandstill:
+    """Return the standstill with a noise of the force between those simulated, interpolated in logarithms."""
+    factors = np.log([*standstill.louder])
+    locked, free, recovered = np.array([(s.locked, s.free, s.recovered) for s in standstill.louder.values()]).T
+
+    def between(values: np.ndarray) -> float:
+        return float(np.interp(np.log(noise), factors, values))
+
+    return NoisyStandstill(np.exp(between(np.log(locked))), np.exp(between(np.log(free))), between(recovered))
 
 
-def _turned_by_noise(standstill: InPosition) -> str:
-    """Say that the noise of the force decides whether the ratio of peaks is as measured; "" if it does not."""
-    expected = PEAK_DEVIATIONS[1] / PEAK_DEVIATIONS[0]
-    ratios = [free / locked for locked, free in standstill.louder.values()]
-    if len({about(value, expected, words.order) for value in ratios}) < 2:
-        return ""
-    return (
-        f"The noise of the force is assumed, and decides: with {', '.join(f'{f:g}' for f in standstill.louder)} times "
-        f"as much, the peaks have the ratios {', '.join(f'{value:.2g}' for value in ratios)}."
-    )
+def _tenfold(standstill: InPosition) -> float:
+    """Return which fraction of the difference ten times the joint's own damping removes."""
+    ten = np.log(10 * standstill.own_damping)
+    return float(np.interp(ten, np.log(standstill.damping), standstill.recovered))
+
+
+def _sized(stands: NoisyStandstill) -> bool:
+    pairs = zip((stands.locked, stands.free), PEAK_DEVIATIONS, strict=True)
+    return all(about(peak, size, words.order) for peak, size in pairs)
 
 
 def _over_noise(standstill: InPosition) -> str:
     """Say with which noises of the force the deviations at standstill are as measured."""
-    met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
+    met = [f"{factor:g}" for factor, stands in standstill.louder.items() if _sized(stands)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
-    if not tried:
-        return "The disturbances are assumed."
-    where = f"with {' and '.join(met)} times the noise it is met" if met else "it is met with none"
-    return f"The disturbances are assumed: {where} ({tried} times the assumed noise of the force were tried)."
+    where = f"With {' and '.join(met)} times that of rounding it is met" if met else "It is met with none"
+    return f"{where} ({tried} times it were tried)."
 
 
-def _noises(standstill: InPosition) -> FindingTable | None:
-    """Return a table of the deviations over the noise of the force, if that was varied."""
+def _noises(standstill: InPosition) -> FindingTable:
+    """Return a table of the deviations over the noise of the force."""
     rows = tuple(
-        (f"{factor:g}", f"{locked * 1e6:.2g} um", f"{free * 1e6:.2g} um", f"{free / locked:.2g}")
-        for factor, (locked, free) in standstill.louder.items()
+        (
+            f"{factor:g}",
+            f"{stands.locked * 1e6:.2g} um",
+            f"{stands.free * 1e6:.2g} um",
+            f"{stands.free / stands.locked:.2g}",
+            percent(stands.recovered),
+        )
+        for factor, stands in standstill.louder.items()
     )
-    columns = "noise of the force over that assumed", "joint locked", "joint free", "ratio"
-    return FindingTable(columns, rows) if rows else None
+    damped = f"recovered by {standstill.bearing_damping:.3g} N s/m"
+    return FindingTable(("noise of the force over that assumed", "joint locked", "joint free", "ratio", damped), rows)

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 def locked_rig_hunts(evidence: Evidence) -> Finding:
     """Judge whether peaks, period and amplitude of the locked rig are as in the thesis."""
     cell = evidence.responses["locked"].cell
-    peaks, period, amplitude = int(cell["count"]), float(cell["period"]), float(cell["peak_to_peak"]) / 2
-    size = f"amplitude {amplitude * 1e3:.3g} mm" if amplitude > BANDS[0] else "no amplitude"
+    peaks, period, amplitude = int(cell["count"]), float(cell["period"]), float(cell["peak_to_peak"])
+    size = f"amplitude {amplitude * 1e3:.3g} mm peak to peak" if amplitude > BANDS[0] else "no amplitude"
     return Finding.of(
         Part("at least one peak is counted after 10 s, as in every map", peaks >= 1, f"{peaks} peaks"),
         Part(
@@ -36,7 +36,7 @@ def locked_rig_hunts(evidence: Evidence) -> Finding:
             f"period {period:.3g} s" if np.isfinite(period) else "no period",
         ),
         Part(
-            f"the amplitude (half of peak to peak) lies between {1 / words.order:.2g} and {words.order:.2g} mm",
+            f"the amplitude (peak to peak, as in Fig. 27) lies between {1 / words.order:.2g} and {words.order:.2g} mm",
             1e-3 / words.order <= amplitude <= 1e-3 * words.order,
             size,
         ),

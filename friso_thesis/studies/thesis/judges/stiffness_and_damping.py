@@ -218,7 +218,7 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
     large, small = needed[damping >= words.large], needed[damping < _SMALL_DAMPING]
     at_large = float(np.median(large))
     locked = evidence.responses["locked"].cell
-    amplitude = float(locked["peak_to_peak"]) / 2
+    amplitude = float(locked["peak_to_peak"])
     ratio = at_large / amplitude if bool(locked["keeps_moving"]) else np.nan
     return Finding.of(
         Part(
@@ -237,9 +237,11 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
             ),
         ),
         Part(
-            f"that stroke is far below the amplitude of the locked rig's cycle (at most {1 / words.order:.2g} of it)",
+            "that stroke is far below the amplitude of the locked rig's cycle, peak to peak: “the full range of a "
+            f"hunting cycle”, as in Fig. 27 (at most {1 / words.order:.2g} of it)",
             ratio <= 1 / words.order,
-            f"{ratio:.2g} of the amplitude of {amplitude * 1e3:.2g} mm"
+            f"{ratio:.2g} of the amplitude of {amplitude * 1e3:.3g} mm peak to peak; of half of it, the other reading "
+            f"of amplitude, {2 * ratio:.2g}"
             if np.isfinite(ratio)
             else "the locked rig does not hunt",
         ),
