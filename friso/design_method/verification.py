@@ -21,8 +21,7 @@ from friso.engine.settings import room_settings
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
-from friso.hunting.criteria import CREEPS, FAILED, RESTS, SWINGS, outcomes
-from friso.hunting.criteria.settling import settling_of_runs
+from friso.hunting.criteria import CREEPS, FAILED, RESTS, SWINGS, outcomes, settling_of_runs
 from friso.hunting.measures import run_ends, turns_of
 from friso.progress import Progress, silent
 from friso.shares import share_interval
