@@ -76,6 +76,25 @@ def test_rest_contradicts_hunting_only_if_the_reference_stands_long_enough(hunti
     assert 1.2 < speeds[0] < 1.5
 
 
+def test_steps_of_the_encoder_and_brief_stands_decide_nothing(hunting: Stage) -> None:
+    """A position that jumps by a count is no hunting; half a swing is no rest; noise of the reference is no motion."""
+    time = np.arange(0, 10, STEP)
+    counts = 1e-6 * (np.sin(2 * np.pi * time / 0.7) > 0)
+    assert not standing_of(log_of(counts)).hunts
+    half = standing_of(log_of(1e-4 * np.sin(2 * np.pi * time / 15)))
+    assert (half.hunts, half.rests) == (False, False)
+    settled = hunting.replace({"controller.crossover": "20 Hz"})
+    assert contradiction(settled, half).open
+    assert contradiction(settled, Standing(0.03, None, None)).open
+    noisy = 1e-9 * np.random.default_rng(0).standard_normal(len(time))
+    assert standing_of(log_of(np.zeros(len(time)), noisy)).time > 9
+
+
+def test_a_stage_whose_values_are_ranges_contradicts_nothing_for_certain(hunting: Stage, swinging: Standing) -> None:
+    uncertain = hunting.replace({"friction.static": "0.8 N .. 1.6 N"})
+    assert not contradiction(uncertain, swinging).certain
+
+
 def test_a_log_without_a_reference_is_refused() -> None:
     log = log_of(np.zeros(100))
     with pytest.raises(InputError, match="reference"):

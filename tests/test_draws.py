@@ -182,7 +182,7 @@ def test_each_case_has_its_own_bandwidths(rig: Stage, case: str) -> None:
     }
     tried["given"], judged["given"] = tried[case], judged[case]
     locked_says, free_says = draws_sentences(Draws(stage, sample, 0, judged, 9, tried))
-    assert "10.4 Hz or more" in locked_says
+    assert "10.4 Hz, up to 16.0 Hz" in locked_says
     assert "free the joint" in locked_says
     assert "4.00 Hz to 8.00 Hz" in free_says
     assert "Cure" not in free_says

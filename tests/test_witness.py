@@ -1,12 +1,14 @@
 """The given controller as a witness: replayed on a log it tells clock, units, signs, gains and feedforward."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from friso.errors import InputError
 from friso.identification.logs.log import Log
-from friso.identification.witness import Witness
+from friso.identification.witness import Witness, doubt_of, replayed
 from friso.stage import Stage
 
 STEP = 1e-3
@@ -113,3 +115,37 @@ def test_forces_at_a_limit_do_not_count() -> None:
     peak = float(np.abs(LOG["force"]).max())
     best = Witness(recorded(limit=0.6 * peak), STAGE.flat()).best()
     assert best.agrees
+
+
+def test_a_step_of_the_force_is_no_switch_of_gains() -> None:
+    stepped = changed(force=LOG["force"] + 20.0 * (LOG.time > 3))
+    replay = replayed(stepped, STAGE.flat())
+    assert replay is not None
+    assert replay.steps
+    assert not replay.refutes
+    assert "constant force" in doubt_of(replay, stepped)
+
+
+def test_a_unit_of_both_positions_is_not_told_as_a_scale_of_the_force() -> None:
+    small = changed(position=1e-3 * LOG["position"], reference=1e-3 * LOG["reference"])
+    with pytest.raises(InputError, match="force") as caught:
+        replayed(small, STAGE.flat())
+    assert "--unit" in caught.value.example
+    with pytest.raises(InputError) as caught:
+        replayed(changed(force=-LOG["force"]), STAGE.flat())
+    assert "--scale" in caught.value.example
+
+
+@pytest.mark.parametrize(
+    "setting", [{"integral_limit": "2 N"}, {"integral_reset": True}, {"error_deadband": "1 um"}], ids=str
+)
+def test_settings_that_are_not_linear_are_not_replayed(setting: dict[str, Any]) -> None:
+    keys = {f"controller.{key}": value for key, value in setting.items()}
+    assert replayed(LOG, STAGE.replace(keys).flat()) is None
+
+
+def test_a_log_in_which_nothing_varies_says_nothing() -> None:
+    still = changed(force=np.zeros(len(LOG.time)))
+    assert replayed(still, STAGE.flat()) is None
+    brief = replace(LOG, time=LOG.time[:20], segments=(slice(0, 20),))
+    assert replayed(replace(brief, signals={k: v[:20] for k, v in LOG.signals.items()}), STAGE.flat()) is None

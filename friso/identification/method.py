@@ -23,7 +23,7 @@ from friso.identification.stage_file import identified_stage, origins, with_unkn
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, silent, together
 from friso.stage import Stage
-from friso.stage.correlations import Correlations, guessed_together
+from friso.stage.correlations import Correlations
 
 
 @dataclass(frozen=True)
@@ -283,4 +283,4 @@ def _correlations(
     part = matrix[np.ix_(places, places)]
     alone = np.abs(part - np.eye(len(leading))).max(axis=1, initial=0.0) == 0
     together = [key for key, single in zip(leading, alone, strict=True) if not single]
-    return Correlations(tuple(leading), part).among(together).with_others(guessed_together(stage))
+    return Correlations(tuple(leading), part).among(together)

@@ -519,6 +519,9 @@ class WitnessSettings(Settings):
     samples_of_a_start: int = setting(10, "")
     """Samples at the start that do not count, in which filters of the controller forget that they began at rest."""
 
+    samples_of_a_replay: int = setting(50, "")
+    """Fewest samples of a replay that says anything."""
+
     samples_of_delay: int = setting(4, "")
     """Longest delay searched from position to force [samples]."""
 

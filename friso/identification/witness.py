@@ -20,6 +20,7 @@ from friso.identification.inverse_model import least_squares, unit_of
 from friso.identification.logs.log import Log
 from friso.identification.settings import witness_settings as settings
 from friso.quantities import percent, plain_factor
+from friso.stage.controllers import CONTROLLER, NO_SETTINGS, settings_of
 from friso.stage.tables import TRANSMISSION
 
 
@@ -46,6 +47,19 @@ class Replay:
     def explains(self) -> bool:
         """Tell whether the controller explains the course of the logged force, whatever its size."""
         return self.left <= settings.force_left_by_the_controller
+
+    @property
+    def steps(self) -> bool:
+        """Tell whether the controller explains two parts of the record alike, each with a constant force of its own."""
+        alike = self.slopes is not None and self.slopes[0] * self.slopes[1] > 0
+        if not alike or self.slopes is None:
+            return False
+        return bool(abs(np.log(self.slopes[1] / self.slopes[0])) <= settings.error_of_an_agreeing_slope)
+
+    @property
+    def refutes(self) -> bool:
+        """Tell whether another controller drove the machine, or one with a feedforward that this one lacks."""
+        return bool(self.mass or not (self.agrees or self.steps))
 
     @property
     def agrees(self) -> bool:
@@ -159,12 +173,19 @@ class Witness:
 def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
     """Replay the controller of a stage on a log; None where what it saw and commanded is not what was logged.
 
-    That is so with a disturbance in the force, or if the controller may see the motor and the log the load. Raises
-    InputError if the log contradicts its own clock, unit or sign: no value of such a log holds.
+    That is so with a disturbance in the force, if the controller may see the motor and the log the load, for settings
+    against friction, which are not linear, and where nothing varies. Raises InputError if the log contradicts its own
+    clock, unit or sign: no value of such a log holds.
     """
-    if "disturbance" in log or any(key.startswith(f"{TRANSMISSION}.") for key in flat):
+    behind = "disturbance" in log or any(key.startswith(f"{TRANSMISSION}.") for key in flat)
+    if behind or settings_of(flat) != NO_SETTINGS or flat.get(f"{CONTROLLER}.coulomb_feedforward"):
         return None
     witness = Witness(log, flat)
+    varies = [
+        np.ptp(signal[witness.rows]) if len(witness.rows) else 0.0 for signal in (witness.force, witness.command())
+    ]
+    if len(witness.rows) < settings.samples_of_a_replay or not np.all(np.isfinite(varies)) or not all(varies):
+        return None
     replay = witness.best()
     left = f"the controller leaves {percent(witness.replay().left)} of the force, so {percent(replay.left)}"
     if replay.clock != 1.0:
@@ -177,9 +198,12 @@ def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
     if replay.explains and not low < replay.slope < high:
         actual = f"a force that is {replay.slope:.3g} times what the controller of the stage file commands"
         expected = "force and controller with agreeing units and signs (of position, too)"
-        example = f'--scale force="{1 / replay.slope:.3g} {log.unit("force")}/{log.unit("force")}"'
+        thousands = np.log(abs(replay.slope)) / np.log(1000)
+        scale = f'--scale force="{1 / replay.slope:.3g} {log.unit("force")}/{log.unit("force")}"'
+        by_unit = replay.slope > 0 and abs(thousands - round(thousands)) < settings.error_of_an_agreeing_slope / 3
+        example = '--unit CHANNEL="mm" for position and reference' if by_unit else scale
         raise InputError("force", actual, expected, example, log.name)
-    return replay if replay.agrees or replay.explains else replace(replay, slopes=witness.at_both_ends())
+    return replay if replay.explains else replace(replay, slopes=witness.at_both_ends())
 
 
 def doubt_of(replay: Replay, log: Log) -> str:
@@ -200,7 +224,9 @@ def doubt_of(replay: Replay, log: Log) -> str:
             f"the logged force is {replay.slope:.3g} times what the controller of the stage file commands: its gains "
             "or the scale of the force are off by that"
         )
-    if replay.slopes:
+    if replay.steps:
+        return "a constant force changes within the record; with its own in each part the controller explains the force"
+    if replay.slopes and replay.slopes[0] * replay.slopes[1] > 0:
         before, after = replay.slopes
         return (
             f"the controller answers the same error with {after / before:.2g} times the force in the later part: its "

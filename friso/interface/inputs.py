@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from friso.errors import InputError, StageError
 from friso.quantities import Quantity, exactly, quoted
 from friso.stage import Stage, load, parse_set
-from friso.stage.correlations import Correlations, correlations_file, guessed_together, read_correlations
+from friso.stage.correlations import Correlations, correlations_file, read_correlations
 from friso.stage.plausible import idle_encoder, implausible_values
 from friso.stage.rig import AS_BUILT, left_out
 from friso.stage.tables_of_files import load_changed, load_tables
@@ -163,13 +163,12 @@ def mention_unstable_loop(stage: Stage) -> None:
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:
     """Return the correlations of uncertain keys, from a file beside the stage file.
 
-    Pairs of keys that nobody knows are correlated as well (`guessed_together`). Raises InputError for a file that
-    cannot be read or used.
+    Without such a file, there are none. Raises InputError for a file that cannot be read or used.
     """
     correlations = Correlations()
     if not isinstance(source, Stage | Mapping) and correlations_file(Path(source)).exists():
         correlations = read_correlations(correlations_file(Path(source)), load(source))
-    return correlations.among(stage.uncertain()).with_others(guessed_together(stage))
+    return correlations.among(stage.uncertain())
 
 
 _LONGEST_STEM = 150

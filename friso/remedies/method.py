@@ -159,7 +159,8 @@ def _working(outcomes: Iterable[RemedyOutcome], stage: Stage, goal: Goal) -> tup
     def rank(outcome: RemedyOutcome) -> tuple[bool, bool, bool, float, ChangeSize]:
         assert outcome.measured is not None
         assert outcome.stage is not None
-        size, ratio = change_size(stage, outcome.stage), max(1.0, loop_bandwidth(outcome.stage) / own)
+        size, ratio = change_size(stage, outcome.stage), loop_bandwidth(outcome.stage) / own
+        ratio = max(1.0, ratio) if np.isfinite(ratio) else np.inf
         knob = outcome.remedy.name == BANDWIDTH and (modes_known or ratio <= settings.fastest_unasked)
         cost = outcome.measured.force(goal) * ratio
         return not outcome.measured.holds_for_all_moves(goal), size.bought, not knob, cost, size

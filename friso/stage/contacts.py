@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, StageError
-from friso.intervals import WIDE_RATIO, is_range, uncertain_value
+from friso.intervals import WIDE_RATIO, Interval, is_range, uncertain_value
 from friso.quantities import Quantity, positive, quoted
 from friso.stage.section import nearest_name, numeric_fields
 from friso.stage.tables import FRICTION
@@ -139,9 +139,8 @@ def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Conta
     They follow from Coulomb friction, or else from static friction, and from the contact that the stage's guess names;
     `bounds` cut them. A key has no range if nobody knows these either, or if nothing is usual for it.
     """
-    flat, intervals, axis = stage.flat(), stage.uncertain(), stage.axis_kind
-    guess = getattr(stage.friction, "guess", None)
-    contact = _understood(guess, axis)[0] if guess else any_contact(axis)
+    flat, intervals = stage.flat(), stage.uncertain()
+    contact = _contact_of(stage)
 
     def known(key: str) -> ContactRange | None:
         """Return the range of a key's value; None if the stage has none, or if nobody knows it."""
@@ -156,6 +155,31 @@ def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Conta
     stiffness = bounds.get("friction.bristle_stiffness", (0.0, math.inf))
     ranges = {f"friction.{key}": ends for key, ends in contact.ranges(coulomb, stiffness).items()}
     return {key: cut(ranges[key], bounds.get(key, ranges[key])) for key in keys if key in ranges and key in flat}
+
+
+def guessed_ratios(stage: Stage) -> dict[str, tuple[str, Interval]]:
+    """Return, for keys of [friction] that grow with another one over machines, that key and the range of their ratio.
+
+    They are static friction with Coulomb friction, and the damping of bristles with their stiffness. Both keys must be
+    uncertain, and nobody may know either: it is listed as unknown, or its range spans orders of magnitude.
+    """
+    intervals = stage.uncertain()
+    open_keys = {key for key, one in intervals.items() if one.wide or key in stage.unknown_keys}
+    if not open_keys:
+        return {}
+    contact = _contact_of(stage)
+    pairs = (("static", "coulomb", contact.ratio), ("bristle_damping", "bristle_stiffness", contact.settling))
+    return {
+        f"friction.{key}": (f"friction.{lead}", Interval(*ends, ""))
+        for key, lead, ends in pairs
+        if {f"friction.{key}", f"friction.{lead}"} <= open_keys
+    }
+
+
+def _contact_of(stage: Stage) -> ContactKind:
+    """Return the contact that the guess of a stage names, or any contact."""
+    guess = getattr(stage.friction, "guess", None)
+    return _understood(guess, stage.axis_kind)[0] if guess else any_contact(stage.axis_kind)
 
 
 def cut(ends: ContactRange, other: ContactRange) -> ContactRange:

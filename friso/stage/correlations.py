@@ -19,6 +19,7 @@ import numpy as np
 from friso.errors import InputError, StageError
 from friso.intervals import NORMAL_COVERAGE
 from friso.quantities import LARGEST_INTEGER, as_toml, percent, quoted
+from friso.stage.contacts import guessed_ratios
 from friso.stage.controllers import as_tuned
 from friso.stage.section import unknown_key
 from friso.stage.stage import Stage, violations
@@ -58,12 +59,6 @@ class Correlations:
         places = [k for k, key in enumerate(self.keys) if key in keys]
         return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
 
-    def with_others(self, other: Correlations) -> Correlations:
-        """Add the correlations of another object among the keys that this one does not have."""
-        more = other.among([key for key in other.keys if key not in self.keys])
-        corner = np.zeros((len(self.keys), len(more.keys)))
-        return Correlations((*self.keys, *more.keys), np.block([[self.matrix, corner], [corner.T, more.matrix]]))
-
     def over(self, keys: list[str]) -> np.ndarray:
         """Return the correlation matrix of `keys`, shape (keys, keys), in their order.
 
@@ -88,24 +83,6 @@ def _problem(matrix: np.ndarray, size: int) -> str:
     if size and np.linalg.eigvalsh(matrix).min() < -MATRIX_ROUNDING * size:
         return "not positive semidefinite: no quantities can be correlated like this"
     return ""
-
-
-GUESSED_TOGETHER = (("friction.static", "friction.coulomb"), ("friction.bristle_stiffness", "friction.bristle_damping"))
-"""Pairs of keys that grow together over machines: levels of friction, and stiffness and damping of bristles."""
-
-CORRELATION_OF_GUESSES = 0.97
-"""Correlation of the two keys of a pair. Independent draws would have ratios that no machine shows."""
-
-
-def guessed_together(stage: Stage) -> Correlations:
-    """Return the correlations of pairs of keys of which nobody knows either; none without such a pair.
-
-    A key whose range spans orders of magnitude counts as unknown, too.
-    """
-    guessed = {key for key, one in stage.uncertain().items() if one.wide or key in stage.unknown_keys}
-    keys = [key for pair in GUESSED_TOGETHER if {*pair} <= guessed for key in pair]
-    one = np.array([[1.0, CORRELATION_OF_GUESSES], [CORRELATION_OF_GUESSES, 1.0]])
-    return Correlations((*keys,), np.kron(np.eye(len(keys) // 2), one))
 
 
 def correlations_file(path: str | os.PathLike[str]) -> Path:
@@ -226,7 +203,8 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
 def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, np.ndarray]:
     """Return values of the uncertain keys [SI], each of shape (count,), at given quantiles.
 
-    `shares` are independent uniform numbers, shape (count, keys), which `matrix` correlates.
+    `shares` are independent uniform numbers, shape (count, keys), which `matrix` correlates. Of two keys that grow
+    together over machines, and that nobody knows, the second is drawn by its ratio to the first.
     """
     from scipy.special import ndtr, ndtri
 
@@ -234,13 +212,21 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
     root = directions * np.sqrt(np.maximum(sizes, 0.0))
     edge = 2.0**-31  # half the step of the sequence: a 0 would be infinitely far out
     normals = ndtri(np.clip(shares, edge, 1 - edge)) @ root.T
-    flat, values = stage.flat(), {}
-    for (key, interval), column in zip(stage.uncertain().items(), normals.T, strict=True):
+    flat, uncertain = stage.flat(), stage.uncertain()
+    values, levels = {}, dict(zip(uncertain, ndtr(normals).T, strict=True))
+    for (key, interval), column in zip(uncertain.items(), normals.T, strict=True):
         half = (interval.high - interval.low) / 2
-        values[key] = (
-            interval.evenly(ndtr(column)) if interval.form == "range" else flat[key] + half / NORMAL_COVERAGE * column
-        )
+        drawn = interval.form == "range"
+        values[key] = interval.evenly(levels[key]) if drawn else flat[key] + half / NORMAL_COVERAGE * column
+    for key, (lead, ratio) in guessed_ratios(stage).items():
+        values[key] = values[lead] * ratio.evenly(levels[key])
+        if key in BOUNDED_GUESSES:
+            values[key] = np.clip(values[key], uncertain[key].low, uncertain[key].high)
     return values
+
+
+BOUNDED_GUESSES = ("friction.bristle_damping",)
+"""Keys drawn by a ratio whose own range is kept, as a log may have shown it."""
 
 
 def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.errors import InputError
-from friso.hunting import sketch_attractors
+from friso.hunting import judge_many, sketch_attractors
 from friso.identification.experiments.hunting import swings_of
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import noise_of
+from friso.identification.readings.common import digit_of, noise_of
 from friso.stage import Stage
 from friso.studies.settings import settings
+
+SURVEY_RTOL = 1e-6
+"""Relative tolerance of the run of the stage's own move."""
 
 CHANGES: Mapping[str, tuple[str, ...]] = {
     "friction.static": ("friction.static",),
@@ -33,13 +36,14 @@ CHANGES: Mapping[str, tuple[str, ...]] = {
 class Standing:
     """What a machine does while its reference stands still for longest in a log.
 
-    `swing` is half of peak to peak [m] and `period` [s] of its lasting swing; both are None for a machine at rest.
-    `time` [s] is how long the reference stands.
+    `swing` is half of peak to peak [m] and `period` [s] of its lasting swing; both are None for a machine without one.
+    `time` [s] is how long the reference stands. `rests` is true if the machine stands still in the later half of it.
     """
 
     time: float
     swing: float | None
     period: float | None
+    rests: bool = True
 
     @property
     def hunts(self) -> bool:
@@ -65,6 +69,7 @@ class Contradiction:
     """What a log shows, what the stage does, and what would explain a difference.
 
     `swing` [m] and `period` [s] are those of the stage's largest attractor, None if nothing attracts it for certain.
+    `may_rest` is true if the stage's own move does not end in hunting, though another may.
     """
 
     standing: Standing
@@ -73,18 +78,23 @@ class Contradiction:
     swing: float | None
     period: float | None
     explanations: tuple[ExplainingChange, ...]
+    may_rest: bool = False
 
     @property
     def agrees(self) -> bool:
         """Tell whether log and stage agree on hunting, and on swing and period within a quarter."""
-        if self.standing.hunts != self.attracts:
-            return not self.standing.hunts and self.short
+        if self.open or self.standing.hunts != self.attracts:
+            return self.open
         return not self.attracts or alike(self.standing, self.swing, self.period)
 
     @property
-    def short(self) -> bool:
-        """Tell whether the reference stands too briefly for hunting of the stage to be seen."""
-        return self.period is not None and self.standing.time < settings.periods_of_a_standing_log * self.period
+    def open(self) -> bool:
+        """Tell whether the log decides nothing: it neither swings nor rests, is too short, or the stage does both."""
+        if self.standing.hunts:
+            return False
+        least = settings.periods_of_a_standing_log * (self.period or 0.0)
+        brief = self.standing.time < max(least, settings.shortest_standing)
+        return not self.standing.rests or brief or (self.attracts and self.may_rest)
 
 
 def alike(standing: Standing, swing: float | None, period: float | None) -> bool:
@@ -109,22 +119,28 @@ def standing_of(log: Log) -> Standing:
     signals = {name: values[rows] for name, values in log.signals.items()}
     part = Log(log.name, time, log.sample_time, signals, (slice(0, last - first),))
     whole = float(time[-1])
+    late = signals["position"][(last - first) // 2 :]
+    noise = noise_of(signals["position"])
+    rests = bool(np.ptp(late) <= max(settings.noises_at_rest * noise, 3 * digit_of(signals["position"])))
     try:
         swings = swings_of(part)
     except InputError:
-        return Standing(whole, None, None)
-    seen = swings.amplitude > settings.noises_of_a_swing * noise_of(signals["position"])
+        return Standing(whole, None, None, rests)
+    fine = max(settings.noises_of_a_swing * noise_of(signals["position"]), 2 * digit_of(signals["position"]))
+    counts = len(np.unique(signals["position"])) <= settings.counts_of_a_dither
+    seen = swings.amplitude > fine and not counts
     even = swings.amplitude_deviation < settings.unevenness_of_a_swing * swings.amplitude
     slow = swings.period > settings.samples_of_a_swing * log.sample_time
     lasts = swings.count * swings.period > settings.share_of_a_lasting_swing * whole
     if seen and even and slow and lasts:
-        return Standing(whole, swings.amplitude, swings.period)
-    return Standing(whole, None, None)
+        return Standing(whole, swings.amplitude, swings.period, False)
+    return Standing(whole, None, None, rests)
 
 
 def _longest_stand(reference: np.ndarray) -> tuple[int, int]:
     """Return the first sample and the end of the longest stretch at which a reference does not change."""
-    moves = np.abs(np.diff(reference)) > np.finfo(np.float32).eps * max(float(np.ptp(reference)), 1e-12)
+    still = max(np.finfo(np.float32).eps * float(np.ptp(reference)), settings.noises_at_rest * noise_of(reference))
+    moves = np.abs(np.diff(reference)) > still
     ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
     longest = int(np.argmax(np.diff(ends)))
     return int(ends[longest]), int(ends[longest + 1])
@@ -136,7 +152,10 @@ def contradiction(stage: Stage, standing: Standing) -> Contradiction:
     factors = np.geomspace(1 / settings.reach_of_a_change, settings.reach_of_a_change, settings.changes_tried)
     own = _attracted(flat, np.ones(1))
     swing, period = (values[0] if own[0][0] else None for values in own[2:])
-    plain = Contradiction(standing, bool(own[0][0]), bool(own[1][0]), swing, period, ())
+    sure = bool(own[1][0]) and not stage.uncertain() and not stage.doubt
+    attracts = bool(own[0][0])
+    may_rest = attracts and not standing.hunts and judge_many(flat, 1, SURVEY_RTOL)[0] != "hunts"
+    plain = Contradiction(standing, attracts, sure, swing, period, (), may_rest)
     if plain.agrees:
         return plain
     explanations = []
@@ -148,7 +167,7 @@ def contradiction(stage: Stage, standing: Standing) -> Contradiction:
         if explanation := _nearest(name, standing, factors, _attracted(_valid(changed), factors)):
             explanations.append(explanation)
     ordered = sorted(explanations, key=lambda one: abs(np.log(one.factor)))
-    return Contradiction(standing, plain.attracts, plain.certain, swing, period, tuple(ordered))
+    return replace(plain, explanations=tuple(ordered))
 
 
 def _valid(flat: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -196,7 +196,7 @@ class _Ladder:
         return 1 / settings.reach_of_bandwidths <= self.factor(place) <= settings.reach_of_bandwidths
 
     def hunts(self, place: int, thoroughly: bool = False) -> np.ndarray:
-        """Return which stages hunt at a place: 1, 0, or NaN where that is not certain or the loop unstable, (count,).
+        """Return which stages hunt at a place: 1, 0, or NaN where that is not certain or a loop unstable, (count,).
 
         Coarse maps tell it, or `thoroughly` a survey, which replaces what a map has told.
         """
@@ -204,9 +204,15 @@ class _Ladder:
             keys = {key: values[: self.count] for key, values in self.sample.keys.items()}
             flat = at_bandwidth(laid_over(self.stage, keys), self.factor(place) * (self.own or 1.0))
             attracted = (find_attractors if thoroughly else sketch_attractors)(flat, self.count)
-            sure = attracted.certain & ~loops_unstable(flat, self.count)
+            sure = attracted.certain & ~loops_unstable(flat, self.count) & self.stands_as_built(place)
             self.columns[place] = np.where(sure, attracted.attracts, np.nan)
         return self.columns[place]
+
+    def stands_as_built(self, place: int) -> bool:
+        """Tell whether the loop of the stage itself stays stable with samples and delays of its drive."""
+        from friso.frequency.crossover import unstable_as_built  # 0.3 s to import
+
+        return not any(unstable_as_built(at_bandwidth(self.stage.flat(), self.factor(place) * (self.own or 1.0))))
 
     def climb(self) -> None:
         """Try faster controllers until nearly no stage hunts over a coarse step, and find the first such bandwidth."""

@@ -11,7 +11,7 @@ from friso.errors import StageError
 from friso.hunting import can_hunt, loops_unstable, sketch_attractors
 from friso.stage import Stage
 from friso.stage.contacts import any_contact, written
-from friso.stage.correlations import draw, guessed_together, laid_over
+from friso.stage.correlations import Correlations, draw, laid_over
 from friso.stage.tables import moving_mass
 from friso.studies.settings import settings
 
@@ -29,8 +29,8 @@ class FrictionLevels:
 
     @property
     def shares(self) -> np.ndarray:
-        """Return the share of machines that hunt at each level, or may do so, (levels,)."""
-        return (self.hunts != 0).mean(axis=0)
+        """Return the share of machines that hunt for certain at each level, (levels,)."""
+        return (self.hunts == 1).mean(axis=0)
 
     def ends(self, share: float) -> tuple[float, float] | None:
         """Return the least and the largest level [N] at which at least a share of machines hunt; None if at none."""
@@ -73,12 +73,11 @@ def _hunting(stage: Stage, coulomb: float) -> np.ndarray | None:
     unknown = ", ".join(f"friction.{key}" for key in ranges if key != "coulomb")
     try:
         tried = Stage(**{**stage.as_written(), "friction": table, "unknown": unknown})
-        sample = draw(tried, guessed_together(tried), settings.machines_of_a_level, 0)
+        sample = draw(tried, Correlations(), settings.machines_of_a_level, 0)
     except StageError:  # uncertain keys of the stage itself may hardly ever fit together
         return None
     flat = laid_over(tried, sample.keys)
-    if not can_hunt(flat):
+    if not can_hunt(flat) or loops_unstable(flat, sample.count).any():
         return None
     attracted = sketch_attractors(flat, sample.count)
-    sure = attracted.certain & ~loops_unstable(flat, sample.count)
-    return np.where(sure, attracted.attracts, np.nan)
+    return np.where(attracted.certain, attracted.attracts, np.nan)

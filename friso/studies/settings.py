@@ -82,11 +82,20 @@ class StudySettings(Settings):
     periods_of_a_standing_log: float = setting(2.0, "")
     """Periods of the predicted cycle for which a reference must stand before rest in a log contradicts it."""
 
+    shortest_standing: float = setting(0.3, "s")
+    """Shortest time for which a reference stands that shows whether a machine rests: half of the quickest cycles."""
+
+    noises_at_rest: float = setting(10.0, "")
+    """Largest motion of a machine at rest, peak to peak, in standard deviations of the position's noise."""
+
     ratio_of_alike_swings: float = setting(1.25, "")
     """Largest ratio of swings, and of periods, that count as alike: friction of one machine differs by as much."""
 
     noises_of_a_swing: float = setting(4.0, "")
     """Smallest amplitude of a swing, in standard deviations of the position's noise."""
+
+    counts_of_a_dither: int = setting(3, "")
+    """Most levels of a position that jumps between counts of its encoder instead of swinging."""
 
     unevenness_of_a_swing: float = setting(0.4, "")
     """Largest standard deviation of the amplitude of a swing, relative to its mean. Noise is less even."""

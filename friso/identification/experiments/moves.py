@@ -64,11 +64,12 @@ def _in_newtons(log: Log) -> bool:
 
 def _explained(replay: Replay | None) -> str:
     """Say that the controller of the stage file explains the logged force; "" if it does not, or was not replayed."""
-    if replay is None or not replay.agrees or replay.mass:
+    if replay is None or not replay.agrees or replay.refutes:
         return ""
+    late = f", {replay.lag * 1e3:.3g} ms after the position" if replay.lag else ""
     return (
         "replayed on the log, the controller of the stage file explains the force to "
-        f"{percent(max(abs(replay.slope - 1), replay.left))}: clock, units and signs of the log fit it"
+        f"{percent(max(abs(replay.slope - 1), replay.left))}{late}: its clock, and the force over the position, fit it"
     )
 
 
@@ -553,7 +554,7 @@ class MovesKind(ExperimentKind[IdentifiedMoves]):
 
     def contradicted(self, result: IdentifiedMoves) -> Sequence[str]:
         """Return the tables of the stage file that a log contradicts: the controller if its force is another."""
-        return [] if result.replay is None or (result.replay.agrees and not result.replay.mass) else ["controller"]
+        return ["controller"] if result.replay is not None and result.replay.refutes else []
 
     def failed(self, result: IdentifiedMoves) -> bool:
         """Tell whether the model does not explain the log."""

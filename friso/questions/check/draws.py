@@ -155,8 +155,8 @@ def _at_other_bandwidths(name: str, draws: Draws) -> str:
         low, high = tried.cure
         freed = _freed(name, draws, ", or free the joint")
         quiet = int(np.count_nonzero(tried.at(low) == 0))
-        seen = f"{quiet} of {count} machines surely do not hunt there, nor at {bandwidth(high)}"
-        return f" Cure: {_faster(draws.stage, tried, low)} or more ({seen}){freed}."
+        seen = f"{quiet} of {count} machines surely do not hunt there"
+        return f" Cure: {_faster(draws.stage, tried, low)}, up to {bandwidth(high)} at least ({seen}){freed}."
     if edge is None:
         return f" None of {count} hunts at {bandwidth(float(tried.factors[0]))} either."
     never = int(np.isnan(tried.edges[0]).sum())

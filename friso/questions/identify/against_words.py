@@ -23,9 +23,13 @@ def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[st
         else f"rests for {with_unit(standing.time, 's')} while its reference stands"
     )
     does = f"hunts, {_swing(result.swing, result.period)}" if result.attracts else "does not hunt"
-    doubt = "" if result.certain else " (not certain)"
-    if result.agrees and result.attracts and not standing.hunts:
-        return [f"{name} does not tell: the machine {machine}, too briefly to see that the stage {does}{doubt}."]
+    doubt = "" if result.certain else " (not certain: its values, or what attracts it, are not)"
+    if not standing.hunts and not standing.rests:
+        return [f"{name} does not tell: the machine neither rests nor swings evenly; the stage {does}{doubt}."]
+    if result.open and result.attracts and result.may_rest:
+        return [f"{name} does not tell: the machine {machine}; the stage may rest, too, and {does} after other moves."]
+    if result.open:
+        return [f"{name} does not tell: the machine {machine}, too briefly for that; the stage {does}{doubt}."]
     if result.agrees:
         return [f"{name} agrees with the stage: the machine {machine}; the stage {does}{doubt}."]
     says = f"{name} contradicts the stage: the machine {machine}; the stage {does}{doubt}."
