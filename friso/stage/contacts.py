@@ -27,9 +27,6 @@ _FORCE = Quantity("N", positive, "5 N")
 
 _EXAMPLE = 'guess = "recirculating ball, size 25, light preload, 4 carriages"'
 
-MOST_CARRIAGES = 100
-"""Largest number of carriages of an axis."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class ContactKind:
@@ -96,10 +93,6 @@ def _ends(value: Any) -> Any:
     return tuple(map(float, value)) if isinstance(value, list) else value
 
 
-STRIBECK_EXPONENT = 2
-"""Exponent of a guessed Stribeck curve, a Gaussian one."""
-
-
 def any_contact(axis: AxisKind) -> ContactKind:
     """Return the ranges that hold for every contact on a kind of axis."""
     return next(iter(contacts(axis.name).values()))
@@ -127,7 +120,7 @@ def with_guess(tables: Mapping[str, Any], axis: AxisKind) -> dict[str, Any]:
         key: written(ranges[key], fields[key].on(axis).unit) for key in fields if key in ranges and key not in table
     }
     if "stribeck_exponent" in fields and "stribeck_exponent" not in table:
-        table["stribeck_exponent"] = STRIBECK_EXPONENT
+        table["stribeck_exponent"] = 2  # a Gaussian curve
     said = tables.get("unknown", "")
     unknown = [said] * bool(said) + [f"friction.{key}" for key in added]
     return {**tables, "friction": {**table, **added}, **({"unknown": ", ".join(unknown)} if unknown else {})}
@@ -228,7 +221,7 @@ def _understood(guess: str, axis: AxisKind) -> tuple[ContactKind, ContactRange |
             size = _named(rest, contact.sizes)
         elif rest == "preload" and contact.preloads:
             preload = _named(what, contact.preloads)
-        elif rest in ("carriage", "carriages") and what.isdecimal() and 1 <= int(what) <= MOST_CARRIAGES:
+        elif rest in ("carriage", "carriages") and what.isdecimal() and what.strip("0") and len(what) < 3:
             carriages = int(what)
         else:
             raise _not_understood(word, "size, preload and number of carriages, of contacts that have sizes")

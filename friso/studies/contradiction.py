@@ -17,9 +17,6 @@ from friso.identification.readings.common import digit_of, noise_of
 from friso.stage import Stage
 from friso.studies.settings import settings
 
-SURVEY_RTOL = 1e-6
-"""Relative tolerance of the run of the stage's own move."""
-
 CHANGES: Mapping[str, tuple[str, ...]] = {
     "friction.static": ("friction.static",),
     "all friction": ("friction.static", "friction.coulomb"),
@@ -154,7 +151,7 @@ def contradiction(stage: Stage, standing: Standing) -> Contradiction:
     swing, period = (values[0] if own[0][0] else None for values in own[2:])
     sure = bool(own[1][0]) and not stage.uncertain() and not stage.doubt
     attracts = bool(own[0][0])
-    may_rest = attracts and not standing.hunts and judge_many(flat, 1, SURVEY_RTOL)[0] != "hunts"
+    may_rest = attracts and not standing.hunts and judge_many(flat, 1, settings.rtol_of_own_moves)[0] != "hunts"
     plain = Contradiction(standing, attracts, sure, swing, period, (), may_rest)
     if plain.agrees:
         return plain

@@ -113,13 +113,13 @@ class DrawnBandwidths:
 
         It reaches over a coarse step at least, so that the cure does not stand on an edge.
         """
-        at = np.flatnonzero(self.factors > 1 + FINEST_STEP)
+        at = np.flatnonzero(self.factors > 1 + settings.finest_step)
         for first in at:
             run = 0
             while first + run < len(self.factors) and self.quiet[first + run]:
                 run += 1
             low, high = self.factors[first], self.factors[first + run - 1]
-            if run and high >= low * settings.step_of_bandwidths * (1 - FINEST_STEP):
+            if run and high >= low * settings.step_of_bandwidths * (1 - settings.finest_step):
                 return float(low), float(high)
         return None
 
@@ -140,10 +140,6 @@ class DrawnBandwidths:
 def _quiet(hunts: np.ndarray) -> np.ndarray:
     """Tell whether nearly all stages surely do not hunt; `hunts` has a row for each, as in `DrawnBandwidths`."""
     return (hunts != 0).mean(axis=0) <= settings.most_open_draws
-
-
-FINEST_STEP = 1e-6
-"""Relative difference below which two bandwidths are one."""
 
 
 def by_bandwidth(stage: Stage, sample: Sample) -> DrawnBandwidths | None:

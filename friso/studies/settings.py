@@ -112,6 +112,18 @@ class StudySettings(Settings):
     changes_tried: int = setting(37, "")
     """Factors tried on a key, 12 % apart, less than the difference that swings may have to be alike."""
 
+    finest_step: float = setting(1e-6, "")
+    """Relative difference below which two bandwidths are one."""
+
+    rtol_of_own_moves: float = setting(1e-6, "")
+    """Relative tolerance of the run of a stage's own move that is compared with a log."""
+
+    most_explanations: int = setting(3, "")
+    """Most changes that an answer names as explanations of a log."""
+
+    shares_of_levels: tuple[float, float] = setting((0.05, 0.5), "")
+    """Shares of machines that hunt from the levels of friction on that an answer states: some, and half."""
+
     most_draws: int = setting(100_000, "")
     """Most draws. At the edge of hunting a draw takes 50 ms, so more take hours."""
 

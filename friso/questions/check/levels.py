@@ -6,14 +6,12 @@ from typing import Any
 
 from friso.shown.drawing.prefixes import range_with_unit, with_unit
 from friso.studies.friction_levels import FrictionLevels
-
-SOME, HALF = 0.05, 0.5
-"""Shares of machines that hunt at the levels of friction that are stated."""
+from friso.studies.settings import settings
 
 
 def levels_sentence(levels: FrictionLevels) -> str:
     """Say from which Coulomb friction on machines with similar contacts hunt, and what shows one's own."""
-    some, half = levels.ends(SOME), levels.ends(HALF)
+    some, half = map(levels.ends, settings.shares_of_levels)
     if some is None:
         tried = range_with_unit(float(levels.coulomb[0]), float(levels.coulomb[-1]), "N")
         return f"The stage file has no [friction]: with usual bearings, {tried} of Coulomb friction, it would not hunt."

@@ -9,9 +9,7 @@ from friso.quantities import plain_factor
 from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
 from friso.stage import Stage
 from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange
-
-MOST_EXPLANATIONS = 3
-"""Largest number of changes that are told."""
+from friso.studies.settings import settings
 
 
 def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[str]:
@@ -33,7 +31,7 @@ def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[st
     if result.agrees:
         return [f"{name} agrees with the stage: the machine {machine}; the stage {does}{doubt}."]
     says = f"{name} contradicts the stage: the machine {machine}; the stage {does}{doubt}."
-    nearest = result.explanations[:MOST_EXPLANATIONS]
+    nearest = result.explanations[: settings.most_explanations]
     if not nearest:
         return [says, "No single change of friction, masses or the controller's speed explains that."]
     changes = listed([_change(stage, one) for one in nearest], "or")
