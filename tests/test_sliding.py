@@ -66,7 +66,7 @@ def test_a_map_over_speeds_agrees_with_the_ranges_of_the_check(pulled: Stage, sp
     end = speeds.ranges[-1].fastest
     axes = {"motion.velocity": f"{0.9 * end} m/s, {1.1 * end} m/s"}
     cells = friso.sweep(pulled, axes, metric="stick_slip")["stick_slip"]
-    assert cells.values.tolist() == ["sticks and slips", "smooth"]
+    assert cells.values.tolist() == ["sticks", "slides"]
     step = pulled.replace({"motion": {"kind": "step", "size": "1 mm", "duration": "1 s"}})
     other = friso.sweep(step, {"friction.viscous": "0.3 N*s/m, 0.4 N*s/m"}, metric="stick_slip")["stick_slip"]
     assert {*other.values.tolist()} == {"no ramp"}

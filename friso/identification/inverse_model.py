@@ -271,6 +271,16 @@ def _within_its_moves(
     return first
 
 
+def within_stretches(signals: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+    """Subtract from signals, (rows, signals), their means over each stretch, whose numbers are (rows,).
+
+    The integral of a controller may have changed between stretches, so each has a constant force of its own.
+    """
+    _, number, count = np.unique(stretch, return_inverse=True, return_counts=True)
+    means = np.stack([np.bincount(number, signal) / count for signal in signals.T], axis=1)
+    return signals - means[number]
+
+
 def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit a force [N], shape (rows,), by columns, shape (rows, columns).
 

@@ -42,7 +42,7 @@ class DoubtSettings(Settings):
     samples_of_a_spectrum: int = setting(256, "")
     """Number of samples in each piece of the residual for its spectrum. Longer pieces resolve more and scatter more."""
 
-    share_of_a_whole_record: float = setting(0.2, "")
+    share_of_a_whole_record: float = setting(0.75, "")
     """Length of the longest stretch without gaps below which gaps are reported, relative to the record."""
 
     digits_of_a_fine_position: float = setting(500.0, "")

@@ -95,8 +95,8 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
     """
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
-        knowledge = f"known only to be {' and '.join(ends)}" if ends else "unknown"
-        return None, f"{knowledge}, the stage file keeps its value"
+        knowledge = f"known only to be {' and '.join(ends)}"
+        return None, knowledge if ends else ""
     if not estimate.high > estimate.low:
         return None, "its uncertainty is not known, the stage file keeps its value"
     if not (field.bound.holds(estimate.low) or field.bound.holds(estimate.high)):

@@ -16,7 +16,7 @@ from scipy.signal import bilinear, lfilter, ss2tf
 from friso.errors import InputError
 from friso.frequency.parts import FEEDFORWARD, FORCE, REFERENCE, STAGE, VELOCITY, compensator
 from friso.frequency.system import System
-from friso.identification.inverse_model import least_squares, unit_of
+from friso.identification.inverse_model import least_squares, unit_of, within_stretches
 from friso.identification.logs.log import Log
 from friso.identification.settings import witness_settings as settings
 from friso.quantities import percent, plain_factor
@@ -75,6 +75,7 @@ class Witness:
         self.log, self.step = log, log.sample_time
         self.reference, self.position, self.force = (log[name][part] for name in CHANNELS)
         self.system = compensator(flat, 1)
+        self._commands: dict[float, np.ndarray] = {}
         size = np.abs(self.force)
         inside = size < settings.share_of_a_limit * size.max()
         if np.mean(~inside) < settings.share_at_a_limit:
@@ -107,14 +108,11 @@ class Witness:
 
         The command comes `shift` samples later. If `fed`, acceleration and direction of the reference explain a part.
         """
-        count = len(self.force)
-        columns = [
-            np.roll(self.command(clock), shift),
-            np.linspace(0.0, 1.0, count),
-        ]
+        columns = [np.roll(self.command(clock), shift), np.linspace(0.0, 1.0, len(self.force))]
         if fed:
-            columns += [*self._derivatives(self.step)[1:2], np.sign(self._derivatives(self.step)[0])]
-        signals = self._deviations(np.stack([*columns, self.force], axis=1)[self.rows])
+            rate, acceleration, _ = self._derivatives(self.step)
+            columns += [acceleration, np.sign(rate)]
+        signals = within_stretches(np.stack([*columns, self.force], axis=1)[self.rows], self.stretch)
         solution, left = least_squares(signals[:, :-1], signals[:, -1])
         spread = float(np.std(signals[:, -1])) or 1.0
         mass, direction = solution[2:] if fed else (0.0, 0.0)
@@ -130,18 +128,21 @@ class Witness:
 
     def command(self, clock: float = 1.0) -> np.ndarray:
         """Return the force [N] that the controller commands on the log, (samples,)."""
+        if clock in self._commands:
+            return self._commands[clock]
         step = self.step / clock
         velocity = np.diff(self.position, prepend=self.position[0]) / step
         inputs = {REFERENCE: self.reference, STAGE: self.position, VELOCITY: velocity}
         inputs |= dict(zip(FEEDFORWARD, self._derivatives(step), strict=True))
-        return _driven(self.system, inputs, step)
+        self._commands[clock] = _driven(self.system, inputs, step)
+        return self._commands[clock]
 
-    def at_both_ends(self, clock: float = 1.0) -> tuple[float, float] | None:
+    def at_both_ends(self) -> tuple[float, float] | None:
         """Return the slopes before and after the instant that divides the record best; None if none explains it.
 
         Gains that are switched have two slopes.
         """
-        signals, count = np.stack([self.command(clock), self.force], axis=1)[self.rows], len(self.rows)
+        signals, count = np.stack([self.command(), self.force], axis=1)[self.rows], len(self.rows)
         best, slopes = settings.force_left_by_the_controller, None
         spread = float(np.std(signals[:, 1])) or 1.0
         for share in np.linspace(*settings.shares_of_a_record, settings.instants_tried):
@@ -162,12 +163,6 @@ class Witness:
         rate = np.gradient(self.reference, step)
         acceleration = np.gradient(rate, step)
         return rate, acceleration, np.gradient(acceleration, step)
-
-    def _deviations(self, signals: np.ndarray) -> np.ndarray:
-        """Subtract the means over each stretch between limits: the integral may have changed there."""
-        _, number, count = np.unique(self.stretch, return_inverse=True, return_counts=True)
-        means = np.stack([np.bincount(number, signal) / count for signal in signals.T], axis=1)
-        return signals - means[number]
 
 
 def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:

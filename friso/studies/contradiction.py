@@ -116,16 +116,16 @@ def standing_of(log: Log) -> Standing:
     signals = {name: values[rows] for name, values in log.signals.items()}
     part = Log(log.name, time, log.sample_time, signals, (slice(0, last - first),))
     whole = float(time[-1])
-    late = signals["position"][(last - first) // 2 :]
-    noise = noise_of(signals["position"])
-    rests = bool(np.ptp(late) <= max(settings.noises_at_rest * noise, 3 * digit_of(signals["position"])))
+    position = signals["position"]
+    noise, digit = noise_of(position), digit_of(position)
+    late = position[len(position) // 2 :]
+    rests = bool(np.ptp(late) <= max(settings.noises_at_rest * noise, 3 * digit))
     try:
         swings = swings_of(part)
     except InputError:
         return Standing(whole, None, None, rests)
-    fine = max(settings.noises_of_a_swing * noise_of(signals["position"]), 2 * digit_of(signals["position"]))
-    counts = len(np.unique(signals["position"])) <= settings.counts_of_a_dither
-    seen = swings.amplitude > fine and not counts
+    dithers = len(np.unique(position)) <= settings.counts_of_a_dither
+    seen = swings.amplitude > max(settings.noises_of_a_swing * noise, 2 * digit) and not dithers
     even = swings.amplitude_deviation < settings.unevenness_of_a_swing * swings.amplitude
     slow = swings.period > settings.samples_of_a_swing * log.sample_time
     lasts = swings.count * swings.period > settings.share_of_a_lasting_swing * whole

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.inverse_model import least_squares, motion
+from friso.identification.inverse_model import least_squares, motion, within_stretches
 from friso.identification.readings.common import low_pass, noise_of
 from friso.identification.settings import doubt_settings
 
@@ -90,13 +90,8 @@ def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.
 
 
 def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Subtract the means over each stretch from the columns of a control law and its force [N].
-
-    The integral may have changed between stretches, so each stretch has a constant force of its own.
-    """
-    _, number, count = np.unique(stretch, return_inverse=True, return_counts=True)
-    means = np.stack([np.bincount(number, signal) / count for signal in signals.T], axis=1)
-    deviations = signals - means[number]
+    """Return the columns of a control law and its force [N] as deviations from the means over each stretch."""
+    deviations = within_stretches(signals, stretch)
     return deviations[:, :-1], deviations[:, -1]
 
 

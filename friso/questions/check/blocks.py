@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from friso.hunting.criteria import PEAK_RULE
 from friso.questions.check.cases import case_document, rows, rows_behind
-from friso.questions.check.draws import draws_details, draws_document, draws_figure, draws_rows, draws_sentences
+from friso.questions.check.draws import (
+    draws_colours,
+    draws_details,
+    draws_document,
+    draws_figure,
+    draws_rows,
+    draws_sentences,
+)
 from friso.questions.check.isolator_words import isolator_document, isolator_sentence
 from friso.questions.check.laws import laws_columns, laws_document, laws_rows, laws_sentences
 from friso.questions.check.levels import levels_document, levels_sentence
@@ -42,7 +49,7 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
     stage, cases, draws = check.stage, shown_cases(check.result), check.draws
     omitted = left_out(stage)
     at_centre = AnswerBlock(
-        title=f"{stage.name}, at the centre of its ranges".removeprefix(", ") if draws else stage.name,
+        title=f"{stage.name or 'The stage'}, at the centre of its ranges" if draws else stage.name,
         columns=cases,
         rows=rows(cases),
         details=[*_over_ranges(check), *details_of(check.result), *([f"{omitted}."] if omitted else [])],
@@ -52,7 +59,7 @@ def blocks(check: CheckAnswer) -> Iterator[AnswerBlock]:
     notes = filter(None, [stage.controller.note(stage.flat()), stage.note])
     says, colours = [*_verdicts(check), *motion_sentences(stage), *notes], [item.colour for item in cases]
     if draws:
-        yield AnswerBlock(sentences=says, colours=[] if check.cut else colours)
+        yield AnswerBlock(sentences=says, colours=[] if check.cut else draws_colours(draws))
         yield at_centre
     else:
         if check.cut:

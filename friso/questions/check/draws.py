@@ -11,6 +11,7 @@ import numpy as np
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.quantities import plain_factor
+from friso.questions.check.words import speed_text
 from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import Axis, Band, Figure, Panel
 from friso.shown.drawing.palette import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION
@@ -18,12 +19,10 @@ from friso.shown.drawing.prefixes import (
     NOTHING,
     percentage,
     range_with_unit,
-    rounded_up,
     share_with_interval,
     with_unit,
 )
 from friso.shown.unknown import if_so
-from friso.stage import Stage
 from friso.studies.draws import DrawnBandwidths, Draws, Fates
 from friso.studies.settings import settings
 
@@ -65,6 +64,16 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
         for key in strongest
     ]
     return rows
+
+
+def draws_colours(draws: Draws) -> list[str]:
+    """Return the colours of the verdicts on the machines drawn, with the joint as given, locked and free."""
+
+    def colour(name: str) -> str:
+        hunting = np.isin(draws.fates[name].verdicts, ATTRACTED).any()
+        return COLOURS["bistable" if draws.split(name) else "hunts" if hunting else "settles"]
+
+    return [colour(name) for name in case_labels(draws.stage)]
 
 
 def draws_sentences(draws: Draws) -> list[str]:
@@ -156,7 +165,8 @@ def _at_other_bandwidths(name: str, draws: Draws) -> str:
         freed = _freed(name, draws, ", or free the joint")
         quiet = int(np.count_nonzero(tried.at(low) == 0))
         seen = f"{quiet} of {count} machines surely do not hunt there"
-        return f" Cure: {_faster(draws.stage, tried, low)}, up to {bandwidth(high)} at least ({seen}){freed}."
+        speed = speed_text(draws.stage.controller, tried.own, low)
+        return f" Cure: {speed}, up to {bandwidth(high)} at least ({seen}){freed}."
     if edge is None:
         return f" None of {count} hunts at {bandwidth(float(tried.factors[0]))} either."
     never = int(np.isnan(tried.edges[0]).sum())
@@ -175,18 +185,6 @@ def _freed(name: str, draws: Draws, text: str) -> str:
 def _bandwidth(tried: DrawnBandwidths, factor: float) -> str:
     """Write a bandwidth by its factor: in Hz, or as a multiple if the controller states none."""
     return f"{plain_factor(factor)} times yours" if tried.own is None else with_unit(factor * tried.own, "Hz", 3)
-
-
-def _faster(stage: Stage, tried: DrawnBandwidths, factor: float) -> str:
-    """Name a faster controller by its bandwidth, or by its gains if it states none."""
-    controller = stage.controller
-    if tried.own is not None:
-        name = controller.bandwidth_name if controller.bandwidth_name == "crossover" else controller.bandwidth_key
-        return f"{name} {with_unit(rounded_up(factor * tried.own), 'Hz')}"
-    factor = rounded_up(factor)
-    powers = controller.speeds_up.items()
-    gains = [f"{gain} × {factor**power:.3g}" for gain, power in powers if getattr(controller, gain)]
-    return f"a controller {plain_factor(factor)} times as fast ({', '.join(gains)})"
 
 
 def _ends_of_hunting(tried: DrawnBandwidths) -> tuple[float, float] | None:

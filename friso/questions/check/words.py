@@ -37,7 +37,7 @@ from friso.shown.drawing.prefixes import (
 from friso.shown.loop_words import unstable_where
 from friso.shown.motion_words import dwell_sentences, following_sentence, stick_slip_sentences
 from friso.shown.unknown import if_so
-from friso.stage.controllers import FORCE_LIMIT, integral_leak
+from friso.stage.controllers import FORCE_LIMIT, ControllerSection, integral_leak
 from friso.stage.motion import motion_of
 from friso.stage.section import numeric_fields
 
@@ -558,14 +558,22 @@ def _to(case: Case, advice: BandwidthAdvice) -> str:
     elif case.static_friction and not advice.just_beyond:
         remarks.append("not examined with other static friction")
     remark = f" ({'; '.join(remarks)})" if remarks else ""
-    if crossover is not None:
-        name = _elsewhere(case) or case.stage.controller.bandwidth_name
-        value = (rounded_up if up else rounded_down)(advice.factor * crossover)
-        return f"{name.replace('_', ' ') if '.' not in name else name} {with_unit(value, 'Hz')}{remark}"
-    factor = (rounded_up if up else rounded_down)(advice.factor)
-    powers = case.stage.controller.speeds_up.items()
-    gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(case.stage.controller, name)]
-    return f"a controller {plain_factor(factor)} times as fast ({', '.join(gains)}){remark}"
+    return f"{speed_text(case.stage.controller, crossover, advice.factor, up)}{remark}"
+
+
+def speed_text(controller: ControllerSection, own: float | None, factor: float, up: bool = True) -> str:
+    """Name a controller that is faster or slower by a factor: by its bandwidth, or by its gains if it states none.
+
+    `own` is its present bandwidth [Hz]. The value is rounded up if `up` is true, otherwise down.
+    """
+    away = rounded_up if up else rounded_down
+    if own is not None:
+        crossover = controller.bandwidth_name == "crossover" or not controller.bandwidth_key
+        name = controller.bandwidth_name.replace("_", " ") if crossover else controller.bandwidth_key
+        return f"{name} {with_unit(away(factor * own), 'Hz')}"
+    factor, powers = away(factor), controller.speeds_up.items()
+    gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
+    return f"a controller {plain_factor(factor)} times as fast ({', '.join(gains)})"
 
 
 def _capital(text: str) -> str:

@@ -20,6 +20,7 @@ from friso.questions.identify.figures import identify_figures
 from friso.questions.identify.words import headline
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
+from friso.shown.drawing.palette import ORANGE
 from friso.shown.files import Content
 from friso.stage.correlations import correlations_file, correlations_text
 
@@ -40,16 +41,11 @@ def blocks(answer: IdentifyAnswer) -> list[AnswerBlock]:
         draw=lambda: identify_figures(result, predictions),
         numbers=lambda: identify_document(result, inputs, predictions),
     )
-    against = [
-        AnswerBlock(
-            sentences=[text for name, one in answer.compared.items() for text in against_sentences(name, suspect, one)],
-            numbers=lambda: plain_json(
-                {"against": [against_document(name, one) for name, one in answer.compared.items()]}
-            ),
-        )
-        for suspect in [answer.suspect]
-        if suspect is not None
-    ]
+    besides = AnswerBlock(
+        sentences=_compared(answer),
+        numbers=lambda: plain_json({"against": [against_document(name, one) for name, one in answer.compared.items()]}),
+    )
+    against = [besides] if answer.suspect is not None else []
     if checked is None:
         return [*against, identified]
     verdict = AnswerBlock(sentences=checked.sentences(), numbers=lambda: {"check": checked.document()})
@@ -60,12 +56,25 @@ def blocks(answer: IdentifyAnswer) -> list[AnswerBlock]:
     return [*against, verdict, identified, *tables]
 
 
+def _compared(answer: IdentifyAnswer) -> list[str]:
+    """Say of each log whether it contradicts the verdict on the suspected stage; nothing without one."""
+    stage = answer.suspect
+    if stage is None:
+        return []
+    return [text for name, one in answer.compared.items() for text in against_sentences(name, stage, one)]
+
+
+def _asked_besides(answer: IdentifyAnswer) -> list[str]:
+    """Return what the answer says besides the estimates: the comparison with a stage, and the verdict."""
+    return [*_compared(answer), *(answer.checked.sentences() if answer.checked else [])]
+
+
 def page_values(answer: IdentifyAnswer) -> dict[str, Any]:
     """Return what the page shows beside the figures: estimates, experiments, predictions, and logs as read."""
     identification = answer.result
     several = zip(identification.experiments, words.labels(identification), strict=True)
     return {
-        "verdicts": words.headline(identification),
+        "verdicts": [*((ORANGE, text) for text in _asked_besides(answer)), *words.headline(identification)],
         "columns": words.COLUMNS,
         "rows": words.estimate_rows(identification),
         "files": words.read_rows(answer.inputs),

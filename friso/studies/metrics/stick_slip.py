@@ -17,20 +17,25 @@ def sliding(run: RunEvidence) -> np.ndarray:
         return np.full(count, "no ramp", dtype=object)
     speed = np.broadcast_to(np.asarray(flat[VELOCITY], float), (count,))
     lasts, decided, _ = lasting_swings({**flat, VELOCITY: speed}, count)
-    return np.where(decided, np.where(lasts, "sticks and slips", "smooth"), "undecided").astype(object)
+    return np.where(decided, np.where(lasts, "sticks", "slides"), "undecided").astype(object)
 
 
 METRIC = Metric(
     "Motion at constant speed",
     sliding,
     words=(
-        Word("sticks and slips", "vermillion", "the error about the moving reference keeps swinging, from rest"),
+        Word(
+            "sticks",
+            "vermillion",
+            "the error about the moving reference keeps swinging, from rest",
+            label="sticks and slips",
+        ),
         Word("undecided", "mauve", "whether the swing lasts was not decided in long runs", is_open=True),
-        Word("smooth", "quiet", "the swing about the moving reference dies out"),
+        Word("slides", "quiet", "the swing about the moving reference dies out", label="slides smoothly"),
         Word("no ramp", "pink", "the reference does not move at constant speed against friction", is_open=True),
     ),
     place=73,
     criterion="whether the swing of the error lasts from a long run to a longer one, from rest",
-    findings=(MapFinding("The stage sticks and slips", ("sticks and slips",)),),
+    findings=(MapFinding("The stage sticks and slips", ("sticks",)),),
     doubt=("undecided", "In {share} of the map it was not decided whether the swing lasts."),
 )
