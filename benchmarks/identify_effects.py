@@ -73,6 +73,7 @@ class Effects:
     sign: float = 1.0
     damping_falls: float = 1.0
     damping_at_rest: float = 1.0
+    by_direction: float = 0.0
 
 
 @njit(cache=True)
@@ -82,6 +83,7 @@ def _run(reference, speed, p, step, parts):
     grows, place, cogging, pitch = p[9], p[10], p[11], p[12]
     load, stiffness, damping, play = p[13], p[14], p[15], p[16]
     later, gain, on_load, gain_fast, gain_beyond, falls = p[17], p[18], p[19], p[20], p[21], p[22]
+    by_direction = p[24]
     n = len(reference)
     position, force = np.zeros(n), np.zeros(n)
     h = step / parts
@@ -106,6 +108,7 @@ def _run(reference, speed, p, step, parts):
         for _ in range(parts):
             factor = 1.0 + place * np.sin(2 * np.pi * x / (0.6 * pitch * 10))
             slides = w if on_load > 0 else v
+            factor *= 1.0 + (by_direction if slides > 0 else -by_direction)
             curve = np.exp(-((slides / stribeck) ** 2))
             level = (coulomb + (static - coulomb) * curve) * factor + grows * abs(u)
             new = (z + h * slides) / (1 + h * bristle * abs(slides) / level)
@@ -142,7 +145,7 @@ def simulated(machine: Effects, rng: np.random.Generator) -> Log:
         machine.load_friction, machine.by_place, machine.cogging, machine.pitch, machine.load, machine.stiffness,
         machine.damping, machine.play, machine.most, machine.gain_after, machine.on_load,
         machine.gain_fast, machine.gain_beyond, machine.damping_falls,
-        machine.damping_at_rest,
+        machine.damping_at_rest, machine.by_direction,
     ])  # fmt: skip
     position, force = _run(reference, wanted, numbers, STEP, PARTS)
     late = machine.late + (machine.late_at_end - machine.late) * clock / TIME if machine.late_at_end else machine.late
@@ -203,6 +206,10 @@ def _by_place(m: dict[str, float], rng: np.random.Generator) -> dict[str, float]
     return {"by_place": rng.uniform(0.15, 0.4), "pitch": _between(rng, 0.02, 0.06)}
 
 
+def _by_direction(m: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
+    return {"by_direction": rng.uniform(0.08, 0.2) * rng.choice([-1, 1])}
+
+
 def _cogging(m: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
     return {"cogging": m["coulomb"] * rng.uniform(0.12, 0.4), "pitch": _between(rng, 0.01, 0.05)}
 
@@ -251,6 +258,7 @@ FAMILIES: Mapping[str, tuple[Callable[[dict[str, float], np.random.Generator], d
     "load friction": (_load_friction, ("load-friction",)),
     "play": (_play, ("play",)),
     "friction by place": (_by_place, ("friction-by-place",)),
+    "friction by direction": (_by_direction, ("friction-by-direction",)),
     "cogging": (_cogging, ("cogging",)),
     "second mode": (_second_mode, ("coupling", "oscillation")),
     "delay": (_delay, ("delay", "timing")),

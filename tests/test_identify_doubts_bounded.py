@@ -127,7 +127,7 @@ def test_an_effect_larger_than_the_force_does_not_lead(
     fitted = FittedCase(case.log, case.inverse, flat={}, fit=cast(Any, fit), velocity=residual)
     explained = ExplainedResidual(np.zeros(1), np.array([size * largest]), 0.1, residual, np.eye(1))
     monkeypatch.setattr(doubts, "effects_of", lambda forces, units, fit: [None] * len(forces))
-    monkeypatch.setattr(doubts, "beside_all_numbers", lambda fit: (residual, np.zeros((len(residual), 1))))
+    monkeypatch.setattr(doubts, "beside_all_numbers", lambda fit, further: (residual, np.zeros((len(residual), 1))))
     monkeypatch.setattr(doubts, "explained_by", lambda *arguments: explained)
     made_up = Doubt("fit", lambda case: (), "", "", "", forces=lambda case: [TriedForces([residual], [1.0])])
     monkeypatch.setattr(doubts, "_at", lambda moment: ["made-up"])

@@ -53,6 +53,19 @@ def test_bristles_are_refused_if_their_damping_falls_with_the_speed(seed: int, f
     assert stiffness.reason == decaying_damping.WHY if falls else stiffness.holds(machine["bristle"])
 
 
+@pytest.mark.parametrize("share", [-0.15, 0.12])
+def test_friction_that_differs_by_direction_is_no_constant_force(share: float) -> None:
+    """A fit takes the difference for a constant force, whose interval must hold the truth: nothing."""
+    rng = np.random.default_rng((2, 56))
+    machine = plain(rng)
+    log = simulated(Effects(**machine, by_direction=share), rng)
+    moves = KIND.analyse([log], Prior(KIND.around(log)), NOTHING_CHOSEN)
+    (size,) = (one.size for one in moves.quality.findings if one.doubt == "friction-by-direction")
+    assert size == pytest.approx(abs(share), rel=0.3)
+    (force,) = (one for one in moves.estimates if one.name == "bias.cart")
+    assert force.holds(0.0)
+
+
 def test_a_constant_force_hides_no_effect() -> None:
     """Cogging of an eighth of Coulomb friction shows, though the axis carries 120 times as much."""
     rng = np.random.default_rng((1, 56))

@@ -29,8 +29,9 @@ from friso.identification.output_error.effects import (
     explained_by_forces,
     reaching_over,
 )
-from friso.identification.output_error.parameters import BRISTLES
+from friso.identification.output_error.parameters import BRISTLES, CURVE, MASS
 from friso.identification.output_error.settings import settings
+from friso.identification.readings.common import deflections, stribeck_curve
 from friso.identification.settings import doubt_settings
 from friso.identification.witness import Replay
 from friso.progress import Progress, silent
@@ -148,6 +149,32 @@ class FittedCase(RecordCase):
     flat: Mapping[str, Any]
     fit: OutputErrorFit
     velocity: np.ndarray
+
+    def bristles(self) -> FollowedBristles | None:
+        """Return the fitted bristles as they follow the log; None if the fit has no such bristles."""
+        fit = self.fit
+        if not {*BRISTLES, *CURVE, MASS, "friction.coulomb"} <= {*fit.problem.names}:
+            return None
+        position = self.log["position"][self.log.longest] if fit.problem.closed else fit.problem.inputs.reference
+        speed = np.abs(np.gradient(position, self.log.sample_time))
+        coulomb, (ratio, velocity, exponent) = fit.value("friction.coulomb"), (fit.value(name) for name in CURVE)
+        level = stribeck_curve(speed, coulomb, ratio * coulomb, velocity, exponent)
+        bend = deflections(np.diff(position), level[1:] / fit.value(BRISTLES[0]))
+        return FollowedBristles(bend, np.gradient(bend, self.log.sample_time), level, speed / velocity)
+
+
+@dataclass(frozen=True)
+class FollowedBristles:
+    """Bristles under a body that follows a log, at n samples, shape (n,) each.
+
+    `bend` [m] and its `rate` [m/s] are their deflection, `level` [N] is friction at a steady speed without its viscous
+    part, and `speed` is in Stribeck velocities.
+    """
+
+    bend: np.ndarray
+    rate: np.ndarray
+    level: np.ndarray
+    speed: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -319,7 +346,8 @@ class Doubt:
     which measurement it is decided (`decided_by`). `after` names doubts that are examined earlier. `forces` returns
     forces that the effect would add, to be fitted to the residual. The doubt whose forces explain most leads, and no
     other doubt names a cause. An effect of `places` shows in a record only that passes its way more than once, because
-    a single pass does not tell a place from a time.
+    a single pass does not tell a place from a time. One that is a matter of form (`of_form`) is another form of what
+    the model has: it may be there beside any other effect, and never leads.
     """
 
     moment: Moment
@@ -330,6 +358,7 @@ class Doubt:
     after: tuple[str, ...] = ()
     forces: Callable[[FittedCase], Iterable[TriedForces]] | None = None
     places: bool = False
+    of_form: bool = False
 
 
 DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
@@ -376,19 +405,26 @@ def way_of(velocity: np.ndarray) -> np.ndarray:
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
-    """Return the effect whose forces explain most of a fit's residual; None if none suffices."""
-    best: LeadingEffect | None = None
+    """Return the effect whose forces explain most of a fit's residual; None if none suffices.
+
+    Effects are examined beside those that are a matter of form, as far as these are sure.
+    """
     names = [name for name in _at("fit") if _may_show(name, case)]
-    searches = [(name, tries) for name in names if (tries := DOUBTS[name].forces) is not None]
-    every = [(name, tried) for name, tries in searches for tried in tries(case)]
+    every = [(name, tried) for name in names if (tries := DOUBTS[name].forces) is not None for tried in tries(case)]
     forces = [force for _, tried in every for force in tried.forces]
     if not forces:
         return None
-    largest = case.largest(case.unit)
     effects = iter(effects_of(forces, [unit for _, tried in every for unit in tried.units], case.fit))
-    rest, slopes = beside_all_numbers(case.fit)
-    for name, tried in every:
-        own = [*islice(effects, len(tried.forces))]
+    columns = [(name, tried, [*islice(effects, len(tried.forces))]) for name, tried in every]
+    power, further = float(case.fit.residual @ case.fit.residual), []
+    for _, tried, own in (one for one in columns if DOUBTS[one[0]].of_form):
+        explained = explained_by(case.fit.linearised[1], case.fit.linearised[0], own, case.fit.problem.counted)
+        if explained is not None and explained.sizes[0] > tried.least and explained.sure(case.fit)[0]:
+            power, further = float(explained.rest @ explained.rest), [*further, *own]
+    rest, slopes = beside_all_numbers(case.fit, further)
+    best: LeadingEffect | None = None
+    largest = case.largest(case.unit)
+    for name, tried, own in (one for one in columns if not DOUBTS[one[0]].of_form):
         explained = explained_by(slopes, rest, own, case.fit.problem.counted, tried.searched)
         if explained is None or explained.sizes.max() < tried.least:
             continue
@@ -398,7 +434,7 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
             best = LeadingEffect(name, tried, explained)
     if best is None:
         return None
-    of_all = float(rest @ rest) / float(case.fit.residual @ case.fit.residual)
+    of_all = float(rest @ rest) / power
     left, moved = 1 - of_all * (1 - best.explained.left), best.explained.moved[[*case.fit.free]]
     enough = left <= doubt_settings.power_left_by_an_effect
     return replace(best, explained=replace(best.explained, moved=moved, left=left)) if enough else None

@@ -95,12 +95,6 @@ class DoubtSettings(Settings):
     """Factor on intervals if a large residual is unexplained, and on intervals of slow friction if any is. Without it,
     intervals missed the truth by up to 1.8 half-widths on known machines with filtered signals."""
 
-    sample_share_of_a_direction: float = setting(0.2, "")
-    """Smallest fraction of the counted samples in one direction for a separate fit."""
-
-    cost_share_of_either_direction: float = setting(0.5, "")
-    """Largest ratio of the sums of squares of separate and common fits that shows friction differing by direction."""
-
     bandwidths_of_a_coupling: float = setting(2.0, "")
     """Cut-off of the motion in tests for a coupling, relative to its bandwidth. For 3 kg with a third behind 40 Hz, 2
     and 3 correct a mass 1.3 % too large; 5 corrects half of the error."""
@@ -143,9 +137,11 @@ class DoubtSettings(Settings):
     digits_of_a_play: float = setting(5.0, "")
     """Smallest width of a play that can be named, in steps of the position."""
 
-    falling_dampings: tuple[float, ...] = setting((0.3, 1.0, 3.0), "")
-    """Dampings at rest of bristles whose damping falls with the speed, relative to half of the critical damping of the
-    mass on them."""
+    tried_falling_damping: float = setting(0.1, "")
+    """Tried damping at rest of bristles whose damping falls with the speed, relative to half of the critical one."""
+
+    least_falling_damping: float = setting(0.1, "")
+    """Smallest fitted damping at rest that counts as falling, relative to half of the critical one."""
 
     stiffer_bristles: tuple[float, ...] = setting((4.0, 8.0, 16.0), "")
     """Stiffnesses of bristles that are tried beside the fitted one, relative to it."""

@@ -1,61 +1,56 @@
-"""Doubt: forward and backward friction differ in more than their levels."""
+"""Doubt: dry friction differs between forward and backward motion."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
-from friso.identification.output_error.fit import everywhere, fits
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
+from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.settings import doubt_settings
-from friso.intervals import NORMAL_COVERAGE
-from friso.progress import between
+from friso.quantities import percent
 
-EITHER = ("friction.viscous_asymmetry", "bias.cart", "bias.stage")
-"""Keys that motion in one direction cannot separate from friction."""
+WHAT = ("Dry friction", "What static friction has beyond Coulomb friction")
+"""What differs, by the label of the tried forces."""
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit forward and backward motion separately, if the common fit does not explain both.
+    """Name friction that differs by direction if it explains most of the residual.
 
-    The model has one static friction, one Stribeck velocity and one set of bristles for both directions. If these
-    differ, the common fit need not lie between them, so intervals are widened to reach both results. If the model lacks
-    something, starts spread over the whole ranges of the parameters, because the common fit may be far from either
-    optimum.
+    A constant force takes most of the difference in the fit. Its interval reaches to what it would be without, also
+    where the difference is sure and explains little.
     """
-    both = case.fit
-    if both.explains(case.quality.noise):
+    effect = case.led_by("friction-by-direction")
+    if effect is None:
+        for _, explained in case.explained(forces):
+            if explained.sure(case.fit)[0]:
+                yield RaisedDoubt(fit=case.reaching(explained.moved))
         return
-    names = both.problem.names
-    free = tuple(i for i in both.free if names[i] not in EITHER)
-    counted = both.problem.counted
-    ways = [counted * (way * case.velocity > 0) for way in (1, -1)]
-    if min(way.sum() for way in ways) < doubt_settings.sample_share_of_a_direction * counted.sum():
-        return
-    problems = [replace(both.problem, counted=way, unsettled=()) for way in ways]
-    starts = everywhere(both.problem, free, both.inner) if case.quality.lacks_something else both.inner[None]
-    progress = between(case.progress, 0, 1, "moves: forward and backward motion alone")
-    alone = fits(problems, free, starts, progress)
-    off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / NORMAL_COVERAGE
-    left = sum(one.cost for one in alone) * len(counted) / counted.sum()
-    reaching = both.with_deviations(np.maximum(off, both.deviation))
-    if left >= doubt_settings.cost_share_of_either_direction * both.left**2:
-        yield RaisedDoubt(fit=reaching)
-        return
-    less = float(np.sqrt(left))
+    (share,) = effect.explained.sizes
+    what, way = WHAT[int(effect.tried.label)], "forward" if share > 0 else "backward"
     words = (
-        f"Friction differs between forward and backward motion by more than its level: either alone leaves "
-        f"{less:.2g} {case.unit} unexplained, both together {both.left:.2g} {case.unit}"
+        f"{what} is about {percent(abs(float(share)))} higher {way} and lower the other way: the stage file has one "
+        "for both, and the intervals allow for it; slow passes to and fro would show it"
     )
-    yield RaisedDoubt(words=words, size=less, unit=case.unit, fit=reaching, spoils=True)
+    yield RaisedDoubt(words=words, size=abs(float(share)), fit=case.reaching(effect.explained.moved), spoils=True)
+
+
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield the force of bristles that are stronger forward, and that of a Stribeck effect that is."""
+    bristles = case.bristles()
+    if bristles is None:
+        return
+    coulomb, force = case.fit.value("friction.coulomb"), np.abs(case.fit.value(BRISTLES[0]) * bristles.bend)
+    for label, against in enumerate((force, force * (1 - coulomb / bristles.level))):
+        yield TriedForces([-against], [doubt_settings.friction_share_of_a_tried_force], label)
 
 
 DOUBT = Doubt(
     "fit",
     find,
-    "fits to the forward and to the backward motion alone",
-    "intervals reach to both; friction at low speed is refused",
+    "Coulomb friction and a Stribeck effect that are stronger in one direction",
+    "intervals widen, also that of the constant force; friction at low speed is refused",
     "slow passes to and fro",
+    forces=forces,
 )

@@ -91,15 +91,16 @@ def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units:
     return explained is not None and bool(explained.sure(fit)[-1])
 
 
-def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
-    """Return the residual after a linear refit of all parameters, with its derivatives.
+def beside_all_numbers(fit: OutputErrorFit, further: Sequence[np.ndarray] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """Return the residual after a linear refit of all parameters and `further` effects, with its derivatives.
 
-    The residual [N] has the shape (n,), the derivatives (n, parameters).
+    The residual [N] and each of the effects have the shape (n,), the derivatives (n, parameters + effects).
 
     Parameters that the log does not determine take part: what they explain, such as the Stribeck effect at a reversal,
     is no effect outside the model.
     """
     rest, slopes = fit.problem.linearised(fit.inner, np.ones(len(fit.inner), bool))
+    slopes = np.column_stack([slopes, *further])
     size = np.linalg.norm(slopes, axis=0)
     usable = np.isfinite(size) & (size > 0)
     scaled = slopes[:, usable] / size[usable]

@@ -133,36 +133,14 @@ def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
     """Fit the `free` parameters of a problem, given by index, from several starts.
 
-    The starts have the shape (starts, parameters). All are simulated, and the best of them refined. Parameters that are
-    not free stay as in the first start.
+    The starts have the shape (starts, parameters). All are simulated, and the best of them refined in rounds that keep
+    fewer and fewer. The quality of a start shows after a few iterations, on pieces of a long record: for a stage that
+    sticks and slips the best starts often lead to worse optima. Parameters that are not free stay as in the first
+    start.
     """
-    return fits([problem], free, starts, progress)[0]
-
-
-def fits(
-    problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
-) -> list[OutputErrorFit]:
-    """Fit several problems that differ only in the samples that count, from equal starts.
-
-    The starts, shape (starts, parameters), are simulated once for all problems. `free` has the indices of the
-    parameters to fit.
-    """
-    pieces, works = _parts(problems[0], len(starts)), 1 + len(problems)
-    ranked = _ranked(problems, pieces, starts, share_of(progress, 0, works))
-    return [
-        _fit(problem, pieces, free, tried, share_of(progress, number, works))
-        for number, (problem, tried) in enumerate(zip(problems, ranked, strict=True), 1)
-    ]
-
-
-def _fit(
-    problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray, progress: Progress
-) -> OutputErrorFit:
-    """Refine the best starts in rounds that keep fewer and fewer, and finish the best one.
-
-    The quality of a start shows after a few iterations, on pieces of a long record: for a stage that sticks and slips
-    the best starts often lead to worse optima.
-    """
+    pieces = _parts(problem, len(starts))
+    tried = _best_starts(problem, pieces, starts, share_of(progress, 0, 2))
+    progress = share_of(progress, 1, 2)
     mask = np.zeros(tried.shape[1], bool)
     mask[list(free)] = True
     rough = [problem] if problem.closed else [problem.part(piece) for piece in pieces]
@@ -222,21 +200,19 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
     return starts
 
 
-def _ranked(
-    problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
-) -> list[np.ndarray]:
-    """Return the best starts of each problem, (tried, parameters), and always the first start."""
+def _best_starts(problem: Problem, pieces: Sequence[slice], starts: np.ndarray, progress: Progress) -> np.ndarray:
+    """Return the best starts of a problem, (tried, parameters), beginning with the first start."""
     if len(starts) <= settings.starts_refined_first:
-        return [starts] * len(problems)
-    sums = np.zeros((len(problems), len(starts) - 1))
-    tally = Tally(progress, len(pieces) * (len(starts) - 1))
+        return starts
+    sums = np.zeros(len(starts) - 1)
+    tally = Tally(progress, len(pieces) * len(sums))
     for piece in pieces:
-        part, counted = problems[0].part(piece), np.stack([problem.counted[piece] for problem in problems])
+        part = problem.part(piece)
         for numbers, record in part.simulated(starts[1:]):
-            sums[:, numbers] += counted**2 @ ((part.target - record.force) ** 2).T
+            sums[numbers] += (part.target - record.force) ** 2 @ part.counted**2
             tally.add(len(numbers), "")
-    best = np.argsort(np.where(np.isfinite(sums), sums, np.inf), axis=1)[:, : settings.starts_refined_first - 1]
-    return [np.vstack([starts[0], starts[1:][chosen]]) for chosen in best]
+    best = np.argsort(np.where(np.isfinite(sums), sums, np.inf))[: settings.starts_refined_first - 1]
+    return np.vstack([starts[0], starts[1:][best]])
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:
