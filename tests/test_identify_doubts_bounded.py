@@ -129,6 +129,7 @@ def test_an_effect_larger_than_the_force_does_not_lead(
     monkeypatch.setattr(doubts, "effects_of", lambda forces, units, fit: [None] * len(forces))
     monkeypatch.setattr(doubts, "beside_all_numbers", lambda fit, further: (residual, np.zeros((len(residual), 1))))
     monkeypatch.setattr(doubts, "explained_by", lambda *arguments: explained)
+    monkeypatch.setattr(ExplainedResidual, "sure", lambda own, fit: np.ones(1, bool))
     made_up = Doubt("fit", lambda case: (), "", "", "", forces=lambda case: [TriedForces([residual], [1.0])])
     monkeypatch.setattr(doubts, "_at", lambda moment: ["made-up"])
     monkeypatch.setitem(DOUBTS.added, "made-up", (made_up, "made up"))

@@ -405,7 +405,7 @@ def way_of(velocity: np.ndarray) -> np.ndarray:
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
-    """Return the effect whose forces explain most of a fit's residual; None if none suffices.
+    """Return the effect whose forces explain most of a fit's residual, and surely; None if none does.
 
     Effects are examined beside those that are a matter of form, as far as these are sure.
     """
@@ -422,22 +422,21 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
         if explained is not None and explained.sizes[0] > tried.least and explained.sure(case.fit)[0]:
             power, further = float(explained.rest @ explained.rest), [*further, *own]
     rest, slopes = beside_all_numbers(case.fit, further)
-    best: LeadingEffect | None = None
-    largest = case.largest(case.unit)
+    of_all, largest, led = float(rest @ rest) / power, case.largest(case.unit), []
     for name, tried, own in (one for one in columns if not DOUBTS[one[0]].of_form):
         explained = explained_by(slopes, rest, own, case.fit.problem.counted, tried.searched)
         if explained is None or explained.sizes.max() < tried.least:
             continue
         if np.sqrt(np.mean((explained.sizes @ np.stack([*tried.forces])) ** 2)) > largest:
             continue  # no record contains it; a delay may exceed the force at its steps, for some samples
-        if best is None or explained.left < best.explained.left:
-            best = LeadingEffect(name, tried, explained)
-    if best is None:
-        return None
-    of_all = float(rest @ rest) / power
-    left, moved = 1 - of_all * (1 - best.explained.left), best.explained.moved[[*case.fit.free]]
-    enough = left <= doubt_settings.power_left_by_an_effect
-    return replace(best, explained=replace(best.explained, moved=moved, left=left)) if enough else None
+        left = 1 - of_all * (1 - explained.left)
+        if left <= doubt_settings.power_left_by_an_effect:
+            led.append(LeadingEffect(name, tried, replace(explained, left=left)))
+    for effect in sorted(led, key=lambda effect: effect.explained.left):
+        if effect.explained.sure(case.fit).any():
+            moved = effect.explained.moved[[*case.fit.free]]
+            return replace(effect, explained=replace(effect.explained, moved=moved))
+    return None
 
 
 def judged_fit(case: FitCase) -> FitCase:
