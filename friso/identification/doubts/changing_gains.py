@@ -65,7 +65,8 @@ def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.
     error = wanted.position - motion(log["position"][part], step, cutoff).position
     raw = np.abs(log["force"][part])
     below_limit = raw < raw.max() - doubt_settings.deviations_at_a_limit * noise_of(log["force"][part])
-    inside = minimum_filter1d(below_limit, 2 * round(1 / (cutoff * step)) + 1)
+    blurred = round(1 / (cutoff * step))  # samples that the filter reaches, also beyond the ends
+    inside = minimum_filter1d(below_limit, 2 * blurred + 1, mode="constant", cval=0)
     stretch = np.cumsum(np.diff(inside.astype(int), prepend=int(inside[0])) > 0)
     speed = np.abs(wanted.velocity)
     creep = doubt_settings.speed_share_of_creeping * speed.max()

@@ -19,8 +19,8 @@ from friso.quantities import percent
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the width of the play if a load with play explains most of the residual.
 
-    If the widest play that may be tried explains most, something slower is the cause; if the narrowest does, something
-    quicker, such as bristles. If the play is hardly wider than the steps of the position, they may be it. No play is
+    If one of the two widest plays that are tried explains most, something slower is the cause; if one of the two
+    narrowest does, something quicker, such as bristles. If the play is hardly wider than the steps of the position, they may be it. No play is
     named then, but the intervals are widened.
     """
     effect = case.led_by("play")
@@ -37,8 +37,10 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
     named, digit = case.named(effect, words, width, "m"), digit_of(case.log["position"][case.log.longest])
-    unsure = np.isclose(width, doubt_settings.plays_tried).any() or width < doubt_settings.digits_of_a_play * digit
-    yield replace(named, words="", explains=False) if unsure else named
+    low, high = doubt_settings.plays_tried
+    near = doubt_settings.ratio_of_plays**1.5  # the ends of the tried widths, and those next to them
+    inside = max(near * low, doubt_settings.digits_of_a_play * digit) < width < high / near
+    yield named if inside else replace(named, words="", explains=False)
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
