@@ -20,8 +20,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the width of the play if a load with play explains most of the residual.
 
     If one of the two widest plays that are tried explains most, something slower is the cause; if one of the two
-    narrowest does, something quicker, such as bristles. If the play is hardly wider than the steps of the position, they may be it. No play is
-    named then, but the intervals are widened.
+    narrowest does, something quicker, such as bristles. If the play is hardly wider than the steps of the position,
+    they may be it. No play is named then, but the intervals are widened.
     """
     effect = case.led_by("play")
     if effect is None:
