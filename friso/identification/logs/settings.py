@@ -84,6 +84,9 @@ class LogSettings(Settings):
     samples_of_a_reading: int = setting(64, "")
     """Fewest samples from which channels are recognised by mechanics (force, acceleration). Fewer fit by chance."""
 
+    pairs_of_a_reading: int = setting(1000, "")
+    """Largest number of pairs of a force and a motion that are tried. More take minutes, and one fits by chance."""
+
     samples_of_a_scale: float = setting(2.0, "")
     """Width of smoothing before differentiation on each time scale, in samples. With less, noise dominates."""
 
@@ -124,6 +127,14 @@ class LogSettings(Settings):
     bytes_unpacked_per_byte: int = setting(300, "")
     """Further bytes that a byte of a packed file may unpack to. Texts of numbers shrink to a hundredth at most."""
 
+    # A look at a large file, before it is analysed.
+    bytes_of_a_part: int = setting(1 << 19, "B")
+    """Size of the beginning, the middle and the end of a text of which a sample is read. Smaller texts are read as a
+    whole: that takes a second."""
+
+    samples_of_a_look: int = setting(100_000, "")
+    """Number of first samples from which `friso logs` recognises the kind of experiment."""
+
     # Values.
     largest_value: float = setting(1e30, "")
     """Largest number of an instrument. Beyond it, squares of squares overflow."""
@@ -138,8 +149,8 @@ class LogSettings(Settings):
     rows_of_a_table_begun: int = setting(50, "")
     """Number of rows within which another one has the length of the first row of a table."""
 
-    columns_of_a_table: int = setting(10_000, "")
-    """Largest number of columns of a table. Reading more takes seconds."""
+    columns_of_a_table: int = setting(2000, "")
+    """Largest number of columns of a table. Asking more for their roles takes ten seconds."""
 
     share_of_cells_of_other_topics: float = setting(0.25, "")
     """Share of empty cells above which rows belong to several topics with instants of their own. Two topics of equal
