@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from friso.errors import LogError
-from friso.identification.kind import Source
 from friso.identification.kinds import KINDS
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.channel import Channel
@@ -21,7 +20,7 @@ from friso.identification.logs.roles import AssignedRole, Proposal, propose, rol
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.logs.time_base import usual_step
 from friso.identification.settings import identification_settings
-from friso.identification.sources import log_with_signals, unnamed
+from friso.identification.sources import named
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
     content = LogContent(path, title, channels, None, "", "", table.read, options=options.options, sampled=file.sampled)
     begun = file.beginning()
     try:
-        source, kind, reason = _recognised(begun, mapping)
+        source, kind, reason = named(begun, mapping)
     except LogError as error:
         gaps = error.gaps if isinstance(error, GapsError) else (error,)
         return replace(content, warnings=_warnings(begun, mapping), gaps=gaps)
@@ -149,16 +148,6 @@ def _warnings(file: ReadFile, mapping: Mapping) -> tuple[str, ...]:
         return read_log(file, mapping, strict=False).warnings
     except LogError:
         return ()
-
-
-def _recognised(file: ReadFile, mapping: Mapping) -> tuple[Source, str, str]:
-    """Read a log as identification would; return it, its kind of experiment, and the reason.
-
-    Raises LogError for an unusable log, and GapsError for missing information.
-    """
-    if mapping.experiment is not None:
-        return log_with_signals(file, mapping, mapping.experiment), mapping.experiment, "as specified"
-    return unnamed(file, mapping)
 
 
 def _content(channel: Channel, proposal: Proposal, reading: Reading, growth: float | None) -> ChannelContent:

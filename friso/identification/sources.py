@@ -15,6 +15,7 @@ from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import SUFFIX, Mapping, load_mapping, place_for, sidecar
+from friso.identification.logs.merge import merged
 from friso.identification.logs.read import (
     ReadFile,
     is_frequency_response,
@@ -103,6 +104,30 @@ def read_usable(
     if wrong and not files:
         raise wrong[0]
     return _recognised_together(files), wrong
+
+
+def read_merged(paths: Sequence[Path], options: Mapping, folder: Path) -> LogFile:
+    """Read two files of one run, recorded by two clocks, as one log.
+
+    Raises InputError for another number of files, for files that cannot be aligned, and for everything that is missing.
+    """
+    if len(paths) != 2 or any(is_frequency_response(path) for path in paths):
+        actual = f"{len(paths)} log{'s' * (len(paths) != 1)}" if len(paths) != 2 else "a frequency response"
+        raise InputError("--merge", actual, "two logs of one run", "friso identify drive.csv daq.csv --merge")
+    for path in reversed(paths):
+        options = options.over(load_mapping(path, folder) or Mapping())
+    file = merged(read_file(paths[0]), read_file(paths[1]), options)
+    log, kind, reason = named(file, replace(options, sample_time=None))
+    clocks = file.table.read[0]
+    return LogFile(paths[0], replace(log, warnings=(clocks, *log.warnings)), kind, reason, options)
+
+
+def named(file: ReadFile, mapping: Mapping) -> tuple[Log, str, str]:
+    """Read a log; return it, its kind of experiment, stated or recognised, and the reason."""
+    if mapping.experiment is None:
+        return unnamed(file, mapping)
+    KINDS.checked(mapping.experiment, "--as", "--as {}")
+    return log_with_signals(file, mapping, mapping.experiment), mapping.experiment, "as specified"
 
 
 def _mentioning_kept(error: InputError, path: Path, options: Mapping, folder: Path) -> LogError:
@@ -207,13 +232,13 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
         KINDS.checked(stored.experiment, f"{path}{SUFFIX}: experiment", 'experiment = "{}"')
     mapping = options.over(stored)
     said = {"earlier": stored.beside(options), "replaced": stored.replaced_by(options)}
-    if mapping.experiment is not None:
-        KINDS.checked(mapping.experiment, "--as", "--as {}")
-        log = log_with_signals(read_file(path), mapping, mapping.experiment)
-        before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
-        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping, **said)
-    log, kind, reason = unnamed(read_file(path), mapping)
-    return LogFile(path, log, kind, reason, mapping, **said)
+    before = (
+        ""
+        if None in (mapping.experiment, stored.experiment) or stored.experiment == mapping.experiment
+        else f", in place of {stored.experiment} as kept"
+    )
+    log, kind, reason = named(read_file(path), mapping)
+    return LogFile(path, log, kind, f"{reason}{before}", mapping, **said)
 
 
 def unnamed(file: ReadFile, mapping: Mapping) -> tuple[Log, str, str]:
