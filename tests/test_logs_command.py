@@ -204,13 +204,3 @@ def test_of_a_large_text_a_sample_is_read_and_its_rows_are_estimated(tmp_path: P
     )
     assert not whole.sampled
     assert whole.channels[1].count == 5000
-
-
-def test_rows_lost_in_the_middle_are_mentioned(tmp_path: Path) -> None:
-    kept = np.r_[0:100, 111:200]
-    names = ["time [s]", "position [mm]", "force [N]"]
-    path = log_files.write_text(
-        tmp_path / "a.csv", names, [M[n][kept] * (1e3 if n == "position" else 1) for n in ("time", "position", "force")]
-    )
-    content = log_content(path, Mapping())
-    assert any("missing" in line and "0.099" in line for line in content.warnings)

@@ -101,4 +101,4 @@ def test_without_overlap_or_motion_or_with_a_motion_that_repeats_it_is_refused(t
         for i in range(2)
     ]
     with pytest.raises(InputError, match="repeats"):
-        merged(*(read_file(path) for path in sines), Mapping())
+        merged(read_file(sines[0]), read_file(sines[1]), Mapping())

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.stats import t as student
@@ -232,7 +232,9 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     size = next_fast_len(one.size + other.size - 1, real=True)
 
     def products(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        return irfft(rfft(first, size) * rfft(second[::-1], size), size)[: one.size + other.size - 1]
+        return np.fft.irfft(np.fft.rfft(first, size) * np.fft.rfft(second[::-1], size), size)[
+            : one.size + other.size - 1
+        ]
 
     energies = [products(one**2, np.ones_like(other)), products(np.ones_like(one), other**2)]
     shares = [energy / max(energy.max(), np.finfo(float).tiny) for energy in energies]
