@@ -29,11 +29,11 @@ def file_sentences(content: LogContent) -> list[str]:
     return [
         *(sentence for _, sentence in conclusions(content)),
         *(f"open: {line}" for line in open_questions(content)),
-        *(f"note: {line}" for line in (*_sampled(content), *content.lost, *content.warnings)),
+        *(f"note: {line}" for line in (*sampled_note(content), *content.lost, *content.warnings)),
     ]
 
 
-def _sampled(content: LogContent) -> tuple[str, ...]:
+def sampled_note(content: LogContent) -> tuple[str, ...]:
     """Return the line on which part of the file was looked at; nothing for all of it."""
     return (content.sampled,) if content.sampled else ()
 
