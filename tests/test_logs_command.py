@@ -184,3 +184,23 @@ def test_the_command_asks_for_the_constant_of_a_motor(tmp_path: Path) -> None:
     assert "--scale force=" in command
     (command,) = friso.logs(file, scale={"force": "35 N/A"}).next_steps([])
     assert command.count("--scale") == 1
+
+
+def test_of_a_large_text_a_sample_is_read_and_its_rows_are_estimated(tmp_path: Path) -> None:
+    time = 1e-3 * np.arange(120_000)
+    force = np.sin(time) + np.sin(2.3 * time)
+    path = tmp_path / "large.csv"
+    frame = pd.DataFrame({"time [s]": time, "position [mm]": np.cumsum(np.cumsum(force)) * 1e-6, "force [N]": force})
+    frame.to_csv(path, index=False)
+    content = log_content(path, Mapping())
+    position = content.channels[1]
+    assert content.sampled
+    assert position.values.size < time.size / 2
+    assert position.count == pytest.approx(time.size, rel=0.05)
+    assert position.duration == pytest.approx(120, rel=0.05)
+    assert content.kind == "moves"
+    whole = log_content(
+        log_files.write_text(tmp_path / "small.csv", [*frame], [frame[n][:5000] for n in frame]), Mapping()
+    )
+    assert not whole.sampled
+    assert whole.channels[1].count == 5000

@@ -16,7 +16,7 @@ from friso.errors import LogError
 from friso.identification.contents import log_content
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import repeated_stamps
-from friso.identification.logs.mapping import Mapping
+from friso.identification.logs.mapping import Mapping, from_options
 
 M = log_files.motion()
 
@@ -27,12 +27,15 @@ def write(path: Path, time: np.ndarray, kept: np.ndarray, unit: str = "s") -> Pa
     return path
 
 
-def test_a_heading_in_milliseconds_above_seconds_is_doubted(tmp_path: Path) -> None:
+def test_a_heading_in_milliseconds_above_seconds_is_asked_about(tmp_path: Path) -> None:
     every = np.ones(len(M["time"]), bool)
-    wrong = read_log(write(tmp_path / "wrong.csv", M["time"], every, "ms"))
-    right = read_log(write(tmp_path / "right.csv", 1e3 * M["time"], every, "ms"))
-    assert [line for line in wrong.warnings if "MHz" in line]
-    assert not [line for line in right.warnings if "MHz" in line]
+    wrong = write(tmp_path / "wrong.csv", M["time"], every, "ms")
+    with pytest.raises(LogError) as asked:
+        read_log(wrong)
+    name = asked.value.example.removeprefix("--unit ").removesuffix("=s")
+    assert read_log(wrong, from_options(units=[f"{name}=s"])).sample_time == pytest.approx(1e-3)
+    assert read_log(wrong, from_options(units=[f"{name}=ms"])).sample_time == pytest.approx(1e-6)
+    assert read_log(write(tmp_path / "right.csv", 1e3 * M["time"], every, "ms")).sample_time == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize(("lost", "told"), [(11, True), (150, True), (2, False)])

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from friso.errors import LogError
-from friso.identification.kind import Source
 from friso.identification.kinds import KINDS
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.channel import Channel
@@ -16,12 +15,12 @@ from friso.identification.logs.format import FORMATS
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.mapping import Mapping, load_mapping
 from friso.identification.logs.measured_response import MeasuredResponse
-from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
+from friso.identification.logs.read import ReadFile, file_format, glance, is_frequency_response, read_frequency_response
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.logs.time_base import usual_step
 from friso.identification.settings import identification_settings
-from friso.identification.sources import log_with_signals, unnamed
+from friso.identification.sources import named
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,7 @@ class ChannelContent:
 
     `values`, shape (n,), are in the `unit` ("" for none). `time`, shape (n,), has their instants [s], or is None.
     `role` is "" if none is proposed; `reason` says why a role is proposed, or how many channels compete for it.
+    `growth` is None, or how many times larger the file is than the sample of it that the values are.
     """
 
     name: str
@@ -38,6 +38,23 @@ class ChannelContent:
     time: np.ndarray | None
     role: str
     reason: str
+    growth: float | None = None
+
+    @property
+    def count(self) -> int:
+        """Return the number of samples, to three digits if it is estimated from a part of the file."""
+        return self.values.size if self.growth is None else int(float(f"{self.growth * self.values.size:.3g}"))
+
+    @property
+    def duration(self) -> float | None:
+        """Return the time from the first to the last sample [s]; None without instants.
+
+        Of a sample it follows from number and rate, unless its instants, which may be those of the file, reach further.
+        """
+        if self.time is None or not self.time.size:
+            return None
+        span, rate = float(self.time[-1] - self.time[0]), self.sample_rate
+        return span if self.growth is None or not rate else max(span, self.count / rate)
 
     @property
     def range(self) -> tuple[float, float] | None:
@@ -74,7 +91,7 @@ class LogContent:
 
     Fields are the title of the file's format, its channels or frequency response, and the kind of experiment with the
     reason for it ("" if open). `read` has lines on how the file was read. `gaps` lists what the user must state before
-    identification, and `options` has the options used for reading.
+    identification, and `options` has the options used for reading. `sampled` says which part of a large file was read.
     """
 
     path: Path
@@ -87,6 +104,7 @@ class LogContent:
     warnings: tuple[str, ...] = ()
     gaps: tuple[LogError, ...] = ()
     options: tuple[str, ...] = ()
+    sampled: str = ""
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -107,41 +125,32 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
         kind = next(kind for kind in KINDS if KINDS[kind].responses)
         return LogContent(path, title, (), response, kind, "the file holds a frequency response", response.read)
     mapping = options.over(load_mapping(path, folder) or Mapping())
-    table = with_user_units(read_table(path), mapping, FORMATS[name].times, str(path))
-    reading = Reading(table, mapping, False, not FORMATS[name].units, str(path))
+    file = glance(path)
+    table = with_user_units(file.table, mapping, file.form.times, str(path))
+    reading = Reading(table, mapping, False, not file.form.units, str(path))
     if not table.channels:
         raise LogError("", "no channel of numbers", "a log with columns of numbers", "", str(path))
     proposal = propose(table, mapping.roles, str(path))
-    channels = tuple(_content(channel, proposal, reading) for channel in table.channels)
+    channels = tuple(_content(channel, proposal, reading, file.growth) for channel in table.channels)
+    content = LogContent(path, title, channels, None, "", "", table.read, options=options.options, sampled=file.sampled)
+    begun = file.beginning()
     try:
-        source, kind, reason = _recognised(path, mapping)
+        source, kind, reason = named(begun, mapping)
     except LogError as error:
         gaps = error.gaps if isinstance(error, GapsError) else (error,)
-        warnings = _warnings(path, mapping)
-        return LogContent(path, title, channels, None, "", "", table.read, warnings, gaps, options.options)
-    warnings = getattr(source, "warnings", ())
-    return LogContent(path, title, channels, None, kind, reason, source.read, warnings, options=options.options)
+        return replace(content, warnings=_warnings(begun, mapping), gaps=gaps)
+    return replace(content, kind=kind, reason=reason, read=source.read, warnings=getattr(source, "warnings", ()))
 
 
-def _warnings(path: Path, mapping: Mapping) -> tuple[str, ...]:
+def _warnings(file: ReadFile, mapping: Mapping) -> tuple[str, ...]:
     """Return the warnings about a log whose kind of experiment is open; none if something else is open, too."""
     try:
-        return read_log(path, mapping, strict=False).warnings
+        return read_log(file, mapping, strict=False).warnings
     except LogError:
         return ()
 
 
-def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
-    """Read a log as identification would; return it, its kind of experiment, and the reason.
-
-    Raises LogError for an unusable log, and GapsError for missing information.
-    """
-    if mapping.experiment is not None:
-        return log_with_signals(path, mapping, mapping.experiment), mapping.experiment, "as specified"
-    return unnamed(path, mapping)
-
-
-def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelContent:
+def _content(channel: Channel, proposal: Proposal, reading: Reading, growth: float | None) -> ChannelContent:
     """Describe a channel, with its instants and the role that the proposal gives it."""
     role, reason = "", ""
     for choice in proposal.chosen.values():
@@ -153,7 +162,9 @@ def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelC
     meaning = role_of(channel.name)
     if not (role or reason) and meaning and meaning[0] == "time" and channel.unit and not reading.mapping.sample_time:
         role, reason = "time", f'the name says "{meaning[1]}"'
-    return ChannelContent(channel.name, channel.unit, channel.values, _time(channel, proposal, reading), role, reason)
+    return ChannelContent(
+        channel.name, channel.unit, channel.values, _time(channel, proposal, reading), role, reason, growth
+    )
 
 
 def _time(channel: Channel, proposal: Proposal, reading: Reading) -> np.ndarray | None:

@@ -15,7 +15,14 @@ from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import SUFFIX, Mapping, load_mapping, place_for, sidecar
-from friso.identification.logs.read import is_frequency_response, read_frequency_response, read_table
+from friso.identification.logs.merge import merged
+from friso.identification.logs.read import (
+    ReadFile,
+    is_frequency_response,
+    read_file,
+    read_frequency_response,
+    read_table,
+)
 from friso.identification.logs.roles import find
 from friso.identification.readings.course import Course
 
@@ -97,6 +104,30 @@ def read_usable(
     if wrong and not files:
         raise wrong[0]
     return _recognised_together(files), wrong
+
+
+def read_merged(paths: Sequence[Path], options: Mapping, folder: Path) -> LogFile:
+    """Read two files of one run, recorded by two clocks, as one log.
+
+    Raises InputError for another number of files, for files that cannot be aligned, and for everything that is missing.
+    """
+    if len(paths) != 2 or any(is_frequency_response(path) for path in paths):
+        actual = f"{len(paths)} log{'s' * (len(paths) != 1)}" if len(paths) != 2 else "a frequency response"
+        raise InputError("--merge", actual, "two logs of one run", "friso identify drive.csv daq.csv --merge")
+    for path in reversed(paths):
+        options = options.over(load_mapping(path, folder) or Mapping())
+    file = merged(read_file(paths[0]), read_file(paths[1]), options)
+    log, kind, reason = named(file, replace(options, sample_time=None))
+    clocks = file.table.read[0]
+    return LogFile(paths[0], replace(log, warnings=(clocks, *log.warnings)), kind, reason, options)
+
+
+def named(file: ReadFile, mapping: Mapping) -> tuple[Log, str, str]:
+    """Read a log; return it, its kind of experiment, stated or recognised, and the reason."""
+    if mapping.experiment is None:
+        return unnamed(file, mapping)
+    KINDS.checked(mapping.experiment, "--as", "--as {}")
+    return log_with_signals(file, mapping, mapping.experiment), mapping.experiment, "as specified"
 
 
 def _mentioning_kept(error: InputError, path: Path, options: Mapping, folder: Path) -> LogError:
@@ -201,16 +232,16 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
         KINDS.checked(stored.experiment, f"{path}{SUFFIX}: experiment", 'experiment = "{}"')
     mapping = options.over(stored)
     said = {"earlier": stored.beside(options), "replaced": stored.replaced_by(options)}
-    if mapping.experiment is not None:
-        KINDS.checked(mapping.experiment, "--as", "--as {}")
-        log = log_with_signals(path, mapping, mapping.experiment)
-        before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
-        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping, **said)
-    log, kind, reason = unnamed(path, mapping)
-    return LogFile(path, log, kind, reason, mapping, **said)
+    before = (
+        ""
+        if None in (mapping.experiment, stored.experiment) or stored.experiment == mapping.experiment
+        else f", in place of {stored.experiment} as kept"
+    )
+    log, kind, reason = named(read_file(path), mapping)
+    return LogFile(path, log, kind, f"{reason}{before}", mapping, **said)
 
 
-def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
+def unnamed(file: ReadFile, mapping: Mapping) -> tuple[Log, str, str]:
     """Read a log whose kind of experiment is not stated; return it, its kind, and the reason.
 
     Raises GapsError for everything that is missing, including units that most kinds need.
@@ -218,18 +249,18 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
     gaps: list[LogError] = []
     kind = reason = ""
     try:
-        log = read_log(path, mapping, strict=False, needed=MOVED, stamped=True)
-        log = log if "force" in log or not log.is_uneven else read_log(path, mapping, strict=False, needed=MOVED)
+        log = read_log(file, mapping, strict=False, needed=MOVED, stamped=True)
+        log = log if "force" in log or not log.is_uneven else read_log(file, mapping, strict=False, needed=MOVED)
     except GapsError as error:
         gaps += error.gaps
-        log = _without_clock(path, replace(mapping, roles={**mapping.roles, **error.proposed}))
+        log = _without_clock(file, replace(mapping, roles={**mapping.roles, **error.proposed}))
     try:
-        kind, reason = recognised(log, path) if log is not None else ("", "")
+        kind, reason = recognised(log, file.path) if log is not None else ("", "")
     except LogError as error:
         gaps.append(error)
     if not (kind and not KINDS[kind].si):
         try:
-            log = log_with_signals(path, mapping, kind) if kind else read_log(path, mapping, needed=MOVED)
+            log = log_with_signals(file, mapping, kind) if kind else read_log(file, mapping, needed=MOVED)
         except GapsError as error:
             gaps += [gap for gap in error.gaps if gap.example not in [other.example for other in gaps]]
     if gaps or log is None:
@@ -237,13 +268,13 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
     return log, kind, reason
 
 
-def _without_clock(path: Path, mapping: Mapping) -> Log | None:
+def _without_clock(file: ReadFile, mapping: Mapping) -> Log | None:
     """Read a log without known instants as if sampled every second; None if impossible.
 
     The motion of this log then shows the kind of experiment.
     """
     try:
-        return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
+        return read_log(file, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
     except LogError:
         return None
 
@@ -253,10 +284,10 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
     return None if mapping == Mapping() else place_for(path, folder)
 
 
-def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
+def log_with_signals(file: ReadFile, mapping: Mapping, kind: str) -> Log:
     """Read a log with the signals that a kind of experiment needs, in the units that it needs."""
     chosen = KINDS[kind]
-    return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign, chosen.stamped)
+    return read_log(file, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign, chosen.stamped)
 
 
 def recognised(log: Log, path: Path) -> tuple[str, str]:

@@ -14,12 +14,11 @@ from scipy.integrate import cumulative_trapezoid
 from friso.errors import InputError, LogError
 from friso.identification.logs import checks
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.format import FORMATS
-from friso.identification.logs.gaps import check_gaps, told_by_mechanics
+from friso.identification.logs.gaps import GapsError, check_gaps, told_by_mechanics
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.physics import MotionReading, is_ramp
-from friso.identification.logs.read import file_format, read_table
+from friso.identification.logs.read import ReadFile, read_file
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of, wanted_of
 from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
@@ -29,23 +28,23 @@ from friso.quantities import percent, quoted
 
 
 def read_log(
-    path: Path | str,
+    source: Path | str | ReadFile,
     mapping: Mapping | None = None,
     strict: bool = True,
     needed: Sequence[str] = ("position",),
     foreign: Sequence[str] = (),
     stamped: bool = False,
 ) -> Log:
-    """Read the log in a file: signals by role, in SI units, on one time base, with warnings.
+    """Read the log in a file, which may have been read: signals by role, in SI units, on one time base, with warnings.
 
     With `strict`, every signal must convert to the SI unit of its role, except for the `foreign` roles; without, other
     units are kept and listed in `Log.units`. `needed` are the roles that must be present; a position may be the
     integral of the velocity. With `stamped`, a log without an even clock keeps its own instants, and its velocity.
     Raises LogError (one message) for files that cannot be read or used.
     """
-    path, mapping = Path(path), mapping or Mapping()
-    form = FORMATS[file_format(path)]
-    table = with_user_units(read_table(path), mapping, form.times, str(path))
+    file, mapping = source if isinstance(source, ReadFile) else read_file(source), mapping or Mapping()
+    path, form = file.path, file.form
+    table = with_user_units(file.table, mapping, form.times, str(path))
     reading = Reading(table, mapping, strict, not form.units, str(path), tuple(foreign))
     proposal = propose(table, mapping.roles, str(path))
     readings = told_by_mechanics(table, proposal, needed)
@@ -70,6 +69,7 @@ def read_log(
                 notes.units["position"] = notes.units["velocity"].removesuffix("/s")
     except InputError as error:
         raise error.found_in(str(path)) from None
+    _no_doubtful_unit(base, reading)
     notes.warnings += [*_lost(base), *_missing(base), *([] if uneven else _doubts(base, signals, notes))]
     notes.read.append(_spans(base))
     return Log(
@@ -207,6 +207,19 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
         if checks.constant(role, signals[role]):
             actual = f"a constant signal, {quoted(float(signals[role][0]))} throughout"
             raise LogError(role, actual, "a signal that changes", f'--map {role}="CHANNEL"')
+
+
+def _no_doubtful_unit(base: Track, reading: Reading) -> None:
+    """Check that a clock is not too fast for a machine because its heading has a smaller unit than its values.
+
+    Raises GapsError, which asks for the unit, unless the user stated it.
+    """
+    mapping, clocks = reading.mapping, [c for c in reading.table.channels if c.unit not in ("", "s")]
+    clocks = [c for c in clocks if (role_of(c.name, c.unit) or ("",))[0] == "time" and c.name not in mapping.units]
+    if clocks and mapping.sample_time is None and base.period <= settings.shortest_sample_time:
+        actual = f"{base.period * 1e6:.3g} us between samples by a heading in {clocks[0].unit}, faster than drives log"
+        example = option("--unit", clocks[0].name, "s")
+        raise GapsError([LogError("time", actual, f"the unit of {quoted(clocks[0].name)}", example, reading.origin)])
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:

@@ -36,7 +36,8 @@ class LogFormat:
 
     Formats are tried by rank: 0 for those recognised by their first bytes, 1 by their first lines, 2 for any text.
     `units` tells whether files can contain units; `times` whether channels come with their instants, so that no time
-    column is needed. `holds_response` tells whether a file contains a frequency response instead of signals over time,
+    column is needed. `of_lines` tells whether any lines of a file can be read without the others, below its first ones.
+    `holds_response` tells whether a file contains a frequency response instead of signals over time,
     which `read_response` reads. Readers raise LogError.
     """
 
@@ -46,6 +47,7 @@ class LogFormat:
     rank: int = 0
     units: bool = True
     times: bool = True
+    of_lines: bool = False
     holds_response: Callable[[Path], bool] = lambda path: False
     read_response: Callable[[Path], MeasuredResponse] | None = None
 

@@ -96,7 +96,10 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
     kinds = KINDS if "position" not in {*chosen, *rivals} else KINDS[:1]
     kinds = KINDS[1:] if "velocity" in chosen and chosen["velocity"].by_user and "position" not in chosen else kinds
     motions = [(channel, kind) for kind in kinds for channel in candidates(kind)]
-    readings = [one for one in motion_readings(candidates("force"), motions) if not _are_alike(one.force, one.motion)]
+    forces = candidates("force")
+    if len(forces) * len(motions) > settings.pairs_of_a_reading:
+        return []
+    readings = [one for one in motion_readings(forces, motions) if not _are_alike(one.force, one.motion)]
     if not readings or readings[0].unexplained > settings.share_left_by_a_reading:
         return []
     readings = with_positions_first(readings)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import ChannelTable
-from friso.identification.logs.format import FORMATS, FileHead
+from friso.identification.logs.format import FORMATS, FileHead, LogFormat
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.logs.packed import unpacked
+from friso.identification.logs.sample import sample_of
 from friso.identification.logs.settings import settings
 from friso.platform.system import cause_of, once_free
+from friso.quantities import percent
 
 _SAVED = "the same saved as one of the formats that friso reads"
 _OTHERS = {
@@ -88,6 +91,70 @@ def read_table(path: Path | str) -> ChannelTable:
     """
     with _plain(path) as plain:
         return FORMATS[_plain_format(plain)].read(plain)
+
+
+@dataclass(frozen=True)
+class ReadFile:
+    """A file that was read: its format and channels.
+
+    Of a large text the channels are a sample; `growth` is then the ratio of the file's size to that of the sample, and
+    `begins` the number of samples that follow each other from the beginning on. Both are None if the whole file was
+    read.
+    """
+
+    path: Path
+    form: LogFormat
+    table: ChannelTable
+    growth: float | None = None
+    begins: int | None = None
+
+    @property
+    def looked_at(self) -> int:
+        """Return the number of samples from which the kind of experiment is recognised without waiting."""
+        return settings.samples_of_a_look if self.begins is None else min(self.begins, settings.samples_of_a_look)
+
+    @property
+    def sampled(self) -> str:
+        """Say which part of the file was looked at; "" for all of it."""
+        if max((channel.values.size for channel in self.table.channels), default=0) <= self.looked_at:
+            return ""
+        parts = (
+            "" if self.growth is None else f"{percent(1 / self.growth)} of the file were read: beginning, middle, end; "
+        )
+        return f"{parts}kind and notes rest on the first {self.looked_at} samples; friso identify reads the whole file"
+
+    def beginning(self) -> ReadFile:
+        """Return the file with the samples that are looked at."""
+        most = slice(self.looked_at)
+        cut = [
+            replace(c, values=c.values[most], time=c.time if c.time is None else c.time[most])
+            for c in self.table.channels
+        ]
+        return replace(self, table=replace(self.table, channels=tuple(cut)))
+
+
+def read_file(path: Path | str) -> ReadFile:
+    """Read the channels of a log of any format, with the format.
+
+    Raises LogError as `read_table` does.
+    """
+    return ReadFile(Path(path), FORMATS[file_format(Path(path))], read_table(path))
+
+
+def glance(path: Path) -> ReadFile:
+    """Read the channels of a log, of a large text only a sample.
+
+    A sample that cannot be read is no reason to refuse the file: it is then read as a whole. Raises LogError as
+    `read_table` does.
+    """
+    with _plain(path) as plain:
+        form = FORMATS[_plain_format(plain)]
+        if form.of_lines and (sample := sample_of(plain)) is not None:
+            with suppress(LogError):
+                table = form.read(sample.file.path)
+                rows = max(channel.values.size for channel in table.channels)
+                return ReadFile(path, form, table, sample.growth, rows - sample.later)
+        return ReadFile(path, form, form.read(plain))
 
 
 def is_frequency_response(path: Path | str) -> bool:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping as Names
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -90,6 +91,7 @@ def _compound(word: str) -> list[str]:
     return [word] if match is None else [own for part in match.groups() if part for own in _compound(part)]
 
 
+@lru_cache(maxsize=4096)  # asked again and again of all channels of a file
 def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
     """Return the role that a name implies, and the word that implies it; None without one.
 

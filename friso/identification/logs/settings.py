@@ -84,6 +84,9 @@ class LogSettings(Settings):
     samples_of_a_reading: int = setting(64, "")
     """Fewest samples from which channels are recognised by mechanics (force, acceleration). Fewer fit by chance."""
 
+    pairs_of_a_reading: int = setting(1000, "")
+    """Largest number of pairs of a force and a motion that are tried. More take minutes, and one fits by chance."""
+
     samples_of_a_scale: float = setting(2.0, "")
     """Width of smoothing before differentiation on each time scale, in samples. With less, noise dominates."""
 
@@ -101,6 +104,49 @@ class LogSettings(Settings):
 
     range_share_off_a_clock: float = setting(0.01, "")
     """Largest deviation of a clock from a straight line, over its range."""
+
+    # Two files of one run, merged by their motion.
+    difference_of_clocks: float = setting(5e-3, "")
+    """Largest relative difference of two clocks that is searched. Clocks of computers differ by less than 1e-3."""
+
+    share_of_an_overlap: float = setting(0.25, "")
+    """Least share of the motion of one of two records that must overlap with the other."""
+
+    samples_of_a_correlation: float = setting(32768.0, "")
+    """Number of samples of a record by which it is aligned at first. More change nothing."""
+
+    ratios_of_a_merge: int = setting(100, "")
+    """Largest number of ratios of clocks that are tried on either side of 1. More take seconds."""
+
+    places_of_a_merge: int = setting(4, "")
+    """Number of places at which an alignment is begun."""
+
+    rows_of_a_merge: int = setting(50_000, "")
+    """Largest number of samples from which an alignment is fitted. More change little."""
+
+    steps_of_a_merge: int = setting(30, "")
+    """Largest number of steps of Gauss and Newton to an alignment. Most take five."""
+
+    precision_of_a_merge: float = setting(1e-9, "")
+    """Change of an alignment, relative to the record, below which it is final."""
+
+    parts_of_a_merge: int = setting(24, "")
+    """Number of stretches of a record whose scores give the intervals of an alignment."""
+
+    widths_of_a_merge: tuple[float, ...] = setting((2.0, 8.0, 32.0), "")
+    """Widths of smoothing that are tried, in samples of the slower file: noise asks for wide ones."""
+
+    share_of_a_width: float = setting(0.01, "")
+    """Largest width of smoothing, relative to the shorter record."""
+
+    share_left_by_a_merge: float = setting(0.5, "")
+    """Largest share of a motion (RMS) that an alignment may leave. Noise, and another point of the axis, leave less."""
+
+    share_left_by_rounding: float = setting(1e-3, "")
+    """Share of a motion up to which what alignments leave is the rounding of the files."""
+
+    ratio_of_rival_merges: float = setting(2.0, "")
+    """Ratio of what two alignments leave up to which both count: then the motion repeats."""
 
     # Logs joined to one.
     sample_time_tolerance: float = setting(1e-3, "")
@@ -124,6 +170,14 @@ class LogSettings(Settings):
     bytes_unpacked_per_byte: int = setting(300, "")
     """Further bytes that a byte of a packed file may unpack to. Texts of numbers shrink to a hundredth at most."""
 
+    # A look at a large file, before it is analysed.
+    bytes_of_a_part: int = setting(1 << 19, "B")
+    """Size of the beginning, the middle and the end of a text of which a sample is read. Smaller texts are read as a
+    whole: that takes a second."""
+
+    samples_of_a_look: int = setting(100_000, "")
+    """Number of first samples from which `friso logs` recognises the kind of experiment."""
+
     # Values.
     largest_value: float = setting(1e30, "")
     """Largest number of an instrument. Beyond it, squares of squares overflow."""
@@ -138,8 +192,8 @@ class LogSettings(Settings):
     rows_of_a_table_begun: int = setting(50, "")
     """Number of rows within which another one has the length of the first row of a table."""
 
-    columns_of_a_table: int = setting(10_000, "")
-    """Largest number of columns of a table. Reading more takes seconds."""
+    columns_of_a_table: int = setting(2000, "")
+    """Largest number of columns of a table. Asking more for their roles takes ten seconds."""
 
     share_of_cells_of_other_topics: float = setting(0.25, "")
     """Share of empty cells above which rows belong to several topics with instants of their own. Two topics of equal

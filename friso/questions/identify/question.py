@@ -15,7 +15,7 @@ from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
 from friso.identification.method import Prediction, around, axis_of_all, check_predictions, nothing_learnt
-from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_usable
+from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_merged, read_usable
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
@@ -110,6 +110,7 @@ def identify(
     scale: RoleScales = None,
     dt: TimeLike | None = None,
     axis: KindName | None = None,
+    merge: bool = False,
     predict: LogFiles = (),
     bandwidth: FrequencyLike | None = None,
     band: FrequencyBand | None = None,
@@ -131,6 +132,9 @@ def identify(
         has no such tables, a log of moves tells them.
     as_ : str, optional
         Kind of experiment; moves and frequency responses are recognised. friso identify --help lists the kinds.
+    merge : bool
+        The two logs are of one run, by two clocks (drive and DAQ): they are aligned by the motion that both have, and
+        analysed as one log.
     predict : path or list of paths, optional
         Other logs, simulated with the identified stage.
     bandwidth : str or float, optional
@@ -177,7 +181,9 @@ def identify(
         axis = beside.name
     settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
     paths, other_paths = paths_of(logs), paths_of(predict)
-    held, unusable = read_usable(paths, options, folder, other_paths)
+    held, unusable = (
+        ([read_merged(paths, options, folder)], []) if merge else read_usable(paths, options, folder, other_paths)
+    )
     predicted_files = [per_unit_of_force(file, beside) for file in read_all(other_paths, options, folder)]
     held = [per_unit_of_force(file, beside) for file in held]
     sources = [(file.source, file.kind) for file in held]
@@ -199,7 +205,7 @@ def identify(
     left_out = [f"left out: {_in_one_line(error)}" for error in unusable]
     result = replace(result, warnings=(*left_out, *reused, *_taken_from_logs(made_up), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
-    if keep is not None and not result.failed and not nothing_learnt(result.estimates, False):
+    if keep is not None and not merge and not result.failed and not nothing_learnt(result.estimates, False):
         keep({file.path: _worth_keeping(file, result) for file in held})
     checked = None
     if check and result.stage is not None:

@@ -16,6 +16,7 @@ from friso.questions.logs.words import (
     logs_document,
     next_command,
     open_questions,
+    sampled_note,
 )
 from friso.shown.blocks import AnswerBlock
 
@@ -38,7 +39,7 @@ def page_values(contents: Sequence[LogContent]) -> dict[str, Any]:
             "open": open_questions(content),
             "command": next_command(content),
             "read": content.read,
-            "warnings": content.warnings,
+            "warnings": (*sampled_note(content), *content.warnings),
             "figure": f"logs_{number}",
         }
         for number, content in enumerate(contents, 1)

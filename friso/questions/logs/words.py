@@ -29,8 +29,13 @@ def file_sentences(content: LogContent) -> list[str]:
     return [
         *(sentence for _, sentence in conclusions(content)),
         *(f"open: {line}" for line in open_questions(content)),
-        *(f"note: {line}" for line in (*content.lost, *content.warnings)),
+        *(f"note: {line}" for line in (*sampled_note(content), *content.lost, *content.warnings)),
     ]
+
+
+def sampled_note(content: LogContent) -> tuple[str, ...]:
+    """Return the line on which part of the file was looked at; nothing for all of it."""
+    return (content.sampled,) if content.sampled else ()
 
 
 def next_steps(contents: Sequence[LogContent], files: Sequence[Path]) -> list[str]:
@@ -108,8 +113,14 @@ def _number(value: float) -> str:
 def _samples(channel: ChannelContent) -> str:
     """Write the number of samples, and how many are missing."""
     rate = "" if channel.sample_rate is None else f" at {with_unit(channel.sample_rate, 'Hz', 4)}"
-    gaps = f", {channel.missing} not numbers" if channel.missing else ""
-    return f"{channel.values.size}{rate}{gaps}"
+    of_sample = "" if channel.growth is None else " in the sample"
+    gaps = f", {channel.missing} not numbers{of_sample}" if channel.missing else ""
+    return f"{_count(channel)}{rate}{gaps}"
+
+
+def _count(channel: ChannelContent) -> str:
+    """Write how many samples a channel has; "about" where that was estimated."""
+    return f"{'' if channel.growth is None else 'about '}{channel.count}"
 
 
 def sparkline(values: np.ndarray) -> str:
@@ -131,10 +142,9 @@ def _holds(content: LogContent) -> str:
         ends = range_with_unit(float(frequency[0]), float(frequency[-1]), "Hz")
         return f"a frequency response of {frequency.size} lines, {ends}, {content.response.unit or 'without a unit'}"
     longest = max(content.channels, key=lambda channel: channel.values.size)
-    time = longest.time
-    lasts = "" if time is None or not time.size else f" over {with_unit(float(time[-1] - time[0]), 's', 4)}"
-    channels, samples = len(content.channels), longest.values.size
-    return f"{channels} channel{'s' * (channels != 1)}, {samples} sample{'s' * (samples != 1)}{lasts}"
+    duration, channels = longest.duration, len(content.channels)
+    lasts = "" if duration is None else f" over {with_unit(duration, 's', 4)}"
+    return f"{channels} channel{'s' * (channels != 1)}, {_count(longest)} sample{'s' * (longest.count != 1)}{lasts}"
 
 
 def logs_document(contents: Sequence[LogContent]) -> dict[str, Any]:
@@ -159,6 +169,7 @@ def _log(content: LogContent) -> dict[str, Any]:
         ],
         "command": next_command(content),
         **entries(content, "read", "warnings"),
+        "sampled": content.sampled or None,
     }
 
 
@@ -170,7 +181,8 @@ def _channel(channel: ChannelContent) -> dict[str, Any]:
         "unit": channel.unit or None,
         "role": channel.role or None,
         "reason": channel.reason or None,
-        "samples": channel.values.size,
+        "samples": channel.count,
+        "samples_estimated": channel.growth is not None,
         "sample_rate_Hz": channel.sample_rate,
         "missing": channel.missing,
         "low": low,

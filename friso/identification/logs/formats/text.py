@@ -13,6 +13,7 @@ FORMAT = LogFormat(
     read_text,
     rank=2,
     times=False,
+    of_lines=True,
     holds_response=lambda path: is_response(layout(path).names),
     read_response=lambda path: response_of(read_text(path), path),
 )
