@@ -346,6 +346,15 @@ def test_dspace_structure_with_time_and_tdms(tmp_path: Path) -> None:
     check_motion(read_table(log_files.write_tdms(tmp_path / "log.bin", SIGNALS)))
 
 
+def test_units_of_mat_files_stand_beside_arrays_or_in_their_names(tmp_path: Path) -> None:
+    """A structure of one array and its unit is that array."""
+    savemat(tmp_path / "a.mat", {"position": {"value": M["position"] * 1e3, "unit": "mm"}, "force_N": M["force"]})
+    table = read_table(tmp_path / "a.mat")
+    assert [(c.name, c.unit) for c in table.channels] == [("position", "mm"), ("force_N", "N")]
+    savemat(tmp_path / "b.mat", {"run": {"x": M["position"], "f": M["force"], "unit": "um"}})
+    assert [(c.name, c.unit) for c in read_table(tmp_path / "b.mat").channels] == [("run.x", ""), ("run.f", "")]
+
+
 def test_mat_73(tmp_path: Path) -> None:
     path = log_files.write_mat73(
         tmp_path / "a.mat", {"t": M["time"], "fs": np.array(1e3)}, {"position (mm)": M["position"] * 1e3}
@@ -413,8 +422,14 @@ def test_lvm(tmp_path: Path) -> None:
     assert channel(table, "position").values == pytest.approx(M["position"] * 1e3, abs=1e-8)
     assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
     assert channel(table, "force").unit == "N"
+    assert not [line for line in table.read if line.startswith("contradiction")]
     # the library would leave a cache file unless told not to
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+    text = (tmp_path / "a.txt").read_text("utf-8")
+    for said, other in (("Delta_X\t0.00", "Delta_X\t0.02"), ("Samples\t400", "Samples\t300")):
+        assert said in text
+        (tmp_path / "c.lvm").write_text(text.replace(said, other), "utf-8")
+        assert [line for line in read_table(tmp_path / "c.lvm").read if line.startswith("contradiction")]
     empty = {name: (unit, x[:0]) for name, (unit, x) in SIGNALS.items()}
     with refused("log"):
         read_table(log_files.write_lvm(tmp_path / "b.lvm", empty))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 import textwrap
@@ -93,11 +94,18 @@ Replace = Annotated[bool, typer.Option("--overwrite", help="Replace the file if 
 
 
 def print_document(document: Mapping[str, Any], files: Iterable[Path] = ()) -> None:
-    """Print the JSON document of a command, with the files written and the plug-ins loaded."""
+    r"""Print the JSON document of a command, with the files written and the plug-ins loaded.
+
+    Bytes of a file name that are no UTF-8 are written out, such as "\xff"; JSON has no half characters.
+    """
     from friso.stage.foreign import foreign
 
     written = {"files": [str(file) for file in files], "plug_ins": foreign()}
-    print(json.dumps({**document, **written}, allow_nan=False))
+    print(_HALF.sub(r"\\\\x\1", json.dumps({**document, **written}, allow_nan=False)))
+
+
+_HALF = re.compile(r"(?<!\\)(?<!\\ud[89ab][0-9a-f]{2})\\udc([89a-f][0-9a-f])")
+"""Pattern of a byte that is no UTF-8, as JSON writes it."""
 
 
 def print_written(files: Iterable[Path]) -> None:

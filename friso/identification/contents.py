@@ -108,8 +108,10 @@ class LogContent:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Return the lines of `read` that tell of parts of the file left out or missing."""
-        return tuple(line for line in self.read if line.startswith("left out") or " ends early: " in line)
+        """Return the lines of `read` that tell of parts left out or missing, and of contradictions."""
+        return tuple(
+            line for line in self.read if line.startswith(("left out", "contradiction")) or " ends early: " in line
+        )
 
 
 def log_content(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:

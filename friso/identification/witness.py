@@ -8,20 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.signal import bilinear, lfilter, ss2tf
 
 from friso.errors import InputError
-from friso.frequency.parts import FEEDFORWARD, FORCE, REFERENCE, STAGE, VELOCITY, compensator
-from friso.frequency.system import System
 from friso.identification.inverse_model import least_squares, unit_of, within_stretches
 from friso.identification.logs.log import Log
 from friso.identification.settings import witness_settings as settings
 from friso.quantities import percent, plain_factor
 from friso.stage.controllers import CONTROLLER, NO_SETTINGS, settings_of
 from friso.stage.tables import TRANSMISSION
+
+if TYPE_CHECKING:
+    from friso.frequency.system import System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +72,8 @@ class Witness:
     """A log with reference, position and force, and the controller of a stage whose keys in SI are `flat`."""
 
     def __init__(self, log: Log, flat: Mapping[str, Any]) -> None:
+        from friso.frequency.parts import compensator  # imports SymPy, which is slow
+
         part = log.longest
         self.log, self.step = log, log.sample_time
         self.reference, self.position, self.force = (log[name][part] for name in CHANNELS)
@@ -130,6 +133,8 @@ class Witness:
         """Return the force [N] that the controller commands on the log, (samples,)."""
         if clock in self._commands:
             return self._commands[clock]
+        from friso.frequency.parts import FEEDFORWARD, REFERENCE, STAGE, VELOCITY
+
         step = self.step / clock
         velocity = np.diff(self.position, prepend=self.position[0]) / step
         inputs = {REFERENCE: self.reference, STAGE: self.position, VELOCITY: velocity}
@@ -239,6 +244,8 @@ CHANNELS = ("reference", "position", "force")
 
 def _driven(system: System, inputs: dict[str, np.ndarray], step: float) -> np.ndarray:
     """Return the force [N] of a linear controller on sampled inputs, by Tustin's rule, (samples,)."""
+    from friso.frequency.parts import FORCE
+
     chosen = system.take([name for name in system.inputs if name in inputs], (FORCE,))
     a, b, c, d = chosen.a[0], chosen.b[0], chosen.c[0], chosen.d[0]
     total = np.zeros(len(next(iter(inputs.values()))))

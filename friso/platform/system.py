@@ -248,6 +248,9 @@ else:
         """Return a word of a command quoted for a shell, if possible also for cmd and PowerShell."""
         if re.fullmatch(r"[\w.,:/=@%+-]+", word):
             return word
+        if re.search("[\ud800-\udfff]", word):  # bytes of a file name that are no UTF-8
+            octal = "".join(f"\\{byte:03o}" if byte > 126 or byte < 32 else chr(byte) for byte in os.fsencode(word))
+            return f"$'{octal}'" if "'" not in word else shlex.quote(word)
         return shlex.quote(word) if set('"$`\\!') & set(word) or not word else _quoted(word)
 
     @contextmanager

@@ -73,6 +73,12 @@ class LogSettings(Settings):
     columns_of_a_matrix: int = setting(64, "")
     """Largest number of columns of a matrix that is read as channels. Larger ones are images or response matrices."""
 
+    largest_travel_in_whole_units: float = setting(1000.0, "")
+    """Largest travel of whole numbers without a unit that is no counter. A travel of more is at least in um."""
+
+    share_of_a_stated_step: float = setting(0.01, "")
+    """Largest difference of a header's time step from that of its time column, relative to it."""
+
     # Pairs of commanded and measured channels.
     correlation_of_a_pair: float = setting(0.99, "")
     """Correlation above which two channels may be the commanded and the measured one."""

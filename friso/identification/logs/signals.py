@@ -187,6 +187,7 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     role, name, wanted = choice.role, choice.channel.name, reading.unit(choice.role)
     if not unit:
         usual, travel = _likely_length(choice.channel, wanted)
+        counted = LENGTH in ROLES[role] and _counted(choice.channel.values)
         usual = "rpm" if wanted == ROTARY.unit(SPEED) and "rpm" in words(name) else usual
         actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
         expected = f"a unit convertible to {wanted}"
@@ -198,6 +199,9 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
         if electric and role in reading.foreign:
             usual, example = electric, option("--unit", name, electric)
             expected += f"; without one, all is told per {electric}"
+        if counted:
+            scale = f'--scale {role}="NUMBER {wanted}/count"'
+            return LogError(role, actual, f"{expected}; whole numbers like these may be counts", scale, reading.origin)
         if not electric or role in reading.foreign:
             expected += guess(usual, travel)
         return LogError(role, actual, expected, example, reading.origin)
@@ -208,6 +212,13 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     if si == ROTARY.unit(wanted) and LENGTH in ROLES[role]:
         expected, example = f"{expected}; or {TURNS} for an axis that turns", TURNS
     return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
+
+
+def _counted(values: np.ndarray) -> bool:
+    """Tell whether a channel holds whole numbers that change by more than one unit would on a machine."""
+    finite = values[np.isfinite(values)]
+    wide = finite.size > 0 and np.ptp(finite) > settings.largest_travel_in_whole_units
+    return bool(wide and (finite == np.round(finite)).all())
 
 
 def _likely_length(channel: Channel, wanted: str) -> tuple[str, str]:

@@ -54,10 +54,10 @@ def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
     return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
 
 
-def _walk(node: Any, name: str, walk: _Contents) -> None:
+def _walk(node: Any, name: str, walk: _Contents, unit: str = "") -> None:
     """Collect the channels, numbers and objects below a node (dict, list, array, str) in `walk`.
 
-    `name` is the node's name in the file.
+    `name` is the node's name in the file, and `unit` the one that stands beside it.
     """
     if isinstance(node, dict) and OBJECT in node:
         walk.objects.append(f"{name} ({node[OBJECT]})")
@@ -66,28 +66,36 @@ def _walk(node: Any, name: str, walk: _Contents) -> None:
     elif isinstance(node, dict) and {"time", "signals"} <= set(node):
         walk.channels += _with_time(node, name, walk)
     elif isinstance(node, dict):
+        unit = next((_text(text) for key, text in node.items() if key.lower() in ("unit", "units")), "")
+        numbers = [key for key, child in node.items() if isinstance(child, np.ndarray)]
         for key, child in node.items():
-            _walk(child, f"{name}.{key}", walk)
+            own = bool(unit) and numbers == [key]  # a structure of one array and its unit is that array
+            _walk(child, name if own else f"{name}.{key}", walk, unit if own else "")
     elif isinstance(node, list):
         for i, child in enumerate(node):
             _walk(child, f"{name}({i + 1})", walk)
     elif isinstance(node, np.ndarray) and node.dtype.kind in "buif":
-        _array(node, name, walk)
+        _array(node, name, walk, unit)
     elif isinstance(node, np.ndarray) and node.dtype.kind == "c":
         walk.notes.append(f"left out: {name}, complex numbers")
 
 
-def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
-    """Add an array to the contents: as one number, one channel, or one channel per column."""
+def _array(values: np.ndarray, name: str, walk: _Contents, unit: str) -> None:
+    """Add an array to the contents: as one number, one channel, or one channel per column.
+
+    Without a `unit` beside it, its name may tell one.
+    """
+    heading, named = split_heading(name)
+    name, unit = (name, unit) if unit else (heading, named)
     values = np.squeeze(values)
     if values.ndim == 0:
         walk.scalars[name] = float(values)
     elif values.ndim == 1 and values.size > 1:
-        walk.channels.append(Channel(name, "", values.astype(float), None, name))
+        walk.channels.append(Channel(name, unit, values.astype(float), None, name))
     elif values.ndim == 2 and min(values.shape) <= settings.columns_of_a_matrix:
         for i, column in enumerate(values.T if values.shape[0] >= values.shape[1] else values):
             label = f"{name}(:,{i + 1})" if values.shape[0] >= values.shape[1] else f"{name}({i + 1},:)"
-            walk.channels.append(Channel(label, "", column.astype(float), None, label))
+            walk.channels.append(Channel(label, unit, column.astype(float), None, label))
     elif values.size:
         walk.notes.append(f"left out: {name}, an array of {' x '.join(map(str, values.shape))}")
 
