@@ -170,7 +170,7 @@ class Scaling:
 
 SCALINGS = {
     "speed": Scaling("Controller speed (times yours)", faster, KIND),
-    "friction": Scaling("Friction (times yours)", with_friction, "friction.model"),
+    "friction": Scaling("All friction (times yours)", with_friction, "friction.model"),
 }
 """All axes of factors, by name.
 
