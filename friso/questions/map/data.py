@@ -39,8 +39,8 @@ def page_data(
     """Return everything that the page's script reads, ready for JSON.
 
     Arrays are base64 of little-endian numbers, cell by cell in the order of the axes, the last axis fastest. `drawn`
-    holds the runs of all cells. `rerun` is the command that repeats a run. `figure` is the map of verdicts that the page
-    shows as it is, for a map over two axes. Raises ValueError for runs without axes, or
+    holds the runs of all cells. `rerun` is the command that repeats a run. `figure` is the map of verdicts that the
+    page shows as it is, for a map over two axes. Raises ValueError for runs without axes, or
     without the metric.
     """
     axes = axes_of(runs)

@@ -61,8 +61,8 @@ def map_html(
 
     `drawn` holds the runs of all cells; the page draws the run of the cell that is chosen. `rerun` is the command that
     repeats a run, with {indices} in place of the indices of its cell: "friso simulate --cell map.zarr {indices}".
-    `figure` is the figure of the variable, if it is already drawn, and `edges` are those of its verdicts. Raises ValueError if {indices} is missing, or the
-    runs lack axes or the metric.
+    `figure` is the figure of the variable, if it is already drawn, and `edges` are those of its
+    verdicts. Raises ValueError if {indices} is missing, or the runs lack axes or the metric.
     """
     if "{indices}" not in rerun:
         raise ValueError(

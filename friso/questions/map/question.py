@@ -63,7 +63,8 @@ CONFIRMED_FROM = 10_000_000
 class SweepAnswer(Answer):
     """The runs of a sweep; `result` is an xarray.Dataset with a dimension for each axis.
 
-    `metric` is the variable that colours the map, and `edges` are those of its verdicts. `store` is the folder of the runs, or None if they are in memory.
+    `metric` is the variable that colours the map, and `edges` are those of its verdicts. `store` is the
+    folder of the runs, or None if they are in memory.
     """
 
     study: Study

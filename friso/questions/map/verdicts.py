@@ -29,7 +29,7 @@ WRITTEN = {
 }
 """Words in the regions, and their colours."""
 
-Point = tuple[float, float]
+MapPoint = tuple[float, float]
 """Values [SI] along both axes."""
 
 
@@ -121,7 +121,7 @@ def _bands(levels: Array, edges: MapEdges) -> list[Area]:
     return [Area(*np.concatenate([near, far[::-1], near[:1]]).T, INK) for near, far in sides]
 
 
-def _here(x: CellAxis, y: CellAxis, own: Mapping[str, Any]) -> Point | None:
+def _here(x: CellAxis, y: CellAxis, own: Mapping[str, Any]) -> MapPoint | None:
     """Return the place of the swept stage, None if it is not on the map."""
     values = own.get(x.key), own.get(y.key)
     if not all(isinstance(value, float) for value in values):
@@ -140,7 +140,7 @@ def nearest_way(ways: Iterable[OwnLine]) -> tuple[OwnLine, float] | None:
     return min(factors, key=lambda pair: abs(np.log(pair[1])), default=None)
 
 
-def _way(here: Point, ways: tuple[OwnLine, ...]) -> tuple[tuple[Arrow, ...], tuple[Lettering, ...]]:
+def _way(here: MapPoint, ways: tuple[OwnLine, ...]) -> tuple[tuple[Arrow, ...], tuple[Lettering, ...]]:
     """Return the arrow from the stage to the nearest edge of hunting, and its factor beside it."""
     nearest = nearest_way(ways)
     if nearest is None:
@@ -155,7 +155,7 @@ def _way(here: Point, ways: tuple[OwnLine, ...]) -> tuple[tuple[Arrow, ...], tup
     return (Arrow(here, end, colour),), (words, yours)
 
 
-def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list[Point]) -> Lettering | None:
+def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list[MapPoint]) -> Lettering | None:
     """Return the word of a region where it has most room in it; None where it has too little.
 
     `words` are the verdicts of the cells, shape (n, m), and `taken` places at which something else stands.

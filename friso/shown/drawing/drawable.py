@@ -22,15 +22,12 @@ Field = TypeVar("Field", bound=Coloured)
 
 SIDES = {
     "": ("center", "center", 0, 0),
-    "left": ("right", "center", -1, 0),
-    "right": ("left", "center", 1, 0),
-    "below": ("center", "top", 0, -1),
-    "above": ("center", "bottom", 0, 1),
+    "left": ("right", "center", -8, 0),
+    "right": ("left", "center", 8, 0),
+    "below": ("center", "top", 0, -8),
+    "above": ("center", "bottom", 0, 8),
 }
-"""How words are aligned that stand on a side of a point, and which way they are moved away from it."""
-
-GAP_TO_WORDS = 8
-"""Distance [px or point] of words beside a point."""
+"""How words are aligned that stand on a side of a point, and how far [px or point] they are moved right and up."""
 
 LONGEST_TEXT = 1000
 """Longest text in a figure in characters. The longest caption has half as many."""

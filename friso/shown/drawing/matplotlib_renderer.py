@@ -28,7 +28,7 @@ from matplotlib.transforms import Bbox
 
 from friso.errors import InputError
 from friso.quantities import quoted
-from friso.shown.drawing.drawable import GAP_TO_WORDS, SIDES, drawable, second_ticks, word_ticks
+from friso.shown.drawing.drawable import SIDES, drawable, second_ticks, word_ticks
 from friso.shown.drawing.figure import IMAGE_FORMATS, Area, Axis, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.matplotlib_maps import LINE_HEIGHT, add_colour_bars, add_footer, draw_coloured, footer_height
 from friso.shown.drawing.palette import GREY, INK
@@ -297,7 +297,7 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
         axes.annotate("", arrow.end, arrow.start, arrowprops=shape)
     for item in panel.words:
         across, up, *shift = SIDES[item.side]
-        place = {"ha": across, "va": up, "xytext": [GAP_TO_WORDS * way for way in shift], "textcoords": "offset points"}
+        place = {"ha": across, "va": up, "xytext": shift, "textcoords": "offset points"}
         axes.annotate(item.text, (item.x, item.y), color=item.colour, weight="bold", parse_math=False, **place)
     if panel.equal:
         axes.set_aspect("equal")

@@ -21,7 +21,7 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from friso.shown.drawing import plotly_maps
-from friso.shown.drawing.drawable import GAP_TO_WORDS, SIDES, drawable, log_ticks, second_ticks, word_ticks
+from friso.shown.drawing.drawable import SIDES, drawable, log_ticks, second_ticks, word_ticks
 from friso.shown.drawing.figure import Area, Arrow, Axis, Band, Figure, Lettering, Markers, Panel, Series
 from friso.shown.drawing.packing import packed, packed_json
 from friso.shown.drawing.palette import DARK, GREY, INK
@@ -321,7 +321,7 @@ def _lettering(item: Lettering, panel: Panel, suffix: str) -> dict[str, Any]:
     across, up, right, above = SIDES[item.side]
     text = "<br>".join(f"<b>{html.escape(line)}</b>" for line in item.text.splitlines())
     place = {"x": _at(item.x, panel.x), "y": _at(item.y, panel.y), "xref": f"x{suffix}", "yref": f"y{suffix}"}
-    shift = {"xanchor": across, "yanchor": up, "xshift": GAP_TO_WORDS * right, "yshift": GAP_TO_WORDS * above}
+    shift = {"xanchor": across, "yanchor": up, "xshift": right, "yshift": above}
     return {"text": text, "showarrow": False, "font": {"color": item.colour}, **place, **shift}
 
 
