@@ -35,7 +35,7 @@ from friso.hunting import (
 from friso.hunting.boundary.plane import LastEnd
 from friso.interface.output_folder import MARKER
 from friso.questions.boundary.blocks import boundary_document
-from friso.questions.boundary.figures import LOST, LOST_END, MEETING, NODES, boundary_figure
+from friso.questions.boundary.figures import LOST, NODES, boundary_figure
 from friso.questions.boundary.words import (
     VERDICTS,
     ShownKey,
@@ -354,9 +354,9 @@ def test_the_document_lists_where_curves_meet_and_end(met: Plane) -> None:
 
 def test_the_figure_marks_where_curves_meet_and_are_lost(met: Plane) -> None:
     marks = {mark.label: len(mark.x) for mark in boundary_figure(met, KEYS).panels[0].markers}
-    assert marks == {LOST: 1, MEETING: 6}
+    assert marks == {LOST: 1, "": 6}
     alone = boundary_figure(replace(met, meetings=()), KEYS)
-    assert {mark.label for mark in alone.panels[0].markers} == {LOST, LOST_END}
+    assert {mark.label for mark in alone.panels[0].markers} == {LOST}
     assert matplotlib_renderer.image(alone, "png")
 
 

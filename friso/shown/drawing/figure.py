@@ -188,8 +188,8 @@ class Coloured:
     """Points x, y coloured by the number z [unit] or, where there is one, by a category.
 
     `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`. If `colours` are given,
-    they are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, are indices into `categories`;
-    where a code is NaN, z counts.
+    they are those of the whole numbers 0, 1, 2, ... instead. A `ramp` has other colours from little to much. `codes`,
+    of the shape of z, are indices into `categories`; where a code is NaN, z counts.
     """
 
     x: Array
@@ -202,6 +202,7 @@ class Coloured:
     colours: tuple[str, ...] = ()
     categories: tuple[Category, ...] = ()
     codes: Array | None = None
+    ramp: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that codes have the shape of the numbers. Raises ValueError if they have not."""

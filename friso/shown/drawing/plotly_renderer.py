@@ -340,7 +340,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
     }
     if axis.words:
         positions, words = word_ticks(axis)
-        settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
+        texts = [html.escape(word).replace("\n", "<br>") for word in words]
+        settings |= {"tickmode": "array", "tickvals": positions, "ticktext": texts}
         settings["automargin"] = True  # words may have any length
     if axis.log:
         settings |= _log_ticks(axis.limits)
