@@ -55,7 +55,7 @@ def bode_figures(bode: Bode) -> tuple[Figure, ...]:
 
 def first_figures(bode: Bode) -> tuple[Figure, ...]:
     """Return the figures of the limit cases alone, which need less time than all states."""
-    return _drawn(bode, (_plant(bode), *_cascade(bode), _loop(bode)))
+    return _drawn(bode, (_loop(bode), _plant(bode), *_cascade(bode)))
 
 
 def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:

@@ -120,14 +120,18 @@ def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Show
             style = ("solid", 2.0) if attracts else ("dashed", 1.4)
             series.append(Series(line.at[run, 0], getattr(line, measure)[run], text, COLOURS[line.shape], *style))
     turns = sorted(((line, k) for line in branches for k in line.special), key=lambda turn: turn[0].at[turn[1], 0])
-    markers, words = [], []
+    markers, words = [], list[Lettering]()
+    low, high = x.limits or (0.0, 0.0)
     for line, k in turns:
-        value = getattr(line, measure)[[k]]
-        markers.append(Markers(line.at[[k], 0], value, "", COLOURS[line.shape], SYMBOLS[line.kinds[k]]))
-        if key:
-            text = f"{line.kinds[k]} at {key.as_known(line.at[k, 0], line.error[k, 0])}"
-            side = "below" if len(words) % 2 else "above"
-            words.append(Lettering(float(line.at[k, 0]), float(value[0]), text, COLOURS[line.shape], side))
+        at, value = float(line.at[k, 0]), float(getattr(line, measure)[k])
+        markers.append(Markers(np.array([at]), np.array([value]), "", COLOURS[line.shape], SYMBOLS[line.kinds[k]]))
+        if not key:
+            continue
+        text = f"{line.kinds[k]} at {key.as_known(line.at[k, 0], line.error[k, 0])}"
+        if words and at - words[-1].x < PLANE_MARGIN * (high - low):
+            words[-1] = replace(words[-1], text=f"{words[-1].text}\n{text}")
+        else:
+            words.append(Lettering(at, value, text, COLOURS[line.shape], "below" if len(words) % 2 else "above"))
     return Panel("", x, y, tuple(series), tuple(markers), words=tuple(words))
 
 
