@@ -163,9 +163,11 @@ def subject_of(runs: xr.Dataset) -> str:
 def second_scale(axis: CellAxis, runs: xr.Dataset) -> SecondScale | None:
     """Return the scale of what an axis of factors multiplies, in Hz or N; None for other axes."""
     values = _multiplied(axis, runs)
-    if values is None or values[1] is None:
+    if values is None:
         return None
     name, own, unit, _ = values
+    if own is None:
+        return None
     return SecondScale(f"{name[0].upper()}{name[1:]}".partition(" (")[0], unit, own)
 
 

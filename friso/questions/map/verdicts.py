@@ -63,7 +63,7 @@ def verdict_panel(
     if edges is not None:
         areas += _bands(levels, edges)
     here = _here(x, y, own)
-    arrows, beside = _way(here, drawn.own) if here else ((), ())
+    arrows, beside = _way(here, drawn.own, x.key) if here else ((), ())
     taken = [*([here] if here else []), *(arrow.end for arrow in arrows)]
     lettering = [item for word in WRITTEN if (item := _written(word, words, x, y, taken))]
     written = {KICKED, *(word for word, (text, _) in WRITTEN.items() if any(item.text == text for item in lettering))}
@@ -75,8 +75,8 @@ def verdict_panel(
         title,
         x.axis((float(x.positions[0]), float(x.positions[-1]))),
         y.axis((float(y.positions[0]), float(y.positions[-1]))),
-        tuple(Series(*line.T, "", INK, width=1.8) for line in _lines(levels, mesh[-1])),
-        (Markers(*np.array(here)[:, None], "", INK, "target"),) if here else (),
+        tuple(Series(line[:, 0], line[:, 1], "", INK, width=1.8) for line in _lines(levels, mesh[-1])),
+        (Markers(np.array(here[:1]), np.array(here[1:]), "", INK, "target"),) if here else (),
         maps=(Map(x.positions, y.positions, np.full(codes.shape, np.nan), *colouring.scale[:-1], categories, codes),),
         areas=tuple(areas),
         arrows=arrows,
@@ -112,13 +112,15 @@ def _area(levels: Array, cells: np.ndarray, mesh: Array, colour: str, hatched: b
     for points, offsets in zip(*_contours(levels, cells).filled(0.5, np.inf), strict=True):
         for ring in np.split(points, offsets[1:-1]):
             rings += [_placed(ring, mesh), np.full((1, 2), np.nan)]
-    return Area(*(np.concatenate(rings[:-1]) if rings else np.zeros((0, 2))).T, colour, hatched)
+    x, y = (np.concatenate(rings[:-1]) if rings else np.zeros((0, 2))).T
+    return Area(x, y, colour, hatched)
 
 
 def _bands(levels: Array, edges: MapEdges) -> list[Area]:
     """Return the areas between the last places inside and the first outside along the edges of hunting."""
     sides = zip(_lines(levels, edges.near[-1]), _lines(levels, edges.far[-1]), strict=True)
-    return [Area(*np.concatenate([near, far[::-1], near[:1]]).T, INK) for near, far in sides]
+    rings = [np.concatenate([near, far[::-1], near[:1]]) for near, far in sides]
+    return [Area(ring[:, 0], ring[:, 1], INK) for ring in rings]
 
 
 def _here(x: CellAxis, y: CellAxis, own: Mapping[str, Any]) -> MapPoint | None:
@@ -140,19 +142,34 @@ def nearest_way(ways: Iterable[OwnLine]) -> tuple[OwnLine, float] | None:
     return min(factors, key=lambda pair: abs(np.log(pair[1])), default=None)
 
 
-def _way(here: MapPoint, ways: tuple[OwnLine, ...]) -> tuple[tuple[Arrow, ...], tuple[Lettering, ...]]:
-    """Return the arrow from the stage to the nearest edge of hunting, and its factor beside it."""
+def _way(here: MapPoint, ways: tuple[OwnLine, ...], key: str) -> tuple[tuple[Arrow, ...], tuple[Lettering, ...]]:
+    """Return the arrow from the stage to the nearest edge of hunting, and its factor beside it.
+
+    `key` is that of the axis to the right.
+    """
     nearest = nearest_way(ways)
     if nearest is None:
         return (), ()
     way, factor = nearest
-    across = way is ways[0] if len(ways) > 1 else None
+    across = way.key == key
     end = (here[0] * factor, here[1]) if across else (here[0], here[1] * factor)
     colour = WHITE if way.attracts else INK
-    middle = (float(np.sqrt(here[0] * end[0])), float(np.sqrt(here[1] * end[1])))
+    half = factor**0.5
+    middle = (here[0] * half, here[1]) if across else (here[0], here[1] * half)
     words = Lettering(*middle, f"× {factor:.3g}", colour, "above" if across else "right")
     yours = Lettering(*here, "YOURS", colour, "below" if across or factor > 1 else "above")
     return (Arrow(here, end, colour),), (words, yours)
+
+
+def _room(cells: np.ndarray, steps: list[float]) -> Array:
+    """Return how far each cell, shape (n, m), lies from the next one that is not marked, or the side of the map.
+
+    `steps` are the sizes of a cell.
+    """
+    from scipy import ndimage
+
+    distances: Any = ndimage.distance_transform_edt(np.pad(cells, 1), sampling=steps)
+    return distances[1:-1, 1:-1]
 
 
 def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list[MapPoint]) -> Lettering | None:
@@ -169,23 +186,22 @@ def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list
     lines = text.splitlines()
     shares = map_settings.letter_width * max(map(len, lines)), map_settings.line_height * len(lines)
     steps = [1 / share / count for share, count in zip(shares, cells.shape, strict=True)]  # [sizes of the words]
-    rows = [np.log(axis.positions) if axis.log else axis.positions for axis in (x, y)]
     if word == HUNTS:
-        kicked, count = ndimage.label(words == KICKED)
-        sizes = [
-            (ndimage.distance_transform_edt(np.pad(kicked == k + 1, 1), sampling=steps)).max() for k in range(count)
-        ]
-        for k in np.flatnonzero(np.array(sizes) > map_settings.room_of_words):
-            cells &= kicked != k + 1
-    free = np.pad(cells, 1)
+        labelled: Any = ndimage.label(words == KICKED)
+        parts = [labelled[0] == number + 1 for number in range(labelled[1])]
+        for part in parts:
+            cells &= ~part if _room(part, steps).max() > map_settings.room_of_words else True
+    free = cells.copy()
     for place in taken:
-        at = [
-            int(np.abs(row - (np.log(value) if axis.log else value)).argmin())
-            for row, value, axis in zip(rows, place, (x, y), strict=True)
-        ]
-        free[at[0] + 1, at[1] + 1] = False
-    room = ndimage.distance_transform_edt(free, sampling=steps)[1:-1, 1:-1]
+        free[_nearest_cell(x, place[0]), _nearest_cell(y, place[1])] = False
+    room = _room(free, steps)
     if room.max() < map_settings.room_of_words:
         return None
     at = np.unravel_index(room.argmax(), room.shape)
     return Lettering(float(x.positions[at[0]]), float(y.positions[at[1]]), text, colour)
+
+
+def _nearest_cell(axis: CellAxis, value: float) -> int:
+    """Return the index of the cell of an axis next to a value [SI]."""
+    away = np.log(axis.positions / value) if axis.log else axis.positions - value
+    return int(np.abs(away).argmin())
