@@ -271,9 +271,8 @@ def test_the_figure_of_one_key_is_solid_where_the_cycle_attracts(round_a_fold: D
     dashes = [(line.dash, line.x[0], line.x[-1]) for line in figure.panels[2].series]
     assert [dash for dash, _, _ in dashes] == ["solid", "dashed", "solid", "dashed"]
     assert dashes[0][1:] == pytest.approx((1e-3, 1.45e-3))
-    assert [marker.label for marker in figure.panels[0].markers] == [
-        *("flip at 1.45 mm", "flip at 1.72 mm", "fold at 1.73 mm"),
-    ]
+    words = [line for item in figure.panels[0].words for line in item.text.splitlines()]
+    assert words == ["flip at 1.45 mm", "flip at 1.72 mm", "fold at 1.73 mm"]
     assert matplotlib_renderer.image(figure, "png")
 
 
@@ -408,9 +407,9 @@ def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: P
     assert panel.y.log
     assert not panel.x.log
     texts = [text.get_text() for text in matplotlib_renderer.render(figure).legends[0].get_texts()]
-    assert texts == [*(kind.label for kind in NODES.values()), LOST, "flip of the hunting cycle"]
+    assert texts == [*(kind.label for kind in NODES.values()), LOST, "edge of hunting"]
     names = [trace.name for trace in plotly_renderer.render(figure).data if trace.mode == "lines"]
-    assert "flip of the hunting cycle" in names
+    assert "edge of hunting" in names
 
 
 def test_a_value_is_told_as_far_as_it_is_known() -> None:

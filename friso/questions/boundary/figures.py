@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friso.hunting import Diagram, KeyRange, Plane
+from friso.questions.boundary.settings import boundary_figure_settings
 from friso.questions.boundary.words import BASIN, MEANINGS, ShownKey, end_sentence
 from friso.questions.map.words import QUIET, quantity
 from friso.shown.drawing.figure import (
@@ -50,9 +51,6 @@ LARGEST_MULTIPLIER = 2.5
 
 LOGARITHMIC_RATIO = 30.0
 """Ratio of the largest to the smallest amplitude above which the axis is logarithmic."""
-
-BEYOND_THE_STORY = 0.15
-"""How far an axis goes on beyond its last cycle, as a share of the range that has cycles."""
 
 PLANE_MARGIN = 0.02
 """Margin around the plane of two keys, as a fraction of the range, so that nodes at its sides are fully visible."""
@@ -98,9 +96,9 @@ def _told(branches: tuple[Line, ...], axis: Axis) -> Axis:
     low, high = axis.limits
     ends = (float(at.min()), float(at.max()))
     if axis.log:
-        gap = (ends[1] / ends[0]) ** BEYOND_THE_STORY
+        gap = (ends[1] / ends[0]) ** boundary_figure_settings.axis_beyond
         return replace(axis, limits=(max(low, ends[0] / gap), min(high, ends[1] * gap)))
-    gap = BEYOND_THE_STORY * (ends[1] - ends[0])
+    gap = boundary_figure_settings.axis_beyond * (ends[1] - ends[0])
     return replace(axis, limits=(max(low, ends[0] - gap), min(high, ends[1] + gap)))
 
 

@@ -58,20 +58,21 @@ def _intervals(identification: Identification) -> list[Figure]:
         [abs(estimate.value) if estimate.determined else (estimate.low + estimate.high) / 2 for estimate in bounded]
     )
     share = np.minimum(100 * half / np.maximum(np.abs(middle), 1e-3 * half), 100.0)
-    visible = np.array([estimate.determined for estimate in bounded]) & (share < 100)
+    determined, lost = np.array([estimate.determined for estimate in bounded]), share >= 100
+    visible = determined & ~lost
     places = np.arange(len(bounded), dtype=float)
     left = 0.5 * float(share.min())
     stems = [
-        Series(np.array([left, x]), np.full(2, y), "", BLUE, width=2.0)
-        for x, y, ok in zip(share, places, visible, strict=True)
-        if ok
+        Series(np.array([left, x]), np.full(2, y), "", BLUE if ok else ORANGE, width=2.0)
+        for x, y, ok in zip(share[~lost], places[~lost], visible[~lost], strict=True)
     ]
     kinds: tuple[tuple[np.ndarray, str, str, Symbol], ...] = (
         (visible, "shown", BLUE, "circle"),
-        (~visible, "not shown by these logs", ORANGE, "cross"),
+        (~determined & ~lost, "not shown: the range left", ORANGE, "triangle"),
+        (lost, "none found", ORANGE, "cross"),
     )
     points = [
-        Markers(np.where(visible, share, 100.0)[chosen], places[chosen], label, colour, symbol)
+        Markers(share[chosen], places[chosen], label, colour, symbol)
         for chosen, label, colour, symbol in kinds
         if chosen.any()
     ]
