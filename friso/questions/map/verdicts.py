@@ -164,12 +164,14 @@ def _way(here: MapPoint, ways: tuple[OwnLine, ...], key: str) -> tuple[tuple[Arr
 def _room(cells: np.ndarray, steps: list[float]) -> Array:
     """Return how far each cell, shape (n, m), lies from the next one that is not marked, or the side of the map.
 
-    `steps` are the sizes of a cell.
+    The map ends at the outermost cells. `steps` are the sizes of a cell.
     """
     from scipy import ndimage
 
-    distances: Any = ndimage.distance_transform_edt(np.pad(cells, 1), sampling=steps)
-    return distances[1:-1, 1:-1]
+    inner = np.zeros(cells.shape, bool)
+    inner[1:-1, 1:-1] = cells[1:-1, 1:-1]
+    distances: Any = ndimage.distance_transform_edt(inner, sampling=steps)
+    return distances
 
 
 def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list[MapPoint]) -> Lettering | None:
