@@ -59,9 +59,15 @@ def machine() -> bytes:
 
 
 def hunting() -> bytes:
-    """The rig with its joint locked: it swings on and on."""
-    response = friso.simulate(rig().replace({"joint.locked": True}), sample_time="5 ms")
-    return _first(response)
+    """The error of the rig after its move, joint locked and free: one swings on and on, the other settles."""
+    cases = (("joint locked: hunts", True, VERMILLION), ("joint free: settles", False, BLUE))
+    lines = []
+    for label, locked, colour in cases:
+        run = friso.simulate(rig().replace({"joint.locked": locked}), sample_time="5 ms").data
+        error = run["position"] - run["reference"]
+        lines.append(Series(run["time"].values, error.values, label, colour))
+    panel = Panel("", Axis("Time", "s", (5, 20)), Axis("Error", "m", (-8e-4, 8e-4)), tuple(lines))
+    return image(Figure("hunting", "Locked, it never stops; free, it stands still after seconds", "", (panel,)), "png")
 
 
 def thesis_rig() -> bytes:
@@ -135,6 +141,11 @@ def thesis_map() -> bytes:
     return _first(friso.sweep(rig(), ranges, set={"joint.locked": True}))
 
 
+def compare() -> bytes:
+    """Isolator or firmware, on machines drawn at random."""
+    return _first(friso.compare(friso.example("thesis_drive"), machines=200))
+
+
 def _first(answer: Answer) -> bytes:
     return image(answer.figures()[0], "png")
 
@@ -149,6 +160,7 @@ FIGURES: Mapping[str, Callable[[], bytes]] = {
     "limit_cycle.png": limit_cycle,
     "branch.png": branch,
     "thesis_map.png": thesis_map,
+    "compare.png": compare,
 }
 
 

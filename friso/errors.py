@@ -1,6 +1,8 @@
 """Errors about inputs: each states in one clear message what is wrong."""
 
+import re
 from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Self
 
 from friso.escapes import escaped, one_line
@@ -39,10 +41,20 @@ class InputError(ValueError):
 
     def __str__(self) -> str:
         head = ": ".join(shortened(one_line(part)) for part in (self.origin, self.key) if part)
-        rows = {"given:": self.actual, "expected:": self.expected, "example:": self.example}
+        rows = {"given:": f"{self.actual}{self._hint}", "expected:": self.expected, "example:": self.example}
         lines = [f"  {name:<9} {shortened(text)}" for name, text in rows.items() if text]
         lines += [f"  {'also:':<9} {shortened(f'{one_line(key)}: {actual}')}" for key, actual in self.also]
         return escaped("\n".join([head, *lines]).lstrip("\n"))
+
+    @property
+    def _hint(self) -> str:
+        """Return which of the choices was meant, for a word that is nearly one of them; empty otherwise."""
+        kind, _, choices = self.expected.partition("one of ")
+        if kind or ";" in self.actual:
+            return ""
+        words = [part.strip("\"' ") for part in re.split(r", |; | or ", choices)]
+        near = get_close_matches(self.actual.strip("\"'"), words, 1)
+        return f"; did you mean {near[0]}?" if near else ""
 
     @classmethod
     def of(cls, error: "InputError") -> Self:

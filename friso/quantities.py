@@ -96,6 +96,9 @@ def quoted(value: Any, hint: str = "") -> str:
 LARGEST_VALUE = 1e30
 """Bound on SI values: larger than any value of a machine, and small enough for squares and products."""
 
+LARGEST = {"m": 1e9}
+"""Largest values [SI unit] of keys that are read, by unit: a slip of the pen, not a machine, has larger ones."""
+
 BEYOND = "too large: beyond 1e30 in SI"
 
 
@@ -204,6 +207,9 @@ class Quantity:
             raise InputError("", quoted(text, str(refused)), self.expected, self.written_example) from None
         if not self.bound.holds(value):
             raise InputError("", quoted(text), self.expected, self.written_example)
+        if abs(value) > LARGEST.get(self.unit, LARGEST_VALUE):
+            hint = f"farther than any stage moves ({LARGEST[self.unit]:.0e} {self.unit})"
+            raise InputError("", quoted(text, hint), self.expected, self.written_example)
         return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

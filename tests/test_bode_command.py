@@ -35,7 +35,7 @@ command = command_of("bode")
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, EMPS = EXAMPLES / "thesis_rig.toml", EXAMPLES / "emps_axis.toml"
-FIGURES = ("bode_plant", "bode_loop", "bode_speeds", "bode_nyquist", "bode_sensitivity")
+FIGURES = ("bode_loop", "bode_plant", "bode_speeds", "bode_nyquist", "bode_sensitivity")
 MARGINS = {
     *("stable", "crossovers_hz", "phase_margin_deg", "gain_margin", "gain_reduction", "modulus_margin"),
     *("peak_sensitivity", "delay_margin_s", "closest_hz", "poles"),
@@ -173,13 +173,25 @@ def test_the_highest_stable_crossover_is_that_of_the_joint_as_given(rig: Stage) 
 def test_series_adds_the_thesis_formula_beside(rig: Stage) -> None:
     loops = bode(rig, (1.0, 100.0), series=True)
     assert {"stuck-touched-series", "sliding-touched-series"} <= bode_document(loops)["cases"].keys()
-    plant = bode_figures(loops)[0].panels[0]
+    plant = _figures(loops)["bode_plant"].panels[0]
     dashed = {line.label: line for line in plant.series if line.dash == "dashed"}
     assert "Sliding, limiter in series" in dashed
     line = dashed["Stuck, limiter in series"]
     assert line.y == pytest.approx(np.abs(loops.cases["stuck-touched-series"].plant))
     assert plant.x.limits == pytest.approx((1.0, 100.0))
     assert (line.x[0], line.x[-1]) == pytest.approx((1.0, 100.0))
+
+
+def test_the_last_crossover_and_its_phase_margin_are_marked(rig: Stage) -> None:
+    loops = bode(rig)
+    above, below = _figures(loops)["bode_loop"].panels
+    for mark, margin, case in zip(
+        above.markers, below.series[-len(above.markers) :], loops.cases.values(), strict=True
+    ):
+        assert mark.x == pytest.approx(case.margins.crossovers[-1:])
+        assert f"{abs(margin.y[1] - margin.y[0]):.0f}°" in mark.label
+    last = loops.cases["sliding"].margins
+    assert f"{last.phase_margin:.0f}°" in above.markers[1].label
 
 
 def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode, snapshots: Snapshots) -> None:
@@ -211,7 +223,7 @@ def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> N
     assert [item.label for item in shown_states(rigid)] == ["As given"]
     assert "0.73" in sentences(rigid)[0]
     figures = _figures(rigid)
-    assert [*figures] == ["bode_plant", "bode_loop", "bode_nyquist", "bode_sensitivity"]
+    assert [*figures] == ["bode_loop", "bode_plant", "bode_nyquist", "bode_sensitivity"]
     assert not figures["bode_sensitivity"].panels[0].bands
     plant = figures["bode_plant"].panels
     assert [line.label for line in plant[0].series] == ["As given", "mass of 2 kg"]

@@ -35,7 +35,7 @@ from friso.hunting import (
 from friso.hunting.boundary.plane import LastEnd
 from friso.interface.output_folder import MARKER
 from friso.questions.boundary.blocks import boundary_document
-from friso.questions.boundary.figures import LOST, LOST_END, MEETING, NODES, boundary_figure
+from friso.questions.boundary.figures import LOST, NODES, boundary_figure
 from friso.questions.boundary.words import (
     VERDICTS,
     ShownKey,
@@ -271,9 +271,8 @@ def test_the_figure_of_one_key_is_solid_where_the_cycle_attracts(round_a_fold: D
     dashes = [(line.dash, line.x[0], line.x[-1]) for line in figure.panels[2].series]
     assert [dash for dash, _, _ in dashes] == ["solid", "dashed", "solid", "dashed"]
     assert dashes[0][1:] == pytest.approx((1e-3, 1.45e-3))
-    assert [marker.label for marker in figure.panels[0].markers] == [
-        *("flip at 1.45 mm", "flip at 1.72 mm", "fold at 1.73 mm"),
-    ]
+    words = [line for item in figure.panels[0].words for line in item.text.splitlines()]
+    assert words == ["flip at 1.45 mm", "flip at 1.72 mm", "fold at 1.73 mm"]
     assert matplotlib_renderer.image(figure, "png")
 
 
@@ -354,9 +353,9 @@ def test_the_document_lists_where_curves_meet_and_end(met: Plane) -> None:
 
 def test_the_figure_marks_where_curves_meet_and_are_lost(met: Plane) -> None:
     marks = {mark.label: len(mark.x) for mark in boundary_figure(met, KEYS).panels[0].markers}
-    assert marks == {LOST: 1, MEETING: 6}
+    assert marks == {LOST: 1, "": 6}
     alone = boundary_figure(replace(met, meetings=()), KEYS)
-    assert {mark.label for mark in alone.panels[0].markers} == {LOST, LOST_END}
+    assert {mark.label for mark in alone.panels[0].markers} == {LOST}
     assert matplotlib_renderer.image(alone, "png")
 
 
@@ -408,9 +407,9 @@ def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: P
     assert panel.y.log
     assert not panel.x.log
     texts = [text.get_text() for text in matplotlib_renderer.render(figure).legends[0].get_texts()]
-    assert texts == [*(kind.label for kind in NODES.values()), LOST, "flip of the hunting cycle"]
+    assert texts == [*(kind.label for kind in NODES.values()), LOST, "edge of hunting"]
     names = [trace.name for trace in plotly_renderer.render(figure).data if trace.mode == "lines"]
-    assert "flip of the hunting cycle" in names
+    assert "edge of hunting" in names
 
 
 def test_a_value_is_told_as_far_as_it_is_known() -> None:

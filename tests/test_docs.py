@@ -1,6 +1,7 @@
 """Test README, docs and package: links lead somewhere, generated pages are complete and not stale."""
 
 import importlib.util
+import io
 import json
 import re
 import shutil
@@ -13,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import matplotlib.image
 import pytest
 
 import friso
@@ -79,6 +81,37 @@ def test_figures_are_of_what_makes_them_and_small() -> None:
     stale = [name for name in figures.FIGURES if made.get(name) != figures.source_of(name)]
     assert stale == [], "run python docs/figures.py with these names"
     assert [path.name for path in DOCS.glob("*.[ps][nv]g") if path.stat().st_size > 300_000] == []
+
+
+PLACED = re.compile(r"!\[[^]]*\]\((?:docs/)?([\w./]+)\)")
+RECORDED = {"identify_friction.png"}
+"""Pictures of published records, which are not in the repository."""
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *DOCS.glob("*.md")], ids=lambda page: page.name)
+def test_every_picture_of_the_docs_has_a_function_that_makes_it(page: Path) -> None:
+    pictures = {name for name in PLACED.findall(page.read_text(encoding="utf-8")) if "/" not in name}
+    assert pictures - RECORDED <= set(module("figures").FIGURES)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "name", ["hunting.png", "thesis_rig.png", "thesis_map.png", "thesis_cycles.png", "compare.png"]
+)
+def test_a_picture_of_the_docs_is_made_as_it_is_there(name: str) -> None:
+    made = matplotlib.image.imread(io.BytesIO(module("figures").FIGURES[name]()))
+    assert made.shape == matplotlib.image.imread(DOCS / name).shape
+
+
+STORIES = {"robot_wrist": friso.bode, "telescope": friso.check, "ball_screw_table": friso.check}
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_a_story_says_what_the_command_answers(name: str) -> None:
+    """Every number of the answer stands in the story."""
+    story = (DOCS / "stories.md").read_text(encoding="utf-8")
+    for sentence in STORIES[name](friso.example(name)).sentences():
+        assert sentence in story
 
 
 def keys_of(node: Mapping[str, Any]) -> Iterator[str]:

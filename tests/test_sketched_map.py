@@ -14,8 +14,7 @@ from friso.hunting.criteria import ATTRACTED, SWINGS
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.questions.map.data import page_data
 from friso.questions.map.figures import map_figure
-from friso.questions.map.findings import caveats, own_place
-from friso.questions.map.page import map_html
+from friso.questions.map.findings import caveats, message, own_place
 from friso.questions.map.question import SweepAnswer
 from friso.stage import Stage
 
@@ -86,27 +85,62 @@ def test_what_cannot_be_scaled_or_confirmed_is_refused(locked: Stage, changed: A
         friso.sweep(locked.replace(changed), axes, **options)
 
 
-def test_the_edge_lies_between_cells_that_hunt_and_cells_that_do_not(sketched: SweepAnswer) -> None:
-    (panel,) = map_figure(sketched.data, "sketch").panels
-    (edge,) = panel.series
-    row = np.isin(sketched.data["sketch"].values, ATTRACTED)[:, 1]
-    at = int(np.flatnonzero(row[:-1] & ~row[1:])[-1])
-    crossing = edge.x[np.isclose(edge.y, 1.0)]
-    assert np.any((crossing > SPEEDS[at]) & (crossing < SPEEDS[at + 1]))
+def test_the_edge_of_a_map_is_that_at_which_followed_cycles_cease_to_attract(
+    locked: Stage, sketched: SweepAnswer
+) -> None:
+    """On every line between cells, and on those through the stage, it is the flip that `friso boundary` follows."""
+    assert sketched.edges is not None
+    (along_speed, _) = sketched.edges.own
+    (edge,) = along_speed.changes
+    (branch, *_) = friso.boundary(locked, {"speed": "0.9..1.4"}).result.special
+    (flip,) = [spot for spot in branch if spot.kind == "flip"]
+    assert edge[0] <= 0.9 + 0.5 * flip.point.place <= edge[1]
+    assert edge[1] - edge[0] < 0.002
+    (panel,) = map_figure(sketched.data, "sketch", edges=sketched.edges).panels
+    (line,) = panel.series
+    at = np.isclose(line.y, 1.0)
+    assert line.x[at] == pytest.approx([edge.mean()], rel=1e-3)
     assert not map_figure(sketched.data, "outcome").panels[0].series
-    x, y = page_data(sketched.data, "sketch", "{indices}")["edge"]
-    assert [value is None for value in x] == [*np.isnan(edge.x)]
-    assert np.nanmax(np.array(y, float)) == pytest.approx(np.nanmax(edge.y), rel=1e-4)
-    assert page_data(sketched.data, "outcome", "{indices}")["edge"] is None
+
+
+def test_the_title_of_a_map_says_what_holds_over_the_whole_picture(sketched: SweepAnswer) -> None:
+    hunts = np.isin(sketched.data["sketch"].values, ATTRACTED)
+    assert (hunts[:-1] >= hunts[1:]).all()
+    says = message(sketched.data, "sketch", sketched.edges)
+    assert "left of the line" in says
+    assert "9.75 Hz" in says
+    mirrored = message(sketched.data.isel(speed=slice(None, None, -1)), "sketch", None)
+    assert "left of the line" in mirrored
+    assert "right of the line" in message(sketched.data.assign_coords(speed=SPEEDS[::-1]), "sketch", None)
+    assert "nowhere" in message(sketched.data.isel(speed=[-2, -1], friction=[0, 1]), "sketch", None)
+    assert not message(sketched.data, "outcome", None)
+
+
+def test_regions_of_a_map_are_written_on_and_the_stage_points_to_the_nearest_edge(sketched: SweepAnswer) -> None:
+    (panel,) = map_figure(sketched.data, "sketch", edges=sketched.edges).panels
+    words = {item.text: item for item in panel.words}
+    verdict = sketched.data["sketch"].sel(speed=words["HUNTS"].x, friction=words["HUNTS"].y, method="nearest")
+    assert verdict.item() in ATTRACTED
+    (arrow,) = panel.arrows
+    assert arrow.start == (1.0, 1.0)
+    assert arrow.end[0] == pytest.approx(9.75 / 8, rel=1e-3)
+    assert arrow.end[1] == 1.0
+    assert (panel.x.second.unit, panel.x.second.factor) == ("Hz", 8.0)  # type: ignore[union-attr]
+    assert (panel.y.second.unit, panel.y.second.factor) == ("N", 3.0)  # type: ignore[union-attr]
+    picture = page_data(sketched.data, "sketch", "{indices}", figure=map_figure(sketched.data, "sketch"))["picture"]
+    assert picture["layout"]["xaxis91"]["matches"] == "x"
+    assert page_data(sketched.data, "outcome", "{indices}", figure=map_figure(sketched.data))["picture"] is None
 
 
 def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(locked: Stage, sketched: SweepAnswer) -> None:
-    """The nearest cell is not called the stage."""
+    """Without edges, the nearest cell is not called the stage."""
+    (sentence,) = own_place(sketched.data, "sketch", sketched.edges)
+    assert "Your stage hunts" in sentence
+    assert "crossover 9.75 Hz" in sentence
     (sentence,) = own_place(sketched.data, "sketch")
     assert "hunts" in sentence
     assert "crossover 8.000 to 10.40 Hz" in sentence
     assert not own_place(sketched.data, "outcome")
-    assert sentence.split(";")[0] in map_html(sketched.data, "sketch", "{indices}")
     beside = friso.sweep(locked, {"controller.crossover": ["5 Hz", "9.9 Hz", "14 Hz"]})
     (sentence,) = own_place(beside.data, "sketch")
     assert "nearest" in sentence

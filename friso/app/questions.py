@@ -22,7 +22,7 @@ from friso.app.uploads import Uploads
 from friso.axis import speaking_of
 from friso.equations.motion import rests
 from friso.errors import InputError
-from friso.hunting import cannot_hunt
+from friso.hunting import cannot_hunt, is_moved_evenly
 from friso.identification.logs.mapping import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
@@ -264,7 +264,10 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     options = asked.chosen(*OPTIONS["map"])
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
-    shown = {"metric": options.get("metric", "outcome"), "log": options.get("log", False)}
+    metric, stage = str(options.get("metric", "outcome")), asked.machine.stage
+    if metric == "sketch" and not rests(stage.flat()):  # there is a verdict only where the reference comes to stand
+        metric = "stick_slip" if is_moved_evenly(stage) else "outcome"
+    shown = {"metric": metric, "log": options.get("log", False)}
 
     def ranges(count: int) -> dict[str, Any]:
         """Return the ranges of both axes with `count` points."""

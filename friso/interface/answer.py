@@ -5,12 +5,14 @@ The terminal, pages and programs show one and the same answer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import copy_context
 from functools import wraps
 from html import escape
 from importlib import import_module
 from importlib.util import find_spec
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, ParamSpec, TypeVar
 
@@ -39,14 +41,22 @@ def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Ret
     """Turn the function of a question into a public function of friso (a decorator).
 
     The decorated function checks its arguments, and restores the kind of axis, by which units are named, when it ends.
-    Shared parameters are added to the docstring.
+    Shared parameters are added to the docstring. Errors name a parameter by its name in Python.
     """
     function.__doc__ = described(function)
-    answer = check_arguments(function)
+    answer, names = check_arguments(function), signature(function).parameters
 
     @wraps(function)
     def asked(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
-        return copy_context().run(answer, *arguments, **options)
+        try:
+            return copy_context().run(answer, *arguments, **options)
+        except InputError as error:
+            key, origin, example = error.key or error.origin, error.origin * bool(error.key), error.example
+            name = key.removeprefix("--").replace("-", "_")
+            if not key.startswith("--") or name not in names:
+                raise
+            example = re.sub(f"^{re.escape(key)} ", f"{name}=", example)
+            raise type(error)(name, error.actual, error.expected, example, origin, error.also) from None
 
     return asked
 
@@ -382,7 +392,8 @@ class Answer:
 
     def __dir__(self) -> list[str]:
         own = (name for name in super().__dir__() if name.startswith("__") or not name.startswith("_"))
-        return sorted({*own, *(name for name in dir(self.result) if not name.startswith("_"))})
+        plain = {*dir(Mapping), *dir(dict), *dir(tuple)}  # what any collection has says nothing of the answer
+        return sorted({*own, *(name for name in dir(self.result) if not name.startswith("_") and name not in plain)})
 
 
 for _name in _SHOWN:

@@ -12,6 +12,7 @@ import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from numbers import Integral
 from typing import Any, Literal, cast
 
@@ -170,7 +171,7 @@ class Scaling:
 
 SCALINGS = {
     "speed": Scaling("Controller speed (times yours)", faster, KIND),
-    "friction": Scaling("Friction (times yours)", with_friction, "friction.model"),
+    "friction": Scaling("All friction (times yours)", with_friction, "friction.model"),
 }
 """All axes of factors, by name.
 
@@ -405,7 +406,9 @@ def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
         raise InputError(key, problem, "a key of the stage, or a stage with that table")
     if not rest or table not in type(stage).model_fields:
         expected = "a key of the stage file, or a name that a link uses"
+        names = [*stage.numeric_keys(), *SCALINGS]
         near = [name for name in stage.numeric_keys() if key in name.split(".", 1)[-1] or name.startswith(key)]
+        near = near or get_close_matches(key, [*names, *(name.split(".", 1)[-1] for name in names)], 1)
         hint = f"; did you mean {' or '.join(near)}?" if 0 < len(near) < 4 else ""
         actual = f"a name that nothing depends on{hint}"
         raise InputError(key, actual, expected, 'with the link masses.cart = "0.7 * mass"')

@@ -20,6 +20,12 @@ class StudySettings(Settings):
     tried_values: int = setting(9, "")
     """Values tried over a range. Fewer miss a range with cycles in its middle only."""
 
+    edge_precision: float = setting(5e-4, "ranges")
+    """Precision of edges of a map at which a closed orbit ceases to attract. Three digits of them are sure."""
+
+    seen_edge_precision: float = setting(5e-3, "ranges")
+    """Precision of edges of a map by verdicts alone, which take longer. It is a fifth of a cell of a usual map."""
+
     scheduler_timeout: float = setting(10.0, "s")
     """Time within which a scheduler on a busy network answers."""
 

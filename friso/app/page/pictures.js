@@ -200,14 +200,14 @@ export class Pictures {
   /** The two keys of a map, with their ranges; gives the options of the question. */
   axes(place) {
     const numeric = this.machine.tables.filter((item) => item.present).flatMap((item) => item.keys.filter((key) => key.range && typeof key.value === "string"));
-    const wanted = this.kept.get("axes") ?? ["controller.crossover", this.has("joint") ? "joint.stroke" : "friction.static"];
+    const wanted = this.kept.get("axes") ?? ["controller.crossover", "friction.static"];
     const chosen = wanted.map((path, k) => numeric.find((key) => key.path === path) ?? numeric[k]);
     const fields = chosen.map((key, k) => this.axis(numeric, key, "xy"[k]));
     const start = () => {
       clearTimeout(this.timer);
       this.timer = setTimeout(() => this.ask(), AT_REST);
     };
-    const metric = el("select", { id: "metric" }, ...this.machine.metrics.map(({ id, label }) => el("option", { value: id, selected: id === "outcome" }, label)));
+    const metric = el("select", { id: "metric" }, ...this.machine.metrics.map(({ id, label }) => el("option", { value: id, selected: id === "sketch" }, label)));
     const log = this.tick("log", () => fields.every((item) => numeric.find((key) => key.path === item.key.value).range.log));
     const edge = this.tick("edge", () => false);
     for (const item of fields) item.key.addEventListener("change", log.again);

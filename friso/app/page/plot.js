@@ -2,24 +2,15 @@
 import { el, plain } from "./dom.js";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
-/** Colours of the figures that a dark page shows otherwise. */
-const DARK = { "#222222": "#e6e7e9", "#e3e3e3": "#2f3338", "#767676": "#9aa0a6", "#0072B2": "#56B4E9", "#c9c9c9": "#5a5f66", "#a9a9a9": "#777d84" };
 const NARROW = 640;
 const RESIZED = 100; // [ms]
 const CONFIG = { displaylogo: false, modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]], showSendToCloud: false, plotlyServerURL: "" };
 
-/** What stands on a map, whose cells are the same on a dark page, is ringed in white, and keeps its colours. */
+/** What is ringed in white is seen on any ground, and keeps its colours. */
 const isRinged = (value) => value.line?.color === "white";
 
-/** Lines on a map have a colour that is seen on its cells, and in its legend on a dark page. */
-const ON_MAP = { ...DARK, "#222222": "#0072B2" };
-
-function themedTraces(traces) {
-  const maps = new Set(traces.filter((trace) => trace.type === "heatmap").map((trace) => trace.xaxis));
-  return traces.map((trace) => themed(trace, maps.has(trace.xaxis) ? ON_MAP : DARK));
-}
-
-function themed(value, colours = DARK) {
+/** A part of a figure in the colours of a dark page, as the figure names them. */
+function themed(value, colours) {
   if (typeof value === "string") return colours[value] ?? value;
   if (value === null || typeof value !== "object" || ArrayBuffer.isView(value) || isRinged(value)) return value;
   if (Array.isArray(value)) return value.length && ArrayBuffer.isView(value[0]) ? value : value.map((item) => themed(item, colours));
@@ -93,7 +84,7 @@ function plot(place, figure, tell) {
   const fresh = !place.data;
   place.figure = figure;
   place.style.height = `${layout.height}px`;
-  const [data, shown] = dark.matches ? [themedTraces(given.data), themed(layout)] : [given.data, layout];
+  const [data, shown] = dark.matches ? [given.data, layout].map((part) => themed(part, layout.meta.dark)) : [given.data, layout];
   Plotly.react(place, data, shown, CONFIG);
   if (!fresh) return;
   if (tell.clicked) place.on("plotly_click", (event) => tell.clicked(event.points[0]));

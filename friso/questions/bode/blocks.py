@@ -33,7 +33,7 @@ def blocks(bode: Bode) -> list[AnswerBlock]:
     block = AnswerBlock(
         title=bode.stage.name,
         sentences=sentences(bode),
-        colours=[GREEN if bode.settled[1].stable else VERMILLION],
+        colours=[GREEN if bode.worst[1].stable else VERMILLION],
         columns=states,
         rows=rows(states),
         details=details(bode),

@@ -55,7 +55,7 @@ def bode_figures(bode: Bode) -> tuple[Figure, ...]:
 
 def first_figures(bode: Bode) -> tuple[Figure, ...]:
     """Return the figures of the limit cases alone, which need less time than all states."""
-    return _drawn(bode, (_plant(bode), *_cascade(bode), _loop(bode)))
+    return _drawn(bode, (_loop(bode), _plant(bode), *_cascade(bode)))
 
 
 def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
@@ -108,7 +108,27 @@ def _loop(bode: Bode) -> Figure:
         "is the distance to −180° where the magnitude crosses 0 dB."
     )
     panels = loop_panels(_hertz(bode), [_loop_of(name, case) for name, case in bode.cases.items()])
+    panels = _with_crossings(panels, _hertz(bode), bode)
     return Figure("bode_loop", "Open loop, limit cases", caption, panels)
+
+
+def _with_crossings(panels: tuple[Panel, ...], hertz: Array, bode: Bode) -> tuple[Panel, ...]:
+    """Mark on panels of magnitude and phase the last crossover of every stable case, and its phase margin.
+
+    The phase margin is a line from the loop to the next odd multiple of 180 degrees.
+    """
+    above, below = panels
+    dots, margins = [], []
+    for line, case in zip(below.series, bode.cases.values(), strict=True):
+        if not (case.margins.stable and case.margins.crossovers):
+            continue
+        at = case.margins.crossovers[-1]
+        phase = float(np.interp(np.log(at), np.log(hertz), line.y))
+        edge = 360.0 * np.round((phase - 180.0) / 360.0) + 180.0
+        name = f"crossover {with_unit(at, 'Hz')}, phase margin {abs(phase - edge):.0f}°"
+        dots.append(Markers(np.array([at]), np.zeros(1), name, line.colour))
+        margins.append(Series(np.full(2, at), np.array([phase, edge]), "", line.colour, width=2.6))
+    return replace(above, markers=tuple(dots)), replace(below, series=(*below.series, *margins))
 
 
 def _cascade(bode: Bode) -> Iterator[Figure]:

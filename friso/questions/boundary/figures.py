@@ -8,9 +8,22 @@ from dataclasses import replace
 import numpy as np
 
 from friso.hunting import Diagram, KeyRange, Plane
-from friso.questions.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, end_sentence
+from friso.questions.boundary.settings import boundary_figure_settings
+from friso.questions.boundary.words import BASIN, MEANINGS, ShownKey, end_sentence
 from friso.questions.map.words import QUIET, quantity
-from friso.shown.drawing.figure import Axis, Category, Cloud, Dash, Figure, Limit, Markers, Panel, Series, Symbol
+from friso.shown.drawing.figure import (
+    Axis,
+    Category,
+    Cloud,
+    Dash,
+    Figure,
+    Lettering,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+    Symbol,
+)
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, LIGHT, VERMILLION
 from friso.studies import boundary
 from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line
@@ -30,17 +43,8 @@ NODES = {
     INVALID: Category("invalid stage", LIGHT),
 }
 
-LOST = "a change, no curve begun"
-"""Label of marks between stages with different verdicts where no curve could be started."""
-
-LOST_END = "cycle not followed farther"
-"""Label of ends of curves inside the range."""
-
-BEYOND_CURVES = "hunting ends here, by another swing"
-"""Label of places beyond a curve where the last motion that attracts ends."""
-
-MEETING = "curves meet"
-"""Label of places where two curves cross, end on each other, or begin or cease to coincide."""
+LOST = "not followed farther"
+"""Label of ends of curves inside the range, and of changes of verdict at which no curve could be started."""
 
 LARGEST_MULTIPLIER = 2.5
 """Largest Floquet multiplier that is shown."""
@@ -68,7 +72,8 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
 
     The legend stands above the first panel.
     """
-    branches, x = boundary.lines(traced), _axis(traced.space.ranges[0])
+    branches = boundary.lines(traced)
+    x = _told(branches, _axis(traced.space.ranges[0]))
     sizes = [size for line in branches for size in line.amplitude]
     log = max(sizes, default=0.0) > LOGARITHMIC_RATIO * min(sizes, default=0.0)
     panels = (
@@ -81,6 +86,20 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
     styles = "Solid: the cycle attracts, nearby motions end in it. Dashed: it repels."
     note = f"{styles if branches else 'No cycle was found.'} {end_sentence(traced, key)}"
     return Figure("boundary", "Hunting cycles", "", panels, note=note)
+
+
+def _told(branches: tuple[Line, ...], axis: Axis) -> Axis:
+    """Return an axis that ends a little beyond the last change of a branch, if none is left there."""
+    at = np.concatenate([np.empty(0), *(line.at[:, 0] for line in branches)])
+    if not at.size or axis.limits is None:
+        return axis
+    low, high = axis.limits
+    ends = (float(at.min()), float(at.max()))
+    if axis.log:
+        gap = (ends[1] / ends[0]) ** boundary_figure_settings.axis_beyond
+        return replace(axis, limits=(max(low, ends[0] / gap), min(high, ends[1] * gap)))
+    gap = boundary_figure_settings.axis_beyond * (ends[1] - ends[0])
+    return replace(axis, limits=(max(low, ends[0] - gap), min(high, ends[1] + gap)))
 
 
 def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
@@ -99,12 +118,19 @@ def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Show
             style = ("solid", 2.0) if attracts else ("dashed", 1.4)
             series.append(Series(line.at[run, 0], getattr(line, measure)[run], text, COLOURS[line.shape], *style))
     turns = sorted(((line, k) for line in branches for k in line.special), key=lambda turn: turn[0].at[turn[1], 0])
-    markers = []
+    markers, words = [], list[Lettering]()
+    low, high = x.limits or (0.0, 0.0)
     for line, k in turns:
-        text = f"{line.kinds[k]} at {key.as_known(line.at[k, 0], line.error[k, 0])}" if key else ""
-        value = getattr(line, measure)[[k]]
-        markers.append(Markers(line.at[[k], 0], value, text, COLOURS[line.shape], SYMBOLS[line.kinds[k]]))
-    return Panel("", x, y, tuple(series), tuple(markers))
+        at, value = float(line.at[k, 0]), float(getattr(line, measure)[k])
+        markers.append(Markers(np.array([at]), np.array([value]), "", COLOURS[line.shape], SYMBOLS[line.kinds[k]]))
+        if not key:
+            continue
+        text = f"{line.kinds[k]} at {key.as_known(line.at[k, 0], line.error[k, 0])}"
+        if words and at - words[-1].x < PLANE_MARGIN * (high - low):
+            words[-1] = replace(words[-1], text=f"{words[-1].text}\n{text}")
+        else:
+            words.append(Lettering(at, value, text, COLOURS[line.shape], "below" if len(words) % 2 else "above"))
+    return Panel("", x, y, tuple(series), tuple(markers), words=tuple(words))
 
 
 def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
@@ -126,7 +152,7 @@ def _plane(traced: Plane) -> Figure:
         Series(
             line.at[:, 0],
             line.at[:, 1],
-            f"{line.kinds[0]} of {CYCLES[line.shape]}",
+            "edge of the basin" if line.shape == "asymmetric" else "edge of hunting",
             COLOURS[line.shape],
             DASHES[line.kinds[0]],
             2.2,
@@ -143,11 +169,12 @@ def _plane(traced: Plane) -> Figure:
     lost_ends = [end.at for end in boundary.curve_ends(traced) if end.kind == "lost"]
     meetings = [place for meeting in boundary.curve_meetings(traced) for place in meeting.places]
     marks = (
-        *_marks(boundary.lost_places(traced), LOST, GREY, "cross"),
-        *_marks(lost_ends, LOST_END, GREY, "triangle"),
-        *_marks(meetings, MEETING, GREEN, "target"),
-        *_marks([end.mean(axis=0) for end in boundary.last_ends(traced)], BEYOND_CURVES, VERMILLION, "circle"),
+        *_marks([*boundary.lost_places(traced), *lost_ends], LOST, GREY, "cross"),
+        *_marks(meetings, "", GREEN, "target"),
+        *_marks([end.mean(axis=0) for end in boundary.last_ends(traced)], "", VERMILLION, "circle"),
     )
+    explained = {"target": "Green: curves meet.", "circle": "Red: hunting ends here, by another swing."}
+    note = " ".join([note, *(explained[mark.symbol] for mark in marks if mark.symbol in explained)])
     return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, marks, clouds=(nodes,)),), note=note)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 
 from friso.equations.motion import last_corner
@@ -36,15 +38,18 @@ def compare_figures(comparison: Comparison) -> list[Figure]:
         "intervals of the median."
     )
     if not comparison.shaken:
-        caption += " No floor vibration is included: a machine at rest here need not stand still in a real room."
+        caption += (
+            " The stage file has no table [floor], the vibration of the floor: a machine at rest here need not stand "
+            "still in a real room."
+        )
     panels = (_probabilities(comparison), _settling(comparison, within), _standstill(comparison))
     return [Figure("compare", "Isolator or firmware?", caption, panels, subject=comparison.stage.name)]
 
 
 def _names(comparison: Comparison) -> Axis:
-    """Return the axis of options, by letter, since full names would not fit a phone."""
-    letters = tuple(result.letter for result in comparison.results)
-    return Axis("Option", "", (-0.5, len(letters) - 0.5), words=letters)
+    """Return the axis of options by name, broken into lines of a word or two."""
+    names = tuple("\n".join(textwrap.wrap(label(result), 14)) for result in comparison.results)
+    return Axis("", "", (-0.5, len(names) - 0.5), words=names)
 
 
 def _probabilities(comparison: Comparison) -> Panel:

@@ -37,6 +37,10 @@ DISTRIBUTION_POINTS = 401
 CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", INK))
 
 
+WORSE = ("#f7dcc4", VERMILLION)
+"""Colours from few corners to all: pale to that of hunting on every map."""
+
+
 def design_figures(design: Design | UnfinishedDesign) -> tuple[Figure, ...]:
     """Return all figures in the order in which they are read; none of an unfinished design."""
     if isinstance(design, UnfinishedDesign):
@@ -98,7 +102,7 @@ def _map(design: Design) -> Figure:
     codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
     percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
     strokes, shade = 1e3 * hunting_map.strokes, ("Corners not in position", "%", (0.0, 100.0))
-    field = Map(hunting_map.crossovers, strokes, percents, *shade, categories=CATEGORIES, codes=codes)
+    field = Map(hunting_map.crossovers, strokes, percents, *shade, categories=CATEGORIES, codes=codes, ramp=WORSE)
     right, up = _reach(hunting_map.crossovers), _reach(strokes)
     edge, limit = design.edges.highest, design.spec.limit
     lines: list[tuple[float, str, Dash]] = [

@@ -57,30 +57,32 @@ def _intervals(identification: Identification) -> list[Figure]:
     middle = np.array(
         [abs(estimate.value) if estimate.determined else (estimate.low + estimate.high) / 2 for estimate in bounded]
     )
-    share = 100 * half / np.maximum(np.abs(middle), 1e-3 * half)
-    visible = np.array([estimate.determined for estimate in bounded])
+    share = np.minimum(100 * half / np.maximum(np.abs(middle), 1e-3 * half), 100.0)
+    determined, lost = np.array([estimate.determined for estimate in bounded]), share >= 100
+    visible = determined & ~lost
     places = np.arange(len(bounded), dtype=float)
     left = 0.5 * float(share.min())
     stems = [
         Series(np.array([left, x]), np.full(2, y), "", BLUE if ok else ORANGE, width=2.0)
-        for x, y, ok in zip(share, places, visible, strict=True)
+        for x, y, ok in zip(share[~lost], places[~lost], visible[~lost], strict=True)
     ]
     kinds: tuple[tuple[np.ndarray, str, str, Symbol], ...] = (
         (visible, "shown", BLUE, "circle"),
-        (~visible, "not shown: the range left", ORANGE, "triangle"),
+        (~determined & ~lost, "not shown: the range left", ORANGE, "triangle"),
+        (lost, "none found", ORANGE, "cross"),
     )
     points = [
         Markers(share[chosen], places[chosen], label, colour, symbol)
         for chosen, label, colour, symbol in kinds
         if chosen.any()
     ]
-    x = Axis("Half the interval, in % of the value", "", (left, 2 * float(share.max())), log=True)
+    x = Axis("Half the interval, in % of the value", "", (left, 150.0), log=True)
     y = Axis(
         "",
         "",
         (-0.6, len(bounded) - 0.4),
         words=tuple(SHORT.get(estimate.name, estimate.name.partition(".")[2]) for estimate in bounded),
     )
-    caption = "Shorter is better known; from 100 % on not even the sign or order of magnitude is."
+    caption = "Shorter is better known. A cross at 100 %: not even the sign or order of magnitude is."
     panel = Panel("", x, y, tuple(stems), tuple(points))
     return [Figure("identify_intervals", "How well each quantity is known", caption, (panel,))]

@@ -44,8 +44,14 @@ def _panel(channel: ChannelContent) -> Panel:
     words = f"{channel.name}: {role}" if role and role != channel.name else channel.name
     if np.isnan(values[np.isfinite(channel.values)]).any():
         words += f" (values beyond {settings.largest_value:g} not drawn)"
+    finite = values[np.isfinite(values)]
+    level, limits = float(np.median(finite)) if finite.size else 0.0, None
+    if finite.size and np.ptp(finite) <= 1e-12 * abs(level):
+        reach = abs(level) or 1.0
+        values, limits = np.where(np.isfinite(values), level, np.nan), (level - reach, level + reach)
     across = Axis("Time", "s", prefixed=False) if timed else Axis("Sample", "", prefixed=False)
-    return Panel(words, across, Axis("", channel.unit, prefixed=False), (Series(x, values, "", BLUE, width=1.0),))
+    line = Series(x, values, "", BLUE, width=1.0)
+    return Panel(words, across, Axis("", channel.unit, limits, prefixed=False), (line,))
 
 
 def _within_range(values: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,12 @@ from friso.axis import unit_shown
 from friso.hunting.measures import BANDS
 from friso.questions.check.figures import common_range
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, coloured, look, pick, plane_first
-from friso.questions.map.figures import edge_of_hunting
 from friso.questions.map.places import SHOWN, machine_of
 from friso.questions.map.words import variable, words_of
 from friso.shown.drawing.colours import scale
 from friso.shown.drawing.drawable import colour_prefix, prefixed
-from friso.shown.drawing.figure import Array, Cloud
+from friso.shown.drawing.figure import Array, Cloud, Figure
+from friso.shown.drawing.palette import DARK
 from friso.shown.drawing.prefixes import choose
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import worded
@@ -32,11 +33,14 @@ MOST_CELLS = 250_000  # most cells in a page: more take a browser seconds to ope
 MISSING_HEIGHT = 255  # code for a cell without a category, whose number counts
 
 
-def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
+def page_data(
+    runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None, figure: Figure | None = None
+) -> dict[str, Any]:
     """Return everything that the page's script reads, ready for JSON.
 
     Arrays are base64 of little-endian numbers, cell by cell in the order of the axes, the last axis fastest. `drawn`
-    holds the runs of all cells. `rerun` is the command that repeats a run. Raises ValueError for runs without axes, or
+    holds the runs of all cells. `rerun` is the command that repeats a run. `figure` is the map of verdicts that the
+    page shows as it is, for a map over two axes. Raises ValueError for runs without axes, or
     without the metric.
     """
     axes = axes_of(runs)
@@ -44,6 +48,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
     chosen = picked(runs)
     cells = _Cells(axes, chosen, sampled)
     flat = dict.fromkeys(SCALINGS, 1.0) | stage.flat() if (stage := machine_of(runs)) else {}
+    chosen_all = not sampled and all(len(at) == len(axis.places) for at, axis in zip(chosen, axes, strict=True))
     order = list(axes) if sampled or len(axes) == 1 else plane_first(axes)
     return {
         "metric": metric,
@@ -51,9 +56,10 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
         "sampled": sampled,
         "indices": [[int(i) for i in places] for places in cells.indices()],
         "axes": [_axis(axis, positions, flat) for axis, positions in zip(axes, cells.positions(), strict=True)],
+        "dark": DARK,
         "machine": SHOWN,
         "order": [axes.index(axis) for axis in order],
-        "edge": _edge(runs, metric, order) if len(axes) == 2 and not sampled else None,
+        "picture": _picture(figure) if len(axes) == 2 and chosen_all else None,
         "variables": [_coloured(runs, name, cells) for name in coloured(runs)],
         "lines": None if drawn is None else _lines(drawn, runs, cells),
         "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
@@ -140,15 +146,13 @@ def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dic
     }
 
 
-def _edge(runs: xr.Dataset, metric: str, order: list[CellAxis]) -> list[list[float | None]] | None:
-    """Return the curve on which hunting ends, in the units of the axes; None without one."""
-    curves = edge_of_hunting(runs, metric, *order)
-    factors = [choose(axis.positions, axis.unit, log=axis.log)[0] for axis in order]
-    return [
-        [None if np.isnan(value) else _shortened(float(value) * factor) for value in places]
-        for curve in curves
-        for places, factor in zip((curve.x, curve.y), factors, strict=True)
-    ] or None
+def _picture(figure: Figure | None) -> dict[str, Any] | None:
+    """Return what plotly draws of a map of verdicts, without its note; None for other maps."""
+    if figure is None or not figure.panels[0].areas:
+        return None
+    from friso.shown.drawing.plotly_renderer import plain_parts
+
+    return plain_parts(replace(figure, note=""))
 
 
 def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:

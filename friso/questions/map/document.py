@@ -7,13 +7,16 @@ from typing import Any
 
 import xarray as xr
 
-from friso.questions.map.findings import headline, loop_first
+from friso.questions.map.findings import answers, loop_first, statements
 from friso.questions.map.words import text_counts, word_counts
 from friso.shown.documents import plain_json
+from friso.studies.edges import MapEdges, OwnLine
 from friso.studies.study import Study
 
 
-def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str) -> dict[str, Any]:
+def map_document(
+    runs: xr.Dataset, study: Study, store: Path | None, metric: str, edges: MapEdges | None = None
+) -> dict[str, Any]:
     """Return the axes and the results."""
     criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
     document = {
@@ -30,7 +33,8 @@ def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str
         },
         "cells": study.cells,
         "rtol": study.rtol,
-        "conclusion": " ".join([*loop_first(study.stage), headline(runs, metric)]),
+        "conclusion": " ".join([*loop_first(study.stage), *answers(runs, metric, edges), *statements(runs, metric)]),
+        "edges": [] if edges is None else [_own_line(line) for line in edges.own],
         "outcomes": word_counts(runs, "outcome"),
         "verdicts": word_counts(runs, "verdict") or None,
         "sketched_verdicts": word_counts(runs, "sketch") or None,
@@ -38,3 +42,8 @@ def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str
         "criteria": criteria,
     }
     return plain_json(document)
+
+
+def _own_line(line: OwnLine) -> dict[str, Any]:
+    """Return where hunting begins and ends along an axis, at the stage's own value of the other: values in SI."""
+    return {"axis": line.key, "own": line.own, "hunts": line.attracts, "changes": line.changes.tolist()}

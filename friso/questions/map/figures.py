@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from friso.hunting.criteria import ATTRACTED, UNDECIDED
-from friso.hunting.criteria import VERDICTS as VERDICT_WORDS
 from friso.questions.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, look, pick, plane_first
-from friso.questions.map.findings import statement
+from friso.questions.map.findings import message, own_values, second_scale, statement, subject_of
+from friso.questions.map.verdicts import is_of_verdicts, verdict_panel
 from friso.questions.map.words import variable
 from friso.shown.drawing.drawable import cell_edges
 from friso.shown.drawing.figure import Axis, Cloud, Figure, Map, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, INK
+from friso.shown.drawing.palette import BLUE
+from friso.studies.edges import MapEdges
 from friso.studies.metric import metrics
 
 MOST_SLICES = 9  # largest number of panels of a map over more than two axes
@@ -26,31 +27,39 @@ RED = "#e3001b"  # the evaluation marker of the thesis
 MOST_LISTED = 12  # largest number of left-out values that are named one by one
 
 
-def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None) -> Figure:
+def map_figure(
+    runs: xr.Dataset,
+    metric: str = "outcome",
+    marker: Mapping[str, float] | None = None,
+    edges: MapEdges | None = None,
+) -> Figure:
     """Draw a variable over one axis as a line, over two as cells, over more as slices.
 
     Samples are drawn as points. `runs` is what friso.sweep returns, and `metric` a variable of it. `marker` is the
-    evaluation point, by key: SI values or words. It is drawn unless there is a single axis. Raises ValueError for a
-    missing metric, runs without dimensions, or a marker that lacks an axis.
+    evaluation point, by key: SI values or words. It is drawn unless there is a single axis. `edges` are those of a map
+    of verdicts over two axes, half-way between cells otherwise. Raises ValueError for a missing metric, runs without
+    dimensions, or a marker that lacks an axis.
     """
     axes, colouring = axes_of(runs), look(runs, metric)
-    caption, columns = "", 1
+    caption, columns, title = "", 1, variable(metric)
     if SAMPLE in runs.dims:
         panels, caption = _samples(axes, colouring, marker)
     elif len(axes) == 1:
         panels = [_line(axes[0], colouring)]
     elif len(axes) == 2:
-        panels = [_cells(axes[0], axes[1], colouring, marker, "")]
+        panels = [_cells(axes[0], axes[1], colouring, marker, "", edges, own_values(runs))]
+        panels = [with_second_scales(panel, axes, runs) for panel in panels]
+        title = message(runs, metric, edges) or title
     else:
         panels, caption = _slices(axes, colouring, marker)
         columns = {1: 1, 2: 2, 4: 2}.get(len(panels), 3)
     return Figure(
         name=f"map-{metric}",
-        title=variable(metric),
+        title=title,
         caption=caption or (f"Every cell is one {_subject(metric)}."),
         panels=tuple(panels),
         columns=columns,
-        subject=str(runs.attrs.get("name", "")),
+        subject=subject_of(runs),
         note=statement(runs, metric) + (f"\n{caption}" if caption else ""),
     )
 
@@ -81,59 +90,41 @@ def map_panel(
     return _cells(axes[0], axes[1], look(runs, metric), marker, title)
 
 
-def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float] | None, title: str) -> Panel:
+def _cells(
+    x: CellAxis,
+    y: CellAxis,
+    colouring: Look,
+    marker: Mapping[str, float] | None,
+    title: str,
+    edges: MapEdges | None = None,
+    own: Mapping[str, Any] = MappingProxyType({}),
+) -> Panel:
     """Return the panel of a map over two axes x and y, the only dimensions of its arrays.
 
-    `marker` is the evaluation point, and `colouring` says how cells are coloured.
+    `marker` is the evaluation point, and `colouring` says how cells are coloured. Of verdicts, `edges` are drawn, and
+    the stage with its `own` values by key.
     """
     z, codes = (
         np.asarray(array.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
         for array in (colouring.numbers, colouring.codes)
     )
+    if is_of_verdicts(x, y, colouring):
+        panel = verdict_panel(x, y, colouring, codes, title, edges, own)
+        return replace(panel, markers=(*panel.markers, *_marked(marker, x, y)))
     points = _marked(marker, x, y)
     return Panel(
         title,
         x.axis(_limits(x, [point.x for point in points])),
         y.axis(_limits(y, [point.y for point in points])),
-        _edges(x, y, colouring, codes),
-        points,
+        markers=points,
         maps=(Map(x.positions, y.positions, z, *colouring.scale, codes),),
     )
 
 
-def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> tuple[Series, ...]:
-    """Return the curve that separates cells in which hunting attracts from the others.
-
-    `metric` is the variable of `runs` that is mapped; it has such a curve only if its values are verdicts. Undecided
-    cells are left out. The result is empty for any other variable, for an axis with words or a single cell, and if
-    all cells are on one side.
-    """
-    colouring = look(runs, metric)
-    codes = np.asarray(colouring.codes.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
-    return _edges(x, y, colouring, codes)
-
-
-def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
-    """Return the curve that separates cells in which hunting attracts from the others.
-
-    `codes`, shape (y, x), are the indices of the cells' categories in `colouring`. The curve runs half-way between
-    cells, and may have several parts. The result is empty for other words than verdicts, and for an axis with words or
-    a single cell. It is also empty if all cells are on one side.
-    """
-    attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
-    if min(codes.shape) < 2 or x.words or y.words or not attracted:
-        return ()
-    from contourpy import contour_generator
-
-    columns, rows = (np.log(axis.positions) if axis.log else axis.positions for axis in (x, y))
-    decided = [k for k, kind in enumerate(colouring.categories) if kind.label in {*VERDICT_WORDS} - {*UNDECIDED}]
-    cells = np.where(np.isin(codes, decided), np.isin(codes, attracted), np.nan)
-    lines: Any = contour_generator(columns, rows, np.ma.masked_invalid(cells)).lines(0.5)
-    if not lines:
-        return ()
-    right, up = np.concatenate([np.vstack([line, [np.nan, np.nan]]) for line in lines]).T
-    right, up = (np.exp(places) if axis.log else places for axis, places in ((x, right), (y, up)))
-    return (Series(right, up, "edge of hunting", INK, width=1.8),)
+def with_second_scales(panel: Panel, axes: Sequence[CellAxis], runs: xr.Dataset) -> Panel:
+    """Add to axes of factors the scales of what they multiply: the controller's speed in Hz, friction in N."""
+    x, y = (replace(axis, second=second_scale(one, runs)) for axis, one in zip((panel.x, panel.y), axes, strict=True))
+    return replace(panel, x=x, y=y)
 
 
 def _limits(axis: CellAxis, points: Sequence[np.ndarray]) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,16 +16,22 @@ from friso.questions.map import words as map_words
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.questions.map.places import machine_of
 from friso.questions.map.words import failures, grouped
+from friso.shown.drawing.figure import SecondScale
 from friso.shown.drawing.prefixes import listed, range_with_unit
 from friso.shown.loop_words import unstable_loop
 from friso.stage import Stage
 from friso.studies.axes import SCALINGS
+from friso.studies.edges import HUNTS_LEVEL, MapEdges, OwnLine, verdict_levels
 from friso.studies.metric import MapFinding, metrics, worded
+from friso.studies.settings import settings
 from friso.studies.study import Study
 
 _NO_RESULT = {"failed": "the run was not completed", "invalid": "these values are not a valid stage"}
 
 _QUIET = ("transient", "settles")
+
+_SHARP = 2 * settings.edge_precision
+"""Width of a change, as a share of its value, that three digits do not show."""
 
 MOST_SENTENCES = 3
 """Number of sentences above the files of a map."""
@@ -140,10 +147,100 @@ def _percent(part: int, total: int) -> str:
     return f"{share:.2g} %" if share < 1 else f"{np.floor(share * 10) / 10:g} %"
 
 
+def own_values(runs: xr.Dataset) -> dict[str, Any]:
+    """Return the values [SI] of the swept stage, by key, and 1 for factors on several keys; empty if it is unknown."""
+    machine = machine_of(runs)
+    return {} if machine is None else {**dict.fromkeys(SCALINGS, 1.0), **machine.flat()}
+
+
+def subject_of(runs: xr.Dataset) -> str:
+    """Return the name of the swept stage, and whether its joint is locked, for the title of a figure."""
+    name, machine = str(runs.attrs.get("name", "")), machine_of(runs)
+    locked = machine is not None and machine.flat().get("joint.locked") and "joint.locked" not in runs.coords
+    return f"{name}, joint locked" if name and locked else name
+
+
+def second_scale(axis: CellAxis, runs: xr.Dataset) -> SecondScale | None:
+    """Return the scale of what an axis of factors multiplies, in Hz or N; None for other axes."""
+    values = _multiplied(axis, runs)
+    if values is None:
+        return None
+    name, own, unit, _ = values
+    if own is None:
+        return None
+    return SecondScale(f"{name[0].upper()}{name[1:]}".partition(" (")[0], unit, own)
+
+
+def message(runs: xr.Dataset, metric: str, edges: MapEdges | None) -> str:
+    """Say on which side of the edge stages hunt, and from which value to which at the stage's own value of one axis.
+
+    The result is empty for a map that is not over two axes of numbers, or has no verdicts. The side holds over the
+    whole map: in every row or column of its cells.
+    """
+    if metric not in worded(verdicts=True) or metric == "outcome" or metric not in runs or SAMPLE in runs.dims:
+        return ""
+    axes = axes_of(runs)
+    if len(axes) != 2 or any(axis.words for axis in axes):
+        return ""
+    words = np.asarray(runs[metric].transpose(*(axis.key for axis in axes)).values).astype(str)
+    levels = verdict_levels(words[np.ix_(*(axis.places for axis in axes))])
+    if np.isnan(levels).all():
+        return ""
+    hunts, decided = levels == HUNTS_LEVEL, ~np.isnan(levels)
+    if not hunts.any() or hunts[decided].all():
+        return "Hunts nowhere on this map" if not hunts.any() else "Hunts everywhere on this map"
+    side, number = next(
+        (
+            (name, axis)
+            for axis, names in enumerate((("left of", "right of"), ("below", "above")))
+            for name, ways in zip(names, (hunts, np.flip(hunts, axis)), strict=True)
+            if (np.diff(ways.astype(int), axis=axis) <= 0).all()
+        ),
+        ("inside", 0),
+    )
+    text = f"Hunts {side} the line"
+    lines = {line.key: line for line in edges.own} if edges else {}
+    if axes[number].key not in lines:
+        return text
+    return f"{text}, at your {_short(axes[1 - number])} {_where(lines[axes[number].key], axes[number], runs)}"
+
+
+def _short(axis: CellAxis) -> str:
+    """Return the shortest name of an axis: "friction", "speed" or a key in words."""
+    return axis.key if axis.key in SCALINGS else map_words.in_sentence(axis.key)
+
+
+def _where(line: OwnLine, axis: CellAxis, runs: xr.Dataset) -> str:
+    """Say in which ranges along a line through the stage hunting attracts: "below 9.75 Hz"."""
+    ends = [_change(line, axis, runs, change) for change in range(len(line.changes))]
+    if not ends:
+        return f"at any {_short(axis)} shown" if line.begins else f"at no {_short(axis)} shown"
+    parts = [f"below {ends[0]}"] if line.begins else []
+    inner = ends[1:] if line.begins else ends
+    parts += [f"from {low} to {high}" for low, high in zip(inner[::2], inner[1::2], strict=False)]
+    return listed([*parts, *([f"above {inner[-1]}"] if len(inner) % 2 else [])], "and")
+
+
+def _change(line: OwnLine, axis: CellAxis, runs: xr.Dataset, number: int) -> str:
+    """Write between which values a change of a line lies, as one where both have equal digits: "9.75 Hz"."""
+    values = _multiplied(axis, runs)
+    scale, unit = (1.0, axis.unit) if values is None else (values[1] or 1.0, values[2] if values[1] else "times yours")
+    low, high = (line.changes[number] * scale).tolist()
+    middle = (low + high) / 2
+    return range_with_unit(middle, middle, unit) if high - low < _SHARP * middle else range_with_unit(low, high, unit)
+
+
 def statement(runs: xr.Dataset, metric: str) -> str:
     """Return the note on every figure of a map: its headline, and its number of runs."""
     caveat = " ".join(caveats(runs, metric))
-    return "\n".join(text for text in (headline(runs, metric), _extent(runs), caveat) if text)
+    return "\n".join(text for text in (hatching(runs, metric), headline(runs, metric), _extent(runs), caveat) if text)
+
+
+def hatching(runs: xr.Dataset, metric: str) -> str:
+    """Say what the hatching of a map of verdicts means; empty for a map without it."""
+    if not message(runs, metric, None) or "bistable" not in map_words.text_counts(runs, metric):
+        return ""
+    return "Hatched: this motion comes to rest there, but a kick or another move starts hunting."
 
 
 def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
@@ -188,30 +285,39 @@ def _extent(runs: xr.Dataset) -> str:
     return f"{text}: {listing}." if listing else f"{text}."
 
 
-def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+def sentences(runs: xr.Dataset, study: Study, metric: str, edges: MapEdges | None = None) -> list[str]:
     """Say in at most three sentences where on a map stages swing or hunt, and where your own stage is."""
-    return _all_sentences(runs, study, metric)[:MOST_SENTENCES]
+    return _all_sentences(runs, study, metric, edges)[:MOST_SENTENCES]
 
 
-def details(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+def details(runs: xr.Dataset, study: Study, metric: str, edges: MapEdges | None = None) -> list[str]:
     """Return further statements on a map, the number of cells with every word, and why cells have no result."""
     words = "; ".join(filter(None, (map_words.tally(runs, name) for name in map_words.tallied())))
     size = " x ".join(map(str, study.shape))
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}."
-    further = _all_sentences(runs, study, metric)[MOST_SENTENCES:]
-    return [*statements(runs, metric)[1:], *further, extent, *caveats(runs, metric)]
+    further = _all_sentences(runs, study, metric, edges)[MOST_SENTENCES:]
+    shares = statements(runs, metric)[0 if message(runs, metric, edges) else 1 :]
+    return [*shares, *further, extent, *caveats(runs, metric)]
 
 
-def _all_sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+def _all_sentences(runs: xr.Dataset, study: Study, metric: str, edges: MapEdges | None) -> list[str]:
     """Return the sentences on a map, the most important first."""
     reasons = [f"{count} cells have no result: {reason}." for reason, count in failures(runs).items()]
-    return [*loop_first(study.stage), *statements(runs, metric)[:1], *own_place(runs, metric), *reasons]
+    return [*loop_first(study.stage), *answers(runs, metric, edges), *reasons]
 
 
-def own_place(runs: xr.Dataset, metric: str) -> list[str]:
+def answers(runs: xr.Dataset, metric: str, edges: MapEdges | None = None) -> list[str]:
+    """Return what a map says first: its message or, without one, its first statement; and where the stage itself is."""
+    says = message(runs, metric, edges)
+    first = [f"{subject_of(runs)}: {says[0].lower()}{says[1:]}."] if says else statements(runs, metric)[:1]
+    return [*first, *own_place(runs, metric, edges)]
+
+
+def own_place(runs: xr.Dataset, metric: str, edges: MapEdges | None = None) -> list[str]:
     """Say how far the stage as given is from the next edge of hunting along each axis.
 
-    Nothing is said for a stage that is not on the map, or a map without verdicts.
+    With `edges`, the distance is that of the edge itself, and not of cells next to it. Nothing is said for a stage that
+    is not on the map, or a map without verdicts.
     """
     machine = machine_of(runs)
     if (
@@ -229,18 +335,29 @@ def own_place(runs: xr.Dataset, metric: str) -> list[str]:
     words = np.asarray(runs[metric].transpose(*(axis.key for axis in axes)).values).astype(str)
     words = words[np.ix_(*(axis.places for axis in axes))]
     at = tuple(int(np.abs(np.log(axis.positions / value)).argmin()) for axis, value in zip(axes, own, strict=True))
-    if words[at] not in (*ATTRACTED, *_QUIET):
+    verdict = words[at]
+    if edges and edges.verdict:
+        verdict = edges.verdict
+    if verdict not in (*ATTRACTED, *_QUIET):
         return []
     lines = [words[(*at[:k], slice(None), *at[k + 1 :])] for k in range(len(axes))]
     shown = [in_its_unit(axis, runs) for axis in axes]
     ways = [
         way for axis, line, own_cell in zip(shown, lines, at, strict=True) for way in _changes(axis, line, own_cell)
     ]
-    exact = all(np.isclose(axis.positions[k], value, rtol=1e-3) for axis, value, k in zip(axes, own, at, strict=True))
+    if edges and len(edges.own) == len(axes):
+        ways = [
+            f"{axis.quantity} {_change(line, plain, runs, change)}"
+            for axis, plain, line in zip(shown, axes, edges.own, strict=True)
+            for change in line.beside
+        ]
+    exact = bool(edges and edges.verdict) or all(
+        np.isclose(axis.positions[k], value, rtol=1e-3) for axis, value, k in zip(axes, own, at, strict=True)
+    )
     subject = "Your stage" if exact else "The cell nearest to your stage"
-    verb = words[at] if words[at] in ("hunts", "settles") else f"is {words[at]}"
+    verb = verdict if verdict in ("hunts", "settles") else f"is {verdict}"
     by = f" {basis}" if (basis := metrics()[metric].basis) else ""
-    does = "begins" if words[at] in _QUIET else "ends"
+    does = "begins" if verdict in _QUIET else "ends"
     nowhere = "; no cell in line with it hunts" if all(np.isin(line, _QUIET).all() for line in lines) else ""
     where = f"; hunting {does} at {listed(ways, 'or')}" if ways else nowhere
     return [f"{subject} {verb}{by}{where}."]
@@ -267,19 +384,30 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
 
 def in_its_unit(axis: CellAxis, runs: xr.Dataset) -> CellAxis:
     """Return an axis as sentences name it: factors as values in Hz and N, and which friction an axis of friction is."""
-    machine, links = machine_of(runs), json.loads(runs.attrs.get("links", "{}"))
+    links = json.loads(runs.attrs.get("links", "{}"))
     held = map_words.friction_held(axis.key, {*map(str, runs.coords), *links})
-    if machine is None or axis.key not in SCALINGS:
+    values = _multiplied(axis, runs)
+    if values is None:
         return replace(axis, quantity=f"{map_words.in_sentence(axis.key)}{held}")
-    flat, name = machine.flat(), machine.controller.bandwidth_name
-    fields = {
-        "speed": ("controller speed", name, bandwidth(flat), "Hz"),
-        "friction": ("all friction", "static friction (all friction scaled)", flat.get(map_words.STATIC), "N"),
-    }
-    factor, value, own, unit = fields[axis.key]
+    name, own, unit, factor = values
     if own is None:
         return replace(axis, quantity=factor, unit="times yours")
-    return replace(axis, quantity=value, unit=unit, positions=own * axis.positions)
+    return replace(axis, quantity=name, unit=unit, positions=own * axis.positions)
+
+
+def _multiplied(axis: CellAxis, runs: xr.Dataset) -> tuple[str, float | None, str, str] | None:
+    """Return what an axis of factors multiplies: its name, the stage's own value, its unit, and the factor's name.
+
+    The value is None for a stage without such a number; the result is None for an axis of a key.
+    """
+    machine = machine_of(runs)
+    if machine is None or axis.key not in SCALINGS:
+        return None
+    flat = machine.flat()
+    return {
+        "speed": (machine.controller.bandwidth_name, bandwidth(flat), "Hz", "controller speed"),
+        "friction": ("static friction (all friction scaled)", flat.get(map_words.STATIC), "N", "all friction"),
+    }[axis.key]
 
 
 def loop_first(stage: Stage) -> list[str]:

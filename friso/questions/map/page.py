@@ -16,7 +16,7 @@ from friso.hunting.criteria import PEAK_RULE
 from friso.questions.map.cells import SAMPLE, axes_of
 from friso.questions.map.data import page_data, picked
 from friso.questions.map.figures import map_figure
-from friso.questions.map.findings import caveats, failures, headline, meanings, own_place
+from friso.questions.map.findings import answers, caveats, failures, hatching, headline, meanings
 from friso.questions.map.places import SHOWN, machine_of, with_places
 from friso.questions.map.words import grouped, tallied, tally, variable
 from friso.shown.drawing.figure import IMAGE_FORMATS, Figure
@@ -25,6 +25,7 @@ from friso.shown.drawing.packing import packed_json
 from friso.shown.files import Content
 from friso.shown.pages import Report, print_image, script
 from friso.shown.unknown import unknown_condition
+from friso.studies.edges import MapEdges
 from friso.studies.traces import Traces
 
 FORMS = (*IMAGE_FORMATS, "html")
@@ -34,33 +35,40 @@ PRINTED = ON_PAGE._replace(noted=False)
 """Image that the page shows when it is printed."""
 
 
-def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
+def map_files(
+    runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None], edges: MapEdges | None = None
+) -> dict[str, Content]:
     """Return the figure in all formats and the page of a map, by suffix in the order of `FORMS`.
 
     `rerun` is the command that repeats a run, with {indices} in place of the indices of its cell. `draw` computes the
-    runs that the page shows, or None if they are too many.
+    runs that the page shows, or None if they are too many. `edges` are those of a map of verdicts.
     """
-    figure = marked_figure(runs, metric)
+    figure = marked_figure(runs, metric, edges)
     draw_beforehand([figure], [*map(Image, IMAGE_FORMATS), PRINTED])
     files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
-    return {**files, FORMS[-1]: map_html(runs, metric, rerun, draw(), figure)}
+    return {**files, FORMS[-1]: map_html(runs, metric, rerun, draw(), figure, edges)}
 
 
 def map_html(
-    runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None, figure: Figure | None = None
+    runs: xr.Dataset,
+    metric: str,
+    rerun: str,
+    drawn: Traces | None = None,
+    figure: Figure | None = None,
+    edges: MapEdges | None = None,
 ) -> str:
     """Return the page of a sweep, which opens with the variable `metric`.
 
     `drawn` holds the runs of all cells; the page draws the run of the cell that is chosen. `rerun` is the command that
     repeats a run, with {indices} in place of the indices of its cell: "friso simulate --cell map.zarr {indices}".
-    `figure` is the figure of the variable, if it is already drawn. Raises ValueError if {indices} is missing, or the
-    runs lack axes or the metric.
+    `figure` is the figure of the variable, if it is already drawn, and `edges` are those of its
+    verdicts. Raises ValueError if {indices} is missing, or the runs lack axes or the metric.
     """
     if "{indices}" not in rerun:
         raise ValueError(
             f"rerun: got {rerun!r}, expected {{indices}} in it, e.g. 'friso simulate --cell x {{indices}}'"
         )
-    figure = figure or marked_figure(runs, metric)
+    figure = figure or marked_figure(runs, metric, edges)
     return Report(
         "map",
         runs.attrs.get("name") or "Unnamed stage",
@@ -69,13 +77,14 @@ def map_html(
         scripted=True,
         condition=_condition(runs),
         values={
-            "headline": headline(runs, metric),
-            "own_place": own_place(runs, metric),
+            "answers": answers(runs, metric, edges),
+            "shares": headline(runs, metric),
+            "hatching": hatching(runs, metric),
             "peak_rule": PEAK_RULE,
             "facts": _facts(runs, metric),
             "thinned": _thinned(runs),
             "undrawn": drawn is None,
-            "data": packed_json(page_data(runs, metric, rerun, drawn)),
+            "data": packed_json(page_data(runs, metric, rerun, drawn, figure)),
             "figure": figure,
             "printed": print_image(figure, noted=PRINTED.noted),
             "script": script("map"),
@@ -89,9 +98,9 @@ def _condition(runs: xr.Dataset) -> str:
     return unknown_condition(machine_of(runs), [axis.key for axis in axes_of(runs)])
 
 
-def marked_figure(runs: xr.Dataset, metric: str) -> Figure:
+def marked_figure(runs: xr.Dataset, metric: str, edges: MapEdges | None = None) -> Figure:
     """Return the figure of a map; over two axes, with a mark where the swept machine lies."""
-    figure, stage = map_figure(runs, metric), machine_of(runs)
+    figure, stage = map_figure(runs, metric, edges=edges), machine_of(runs)
     figure = replace(figure, note=_condition(runs) + figure.note)
     keys = [] if SAMPLE in runs.dims else [axis.key for axis in axes_of(runs)]
     return with_places(figure, [(SHOWN, stage)], keys) if stage and len(keys) == 2 else figure

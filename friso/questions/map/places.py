@@ -32,8 +32,10 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
             places.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
 
     def marked(panel: Panel) -> Panel:
-        """Add the marks that lie within a panel."""
+        """Add the marks that lie within a panel, but those that it has."""
+        marked = {(item.x[0], item.y[0]) for item in panel.markers if item.symbol == "target"}
         inside = [one for one in places if _is_on(panel.x, one.x[0]) and _is_on(panel.y, one.y[0])]
+        inside = [one for one in inside if (one.x[0], one.y[0]) not in marked]
         return replace(panel, markers=(*panel.markers, *inside))
 
     return replace(figure, panels=tuple(map(marked, figure.panels)))

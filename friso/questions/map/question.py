@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from friso.shown.blocks import AnswerBlock
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Content, Files
+    from friso.studies.edges import MapEdges
 
 CONFIRMED_FROM = 10_000_000
 """Number of cells above which a study must be confirmed: it takes minutes and a gigabyte."""
@@ -62,13 +63,15 @@ CONFIRMED_FROM = 10_000_000
 class SweepAnswer(Answer):
     """The runs of a sweep; `result` is an xarray.Dataset with a dimension for each axis.
 
-    `metric` is the variable that colours the map. `store` is the folder of the runs, or None if they are in memory.
+    `metric` is the variable that colours the map, and `edges` are those of its verdicts. `store` is the
+    folder of the runs, or None if they are in memory.
     """
 
     study: Study
     metric: str
     store: Path | None
     exports: Sequence[Path]
+    edges: MapEdges | None
 
     @property
     def varied(self) -> Sequence[str]:
@@ -102,12 +105,15 @@ class SweepAnswer(Answer):
 
         def draw() -> list[Figure]:
             """Draw the map, with the condition under which it holds."""
-            figures = [map_figure(self.result, self.metric)] if self.drawable else []
+            figures = [map_figure(self.result, self.metric, edges=self.edges)] if self.drawable else []
             return [replace(figure, note=self.condition + figure.note) for figure in figures]
 
-        says = [*sentences(self.result, self.study, self.metric), *([f"store: {self.store}"] if self.store else [])]
-        numbers = partial(map_document, self.result, self.study, self.store, self.metric)
-        more = partial(details, self.result, self.study, self.metric)
+        says = [
+            *sentences(self.result, self.study, self.metric, self.edges),
+            *([f"store: {self.store}"] if self.store else []),
+        ]
+        numbers = partial(map_document, self.result, self.study, self.store, self.metric, self.edges)
+        more = partial(details, self.result, self.study, self.metric, self.edges)
         return [AnswerBlock(sentences=says, long_details=more, draw=draw, numbers=numbers)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
@@ -144,7 +150,7 @@ class SweepAnswer(Answer):
         again = 'friso.simulate(runs.cell("{indices}"))'
         if self.store is not None:
             again = f"friso simulate --cell {shell_word(str(self.store))} {{indices}}"
-        return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, progress))
+        return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, progress), self.edges)
 
 
 class StoreAnswer(Answer):
@@ -217,7 +223,7 @@ def sweep(
         Or `friso.Samples`: several keys that vary at once.
     x : str, optional
         Horizontal axis, controller.crossover="1 Hz..40 Hz:41"; also a list: KEY="4 Hz, 8 Hz". Besides keys: speed (the
-        controller so many times as fast) and friction (so many times yours).
+        controller so many times as fast) and friction (all of it so many times yours), the axes of a map without any.
     y : str, optional
         Vertical axis.
     axis : list of str, optional
@@ -307,7 +313,12 @@ def sweep(
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
             inputs.mention_unstable_loop(study.stage)
             runs, can_note = _filled(study, store, crew, overwrite, metric, beside, progress)
-    held = in_memory(runs) if store is not None and study.cells <= CONFIRMED_FROM else runs
+        held = in_memory(runs) if store is not None and study.cells <= CONFIRMED_FROM else runs
+        from friso.questions.map.findings import own_values
+        from friso.studies.edges import fine_edges
+
+        shown = coloured_by(study, metric)
+        edges = fine_edges(study, held, shown, own_values(held), crew, progress)
     if store is None:
         write(export_files(held, exports), exports if overwrite else ())
     elif exports and not beside:
@@ -316,9 +327,10 @@ def sweep(
         held,
         stage=study.stage,
         study=study,
-        metric=coloured_by(study, metric),
+        metric=shown,
         store=store,
         exports=tuple(exports),
+        edges=edges,
     )
 
 

@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
 
+USUAL_AXES = {"speed": "0.4..2.5:41:log", "friction": "0.3..3:41:log"}
+"""Axes of a map for which none were named: what one may choose, and what nobody knows."""
+
 MOST_DRAWN_CELLS = 4096
 """Largest number of cells for which a page includes every run."""
 
@@ -82,6 +85,8 @@ def study_for(stage: Stage, varied: Varied, metric: str, most: int | None, crew:
     Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its cost.
     """
     axes, links, samples = varied.axes, varied.links, varied.samples
+    if not axes and samples is None:
+        axes = USUAL_AXES
     if not axes and not isinstance(samples, Samples):
         raise InputError("x", "no axis", "one axis or more", f"x={AXIS_EXAMPLE}")
     if isinstance(samples, int):

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.axis import axis_shown
 from friso.shown.drawing.figure import Category
-from friso.shown.drawing.palette import GREY, INK, MAUVE, ORANGE, PINK, VERMILLION
+from friso.shown.drawing.palette import GREY, INK, MAUVE, ORANGE, PINK, QUIET, VERMILLION
 from friso.shown.key_words import key_in_words
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import metrics, worded
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 AT_ONCE = 1_000_000
 """Number of texts counted in one batch."""
 
-QUIET = "#d3e6f3"  # colour of rest: a pale blue, far from the colours of swings and from white and grey
 INVALID = Category("invalid", "#b4b4b4")
 FAILED = Category("failed", INK)
 NOT_RUN = Category("not run", "#ffffff")

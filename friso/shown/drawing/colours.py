@@ -70,13 +70,13 @@ def scale(field: Coloured) -> ColourScale:
         return ColourScale(-0.5, count - 0.5, field.colours, True, ticks, tuple(map(str, ticks)))
     low, high = _limits(field)
     if not field.log:
-        return ColourScale(low, high, MORE)
+        return ColourScale(low, high, field.ramp or MORE)
     low, high = math.log10(low), math.log10(high)
     step = max(1, math.ceil((high - low) / 6))
     decades = range(math.ceil(low + 0.3), math.floor(high + 1e-9) + 1, step)
     # `painted` raises lower numbers to the limit
     texts = (f"≤ {10.0**low:.2g}", *(f"{10.0**decade:g}" for decade in decades))
-    return ColourScale(low, high, MORE, False, (low, *decades), texts)
+    return ColourScale(low, high, field.ramp or MORE, False, (low, *decades), texts)
 
 
 def ramp(count: int) -> tuple[str, ...]:

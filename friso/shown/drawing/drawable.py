@@ -6,6 +6,7 @@ arrays.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
@@ -13,11 +14,20 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.escapes import escaped
-from friso.shown.drawing.figure import Array, Axis, Category, Coloured, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.figure import Array, Arrow, Axis, Category, Coloured, Figure, Limit, Markers, Panel, Series
 from friso.shown.drawing.prefixes import choose, pretty
 
 Field = TypeVar("Field", bound=Coloured)
 
+
+SIDES = {
+    "": ("center", "center", 0, 0),
+    "left": ("right", "center", -8, 0),
+    "right": ("left", "center", 8, 0),
+    "below": ("center", "top", 0, -8),
+    "above": ("center", "bottom", 0, 8),
+}
+"""How words are aligned that stand on a side of a point, and how far [px or point] they are moved right and up."""
 
 LONGEST_TEXT = 1000
 """Longest text in a figure in characters. The longest caption has half as many."""
@@ -81,9 +91,10 @@ def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
         for field in panel.coloured
         for code in np.unique(_finite(np.empty(0) if field.codes is None else field.codes.ravel()))
     ]
-    markers = {(item.label, item.colour, item.symbol): item for panel in panels for item in panel.markers}
+    markers = {(item.label, item.colour, item.symbol): item for panel in panels for item in panel.markers if item.label}
     order = [category for panel in panels for field in panel.coloured for category in field.categories]
-    return sorted(dict.fromkeys(categories), key=order.index), list(markers.values())
+    named = dict.fromkeys(category for category in categories if not category.is_written)
+    return sorted(named, key=order.index), list(markers.values())
 
 
 def line_key(figure: Figure) -> list[Series]:
@@ -129,7 +140,18 @@ def _panel(panel: Panel) -> Panel:
             for band in panel.bands
         ),
         limits=(),
+        areas=tuple(replace(area, x=area.x * x_factor, y=area.y * y_factor) for area in panel.areas),
+        arrows=tuple(
+            replace(arrow, **{end: (at[0] * x_factor, at[1] * y_factor) for end, at in _ends(arrow).items()})
+            for arrow in panel.arrows
+        ),
+        words=tuple(replace(item, x=item.x * x_factor, y=item.y * y_factor) for item in panel.words),
     )
+
+
+def _ends(arrow: Arrow) -> dict[str, tuple[float, float]]:
+    """Return both ends of an arrow by name."""
+    return {"start": arrow.start, "end": arrow.end}
 
 
 def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
@@ -158,7 +180,39 @@ def _axis(axis: Axis, factor: float, unit: str) -> Axis:
     """Return an axis with a prefixed unit, such as mm, and its limits and step times `factor`."""
     limits = None if axis.limits is None else (axis.limits[0] * factor, axis.limits[1] * factor)
     step = None if axis.step is None else axis.step * factor
-    return replace(axis, unit=unit, limits=limits, step=step)
+    second = None if axis.second is None else replace(axis.second, factor=axis.second.factor / factor)
+    return replace(axis, unit=unit, limits=limits, step=step, second=second)
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return round numbers within a logarithmic axis of less than two decades, three at least.
+
+    They are 1, 2 and 5 times powers of ten, more numbers if these are too few, and evenly spaced ones at last.
+    """
+    steps = (1, 2, 5) if math.log10(high / low) >= 1 else (1, 1.5, 2, 3, 4, 5, 7)
+    exponents = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    values = [step * 10.0**exponent for exponent in exponents for step in steps]
+    if low < high and sum(low <= value <= high for value in values) < 3:
+        return even_ticks(low, high)
+    return values
+
+
+def even_ticks(low: float, high: float) -> list[float]:
+    """Return about five round numbers from low to high, evenly spaced."""
+    unit = 10.0 ** math.floor(math.log10((high - low) / 4))
+    step = unit * next((size for size in (5, 2) if size * unit <= (high - low) / 4), 1)
+    return [number * step for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
+
+
+def second_ticks(axis: Axis) -> tuple[list[float], list[str]]:
+    """Return where on an axis its second scale has ticks, and their texts. The axis must have limits."""
+    if axis.second is None or axis.limits is None:
+        return [], []
+    factor = axis.second.factor
+    low, high = (limit * factor for limit in axis.limits)
+    values = log_ticks(low, high) if axis.log else even_ticks(low, high)
+    inside = [value for value in values if low <= value <= high]
+    return [value / factor for value in inside], [f"{value:.10g}" for value in inside]
 
 
 def _thinned(line: Series) -> Series:

@@ -25,6 +25,20 @@ Symbol = Literal["circle", "triangle", "cross", "target", "patch"]
 
 
 @dataclass(frozen=True)
+class SecondScale:
+    """A second scale of an axis, on the opposite side: the axis times `factor` is `quantity` [`unit`]."""
+
+    quantity: str
+    unit: str
+    factor: float
+
+    @property
+    def label(self) -> str:
+        """Return the text at the scale, e.g. "Crossover [Hz]"."""
+        return f"{self.quantity} [{self.unit}]"
+
+
+@dataclass(frozen=True)
 class Axis:
     """One axis: label from `quantity` and `unit`, and `limits` [unit] (None: from the data).
 
@@ -39,6 +53,7 @@ class Axis:
     words: tuple[str, ...] = ()
     step: float | None = None
     prefixed: bool = True
+    second: SecondScale | None = None
 
     @classmethod
     def of_frequency(cls, hertz: Array) -> Axis:
@@ -111,6 +126,42 @@ class Band:
 
 
 @dataclass(frozen=True)
+class Area:
+    """Filled rings with their points x, y, both (n,); NaN stands between two rings, of which one may be a hole.
+
+    A hole runs the other way round than the ring around it. A hatched area has lines in its colour, and no ground.
+    """
+
+    x: Array
+    y: Array
+    colour: str
+    hatched: bool = False
+
+    def __post_init__(self) -> None:
+        _same_length("area", self.x, self.y)
+
+
+@dataclass(frozen=True)
+class Lettering:
+    """Words centred at the point x, y, or beside it at the `side` on which the point does not lie."""
+
+    x: float
+    y: float
+    text: str
+    colour: str
+    side: Literal["", "left", "right", "below", "above"] = ""
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """An arrow from the point `start` to the point `end`."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    colour: str
+
+
+@dataclass(frozen=True)
 class Limit:
     """Horizontal lines at `values` [unit of the y axis] across the panel, under one label."""
 
@@ -124,11 +175,12 @@ class Limit:
 class Category:
     """A word in place of a number, with one flat colour.
 
-    The word is a verdict, or the reason for a missing number.
+    The word is a verdict, or the reason for a missing number. The legend has it unless it is written in the panel.
     """
 
     label: str
     colour: str
+    is_written: bool = False
 
 
 @dataclass(frozen=True)
@@ -136,8 +188,8 @@ class Coloured:
     """Points x, y coloured by the number z [unit] or, where there is one, by a category.
 
     `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`. If `colours` are given,
-    they are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, are indices into `categories`;
-    where a code is NaN, z counts.
+    they are those of the whole numbers 0, 1, 2, ... instead. A `ramp` has other colours from little to much. `codes`,
+    of the shape of z, are indices into `categories`; where a code is NaN, z counts.
     """
 
     x: Array
@@ -150,6 +202,7 @@ class Coloured:
     colours: tuple[str, ...] = ()
     categories: tuple[Category, ...] = ()
     codes: Array | None = None
+    ramp: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that codes have the shape of the numbers. Raises ValueError if they have not."""
@@ -198,7 +251,7 @@ class Cloud(Coloured):
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes with maps and clouds lowest, then bands, limits, lines and markers.
+    """One pair of axes with maps and clouds lowest, then areas, bands, limits, lines, arrows, markers and words.
 
     With `equal`, a unit is as long on the one axis as on the other, and both have limits.
     """
@@ -213,6 +266,9 @@ class Panel:
     clouds: tuple[Cloud, ...] = ()
     bands: tuple[Band, ...] = ()
     equal: bool = False
+    areas: tuple[Area, ...] = ()
+    arrows: tuple[Arrow, ...] = ()
+    words: tuple[Lettering, ...] = ()
 
     @property
     def coloured(self) -> tuple[Coloured, ...]:

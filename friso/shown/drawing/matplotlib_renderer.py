@@ -17,16 +17,19 @@ from threading import RLock
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib import ticker
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from matplotlib.transforms import Bbox
 
 from friso.errors import InputError
 from friso.quantities import quoted
-from friso.shown.drawing.drawable import drawable, word_ticks
-from friso.shown.drawing.figure import IMAGE_FORMATS, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.drawable import SIDES, drawable, second_ticks, word_ticks
+from friso.shown.drawing.figure import IMAGE_FORMATS, Area, Axis, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.matplotlib_maps import LINE_HEIGHT, add_colour_bars, add_footer, draw_coloured, footer_height
 from friso.shown.drawing.palette import GREY, INK
 
@@ -274,6 +277,8 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
     """Draw everything in one panel, which is `width` [inch] wide."""
     _scale(axes, panel)
     draw_coloured(axes, panel)
+    for area in panel.areas:
+        axes.add_patch(_filled(area))
     handles: list[Artist] = []
     for band in panel.bands:
         handles += axes.fill(*band.outline, color=band.colour, linewidth=0)
@@ -287,10 +292,27 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
         axes.set_xlim(panel.x.limits)
     if panel.y.limits:
         axes.set_ylim(panel.y.limits)
+    for arrow in panel.arrows:
+        shape = {"arrowstyle": "-|>", "color": arrow.colour, "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", arrow.end, arrow.start, arrowprops=shape)
+    for item in panel.words:
+        across, up, *shift = SIDES[item.side]
+        place = {"ha": across, "va": up, "xytext": shift, "textcoords": "offset points"}
+        axes.annotate(item.text, (item.x, item.y), color=item.colour, weight="bold", parse_math=False, **place)
     if panel.equal:
         axes.set_aspect("equal")
     _ticks(axes, panel, width)
     _annotate(axes, panel, handles, width)
+
+
+def _filled(area: Area) -> PathPatch:
+    """Return the patch of filled rings."""
+    rings = np.split(np.column_stack([area.x, area.y]), np.flatnonzero(np.isnan(area.x)))
+    paths = [Path(ring[~np.isnan(ring[:, 0])], closed=True) for ring in rings]
+    style: dict[str, Any] = {"facecolor": area.colour, "edgecolor": "none"}
+    if area.hatched:
+        style = {"facecolor": "none", "edgecolor": area.colour, "hatch": "///", "linewidth": 0}
+    return PathPatch(Path.make_compound_path(*paths), **style)
 
 
 def _scale(axes: Axes, panel: Panel) -> None:
@@ -343,6 +365,14 @@ def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> 
     """Write the labels, and the title over the legend above the axes, where they cover no data."""
     axes.set_xlabel(panel.x.label, parse_math=False)
     axes.set_ylabel(panel.y.label, parse_math=False)
+    if panel.x.second is not None:
+        above = axes.secondary_xaxis("top")
+        above.set_xlabel(panel.x.second.label, parse_math=False)
+        _second_ticks(above.xaxis, panel.x)
+    if panel.y.second is not None:
+        beside = axes.secondary_yaxis("right")
+        beside.set_ylabel(panel.y.second.label, parse_math=False)
+        _second_ticks(beside.yaxis, panel.y)
     labels = [item.label for item in _items(panel)]
     handles = [handle for handle, label in zip(handles, labels, strict=True) if label]
     labels = [label for label in labels if label]
@@ -354,6 +384,14 @@ def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> 
         for text in legend.get_texts():
             text.set_parse_math(False)
     axes.set_title(panel.title, pad=5 + LEGEND_ROW * rows, parse_math=False)
+
+
+def _second_ticks(axis: Any, declared: Axis) -> None:
+    """Set the ticks of the second scale of an axis."""
+    places, texts = second_ticks(declared)
+    axis.set_major_locator(ticker.FixedLocator(places))
+    axis.set_major_formatter(ticker.FixedFormatter(texts))
+    axis.set_minor_locator(ticker.NullLocator())
 
 
 def _items(panel: Panel) -> list[Band | Series | Markers]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import html
+import json
 import math
 import textwrap
 from dataclasses import dataclass, replace
@@ -20,10 +21,10 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from friso.shown.drawing import plotly_maps
-from friso.shown.drawing.drawable import drawable, word_ticks
-from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.drawable import SIDES, drawable, log_ticks, second_ticks, word_ticks
+from friso.shown.drawing.figure import Area, Arrow, Axis, Band, Figure, Lettering, Markers, Panel, Series
 from friso.shown.drawing.packing import packed, packed_json
-from friso.shown.drawing.palette import GREY, INK
+from friso.shown.drawing.palette import DARK, GREY, INK
 
 WIDE_PAGE_WIDTH, NARROW_PAGE_WIDTH = (
     540,
@@ -67,6 +68,12 @@ def fragment(figure: Figure) -> str:
         f'<div id="figure-{figure.name}" style="height: {drawn["layout"]["height"]}px"></div>\n'
         f'<script type="application/gzip" class="figure">{packed_json({**_single(drawn), "config": _CONFIG})}</script>'
     )
+
+
+def plain_parts(figure: Figure) -> dict[str, Any]:
+    """Return traces and layouts of a figure for a page whose own script draws it, ready for JSON."""
+    parts = parts_of_both(figure)
+    return json.loads(json.dumps(parts, default=lambda array: _single(array)))
 
 
 def parts_of_both(figure: Figure) -> dict[str, Any]:
@@ -137,11 +144,14 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     height = row * prepared.rows
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the earlier numbers
     below, legend, note = plotly_maps.footer(prepared, key, width)
+    top_margin = TOP_MARGIN + FOOTER_HEIGHT * any(panel.x.second is not None for panel in prepared.panels)
+    right_margin = FOOTER_HEIGHT if any(panel.y.second is not None for panel in prepared.panels) else RIGHT_MARGIN
     layout: dict[str, Any] = {
-        "height": height + TOP_MARGIN + below,
-        "margin": {"l": LEFT_MARGIN, "r": RIGHT_MARGIN, "t": TOP_MARGIN, "b": below},
+        "height": height + top_margin + below,
+        "margin": {"l": LEFT_MARGIN, "r": right_margin, "t": top_margin, "b": below},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
         "hovermode": "closest",
+        "meta": {"dark": DARK},
         "annotations": note,
         **legend,
     }
@@ -269,6 +279,50 @@ def _add_panel(
     layout[f"xaxis{suffix}"] = x_axis
     shape |= {"scaleanchor": f"x{suffix}"} if panel.equal else {}
     layout[f"yaxis{suffix}"] = _axis(panel.y) | {"domain": y_domain, "anchor": f"x{suffix}"} | shape
+    layout["annotations"] += [_arrow(arrow, panel, suffix) for arrow in panel.arrows]
+    layout["annotations"] += [_lettering(item, panel, suffix) for item in panel.words]
+    for letter, axis, side in (("x", panel.x, "top"), ("y", panel.y, "right")):
+        if axis.second is not None:
+            main = f"{letter}axis{suffix}"
+            other = {"x": f"y{suffix}", "y": f"x{suffix}"}[letter]
+            layout[f"{letter}axis{SECOND}{number + 1}"] = _second(axis, layout[main]) | {
+                "overlaying": f"{letter}{suffix}", "matches": f"{letter}{suffix}", "side": side, "anchor": other,
+            }  # fmt: skip
+
+
+SECOND = "9"
+"""First digit of the numbers of second scales, which no panel's own axes have."""
+
+
+def _second(axis: Axis, settings: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings of the second scale of an axis, from those of the axis itself."""
+    assert axis.second is not None
+    places, texts = second_ticks(axis)
+    title = {"text": html.escape(axis.second.label), "standoff": 8}
+    ticks = {"title": title, "tickmode": "array", "tickvals": places, "ticktext": texts, "showgrid": False}
+    return {**settings, **ticks}
+
+
+def _at(value: float, axis: Axis) -> float:
+    """Return where a value lies on an axis for an annotation: its logarithm on a logarithmic one."""
+    return math.log10(value) if axis.log else value
+
+
+def _arrow(arrow: Arrow, panel: Panel, suffix: str) -> dict[str, Any]:
+    """Return an arrow as an annotation without text, on the axes of a panel."""
+    (ax, ay), (x, y) = ((_at(at[0], panel.x), _at(at[1], panel.y)) for at in (arrow.start, arrow.end))
+    refs = {"xref": f"x{suffix}", "axref": f"x{suffix}", "yref": f"y{suffix}", "ayref": f"y{suffix}"}
+    style = {"showarrow": True, "arrowhead": 2, "arrowwidth": 2, "arrowcolor": arrow.colour, "text": ""}
+    return {"x": x, "y": y, "ax": ax, "ay": ay, **refs, **style}
+
+
+def _lettering(item: Lettering, panel: Panel, suffix: str) -> dict[str, Any]:
+    """Return words as an annotation, on the axes of a panel."""
+    across, up, right, above = SIDES[item.side]
+    text = "<br>".join(f"<b>{html.escape(line)}</b>" for line in item.text.splitlines())
+    place = {"x": _at(item.x, panel.x), "y": _at(item.y, panel.y), "xref": f"x{suffix}", "yref": f"y{suffix}"}
+    shift = {"xanchor": across, "yanchor": up, "xshift": right, "yshift": above}
+    return {"text": text, "showarrow": False, "font": {"color": item.colour}, **place, **shift}
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
@@ -286,7 +340,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
     }
     if axis.words:
         positions, words = word_ticks(axis)
-        settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
+        texts = [html.escape(word).replace("\n", "<br>") for word in words]
+        settings |= {"tickmode": "array", "tickvals": positions, "ticktext": texts}
         settings["automargin"] = True  # words may have any length
     if axis.log:
         settings |= _log_ticks(axis.limits)
@@ -306,14 +361,7 @@ def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
     decades = math.log10(limits[1] / limits[0]) if limits else math.inf
     if limits is None or decades >= 2:
         return {"dtick": 1}
-    steps = (1, 2, 5) if decades >= 1 else (1, 1.5, 2, 3, 4, 5, 7)
-    exponents = range(math.floor(math.log10(limits[0])), math.ceil(math.log10(limits[1])) + 1)
-    values = [step * 10.0**exponent for exponent in exponents for step in steps]
-    low, high = limits
-    if low < high and sum(low <= value <= high for value in values) < 3:
-        unit = 10.0 ** math.floor(math.log10((high - low) / 4))
-        step = unit * next((size for size in (5, 2) if size * unit <= (high - low) / 4), 1)
-        values = [number * step for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    values = log_ticks(*limits)
     return {"tickmode": "array", "tickvals": values, "ticktext": [f"{value:.10g}" for value in values]}
 
 
@@ -323,12 +371,43 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
     key = bool(_labels(panel))
     named = place | {"legend": f"legend{suffix}"}
+    seconds = [
+        {
+            "type": "scatter",
+            "x": [None],
+            "y": [None],
+            "showlegend": False,
+            **place,
+            f"{letter}axis": f"{letter}{SECOND}{number + 1}",
+        }
+        for letter, axis in (("x", panel.x), ("y", panel.y))
+        if axis.second is not None
+    ]  # an axis without any trace is not drawn
     return [
+        *seconds,
         *plotly_maps.coloured_traces(panel, place, bar),
+        *(_filled(area, place) for area in panel.areas),
         *(_area(band, named | {"showlegend": key and bool(band.label)}) for band in panel.bands),
         *(_line(line, panel, named | {"showlegend": key and bool(line.label)}) for line in panel.series),
         *(_points(marker, panel, named | {"showlegend": key and bool(marker.label)}) for marker in panel.markers),
     ]
+
+
+def _filled(area: Area, place: dict[str, Any]) -> dict[str, Any]:
+    """Return the trace of filled rings, on the axes in `place`."""
+    style: dict[str, Any] = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": area.colour}
+    if area.hatched:
+        style |= {
+            "fillpattern": {
+                "shape": "/",
+                "fgcolor": area.colour,
+                "bgcolor": "rgba(0,0,0,0)",
+                "size": 9,
+                "solidity": 0.16,
+            }
+        }
+        style["fillcolor"] = "rgba(0,0,0,0)"
+    return {"type": "scatter", "x": area.x, "y": area.y, "hoverinfo": "skip", "showlegend": False, **style, **place}
 
 
 def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:

@@ -4,6 +4,8 @@
   const NONE = 255; // no kind: the number counts; no height: the run has ended
   const HIGHEST = 250; // heights from half a range below it to half a range above
   const GREY = "#767676", INK = "#222222";
+  const NARROW = 640; // [px]
+  const coloured = (part) => themed(part, data.dark);
   const plot = document.getElementById("plot");
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -169,14 +171,25 @@
     const layout = { template: "none", margin: { l: 72, r: 14, t: 30, b: 54 }, hovermode: "closest",
       font: { family: "system-ui, sans-serif", size: 12, color: INK }, showlegend: false, hoverlabel: { bgcolor: "#444444", font: { color: "white" } },
       xaxis: plotAxis(data.axes[across]), yaxis: plotAxis(yAxis()), uirevision: "kept" };
-    if (!points && data.edge && shown.name === data.metric) traces.push(edge());
-    if (isHere()) traces.push(machine(layout));
+    const asDrawn = isPicture();
+    if (asDrawn) {
+      const narrow = plot.clientWidth < NARROW;
+      traces = data.picture.data.slice();
+      Object.assign(layout, narrow ? data.picture.narrow : data.picture.layout);
+      plot.style.height = `${layout.height}px`;
+    } else {
+      plot.style.height = "";
+      if (isHere()) traces.push(machine(layout));
+    }
     if (selected) traces.push(ring(height));
     const config = { displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "",
       modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]] };
-    Plotly.react(plot, traces, layout, config);
+    Plotly.react(plot, coloured(traces), coloured({ ...layout, ...CLEAR }), config);
     drawKey();
   }
+
+  // The map of verdicts that the page is about is shown as in its files.
+  const isPicture = () => Boolean(data.picture) && shown.name === data.metric;
 
   function yAxis() {
     if (data.sampled || !points) return data.axes[up];
@@ -191,11 +204,6 @@
   const shownAxes = points && !data.sampled ? [across] : [across, up];
   const isHere = () => shownAxes.every((i) => data.axes[i].machine !== null)
     && (data.sampled || further.every((i) => data.axes[i].machine === null || isNear(data.axes[i], i)));
-
-  function edge() {
-    const [x, y] = data.edge;
-    return { type: "scatter", mode: "lines", x, y, line: { color: INK, width: 2 }, hoverinfo: "skip", showlegend: false };
-  }
 
   function machine(layout) {
     const [x, y] = shownAxes.map((i) => data.axes[i].machine);
@@ -216,24 +224,20 @@
   function drawKey() {
     const key = document.getElementById("key");
     key.replaceChildren();
+    if (isPicture()) return;
     shown.kinds.forEach((kind, code) => {
       if (!shown.codes.includes(code)) return;
       const entry = element("li", key);
       const swatch = element("span", entry);
       swatch.className = "swatch";
-      swatch.style.background = kind.colour;
+      swatch.style.background = coloured(kind.colour);
       entry.append(kind.label);
     });
-    if (!points && data.edge && shown.name === data.metric) {
-      const entry = element("li", key);
-      element("span", entry).className = "swatch edge";
-      entry.append("edge of hunting");
-    }
     if (!isHere()) return;
     const entry = element("li", key);
     const mark = element("span", entry);
     mark.className = "swatch machine";
-    mark.style.background = INK;
+    mark.style.background = coloured(INK);
     entry.append(`${data.machine}: ${shownAxes.map((i) => withUnit(data.axes[i].machine, data.axes[i].unit)).join(", ")}`);
   }
 
@@ -281,7 +285,7 @@
       yaxis: { ...style, title: { text: `Deviation [${prefix}${lines.unit}]`, standoff: 8 }, range: [factor * low, factor * high] } };
     const line = { type: "scatter", mode: "lines", x, y, line: { color: "#0072B2", width: 1.4 }, hoverinfo: "skip" };
     const picture = element("div", element("figure", section));
-    Plotly.newPlot(picture, [line], layout, { displayModeBar: false, responsive: true });
+    Plotly.newPlot(picture, coloured([line]), coloured({ ...layout, ...CLEAR }), { displayModeBar: false, responsive: true });
     element("p", section, "The deviation of the position from its reference, at the scale of what the run does at its end; the move itself is cut off.").className = "caption";
   }
 
@@ -311,6 +315,7 @@
     plot.focus({ preventScroll: true }); // so that arrow keys go on from here
     const hit = event.points[0];
     if (points && hit.customdata === undefined) return;
+    if (hit.data.type !== "heatmap" && !points) return;
     if (points) at[0] = hit.customdata;
     else [at[up], at[across]] = hit.pointIndex;
     select();
@@ -368,6 +373,8 @@
   await plotly;
   addControls();
   draw();
+  darkness.addEventListener("change", draw);
+  window.addEventListener("resize", () => data.picture && draw());
   plot.on("plotly_click", clicked);
   plot.addEventListener("keydown", moved);
 })();

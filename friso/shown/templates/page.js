@@ -14,6 +14,16 @@ const numbers = ({ planes, shape }) => {
   if (!columns) return flat;
   return Array.from({ length: rows }, (_, row) => flat.subarray(row * columns, (row + 1) * columns));
 };
+// Colours on a dark page; what is ringed in white is seen on any ground.
+const darkness = matchMedia("(prefers-color-scheme: dark)");
+const themed = (value, colours) => {
+  if (!darkness.matches) return value;
+  if (typeof value === "string") return colours[value] ?? value;
+  if (value === null || typeof value !== "object" || ArrayBuffer.isView(value) || value.line?.color === "white") return value;
+  if (Array.isArray(value)) return value.map((item) => themed(item, colours));
+  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, themed(item, colours)]));
+};
+const CLEAR = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)" };
 const plotly = (async () => {
   const script = document.createElement("script");
   script.textContent = await unpacked(document.getElementById("plotly"));
@@ -30,11 +40,13 @@ const drawer = (place, { data, layout, narrow, bars, config }) => {
   return async () => {
     const isNarrow = place.parentElement.clientWidth < 640;
     const again = drawn !== null;
-    if (drawn !== isNarrow) {
-      drawn = isNarrow;
+    const now = `${isNarrow} ${darkness.matches}`;
+    if (drawn !== now) {
+      drawn = now;
       const chosen = isNarrow ? narrow : layout;
       place.style.height = `${chosen.height}px`;
-      await Plotly.react(place, isNarrow ? data.map((trace, k) => moved(trace, bars[k])) : data, chosen, config);
+      const traces = isNarrow ? data.map((trace, k) => moved(trace, bars[k])) : data;
+      await Plotly.react(place, ...[traces, { ...chosen, ...CLEAR }].map((part) => themed(part, layout.meta.dark)), config);
     }
     if (!again) return;
     await Plotly.Plots.resize(place);
@@ -45,12 +57,14 @@ const drawer = (place, { data, layout, narrow, bars, config }) => {
   await plotly;
   const drawers = [];
   let resized = 0;
-  window.addEventListener("resize", () => {
+  const again = () => {
     clearTimeout(resized);
     resized = setTimeout(async () => {
       for (const draw of drawers) await draw();
     }, 100);
-  });
+  };
+  window.addEventListener("resize", again);
+  darkness.addEventListener("change", again);
   for (const packed of document.querySelectorAll("script.figure")) {
     const parts = JSON.parse(await unpacked(packed), (_, value) => (value?.planes === undefined ? value : numbers(value)));
     const draw = drawer(packed.previousElementSibling, parts);
