@@ -152,17 +152,19 @@ def tune(
 
 
 def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
-    """Log the first remedy tried if it works, while others are still tried."""
+    """Log the first remedy that works, and how long others are still tried."""
     from friso.questions.tune.words import changes, slowest_time
-    from friso.shown.drawing.prefixes import listed
+    from friso.remedies.settings import settings
+    from friso.shown.drawing.prefixes import listed, with_unit
     from friso.shown.unknown import unknown_condition
 
-    if outcome.certainty != "works" or outcome.stage is None or outcome.measured is None:
+    if outcome.stage is None or outcome.measured is None:
         return
     changed = listed(changes(stage, outcome.stage), "and")
     when, condition = slowest_time(outcome.measured, goal), unknown_condition(stage, [*stage.uncertain()])
     LOGGER.info(
-        f"{condition}this works: {changed}, in position after {when}; others are tried",
+        f"{condition}this works: {changed}, in position after {when}; others are tried for up to "
+        f"{with_unit(settings.others_time, 's', 2)} of computing (Ctrl-C ends with this)",
         extra={"meanwhile": True},
     )
 
