@@ -1369,12 +1369,13 @@ def test_a_rare_machine_does_not_stand_for_a_twentieth(
     ],
 )
 def test_the_speed_is_capped_by_sampling_mode_or_what_is_unknown_unless_a_limit_is_stated(
-    drive: dict, mode: str | None, limit: float | None, factor: float, reason: str
+    rigid: Stage, drive: dict, mode: str | None, limit: float | None, factor: float, reason: str
 ) -> None:
     """The bandwidth of a locked stage on van Dijk's rules is about its crossover, 8 Hz."""
-    locked = friso.example("thesis_rig").replace({"joint.locked": True})
-    modes = {"parasitic": {"frequency": mode, "mass": "1 g", "damping_ratio": 0.5}} if mode else {}
-    stage = locked.replace({**modes, **({"drive": drive} if drive else {})})
+    locked = load(friso.example("thesis_rig")).replace({"joint.locked": True})
+    parasitic = {"frequency": mode, "mass": "1 g", "damping_ratio": 0.5}
+    stage = locked.replace({"parasitic": parasitic}) if mode else rigid
+    stage = stage.replace({"drive": drive}) if drive else stage
     cap = speed_cap(stage, Goal(bandwidth_limit=limit))
     assert (cap.factor, cap.reason) == (pytest.approx(factor, rel=0.05), reason)
 
