@@ -2,10 +2,10 @@
 
 `python -m benchmarks.advice [--copies N] [--only NAME ...]` tunes the machines of `advice.toml`. For each it prints the
 answer, and a row: CPU time until the first verified answer and until the end, as multiples of a check of the same
-stage; the settling time told and the one of copies drawn anew, at the worse end of their moves, by the equations and
-the integrator of `benchmarks.machines_by_hand`; and bandwidth and force of the answer over those of the least speed of
-the controller that meets the goal. That speed is found by brute search, in steps of `STEP`. Kernels are to be in the
-cache: run it twice.
+stage; the settling time told and the one of copies drawn anew, at the worse end of their moves, by
+`benchmarks.advice_equations`; and bandwidth and force of the answer over those of the least speed of the controller
+that meets the goal. That speed is found by brute search, in steps of `STEP`. Kernels are to be in the cache: run it
+twice.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 import numpy as np
 
 import friso
-from benchmarks.machines_by_hand import machine
+from benchmarks.advice_equations import settling
 from benchmarks.report import print_table
 from friso.axis import speaking_of
 from friso.equations.bandwidth import sped_up
@@ -32,7 +32,7 @@ from friso.remedies.verified import Performance, confirmed, missed_parts, moving
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
-STEP, FRESH_SEED, COPIES = 1.02, 9001, 10
+STEP, FRESH_SEED, COPIES = 1.02, 9001, 50
 """Ratio of speeds of the brute search, seed of the copies, and their number."""
 
 ALLOWED = 1.3
@@ -92,7 +92,7 @@ def row(name: str, stage: Stage, copies: int) -> list[str]:
     drawn = draw_fleet(outcome.stage, Correlations(), copies, FRESH_SEED, goal.moves)
     flat = drawn.laid_over(outcome.stage, {}, 1)
     one_by_one = [{key: value[k] if np.ndim(value) else value for key, value in flat.items()} for k in range(copies)]
-    times = np.array([machine(one).settling(goal.within, one["motion.duration"]) for one in one_by_one])
+    times = np.array([settling(one, goal.within) for one in one_by_one])
     low, high = outcome.measured.slowest_interval(goal)
     least = least_speed(advice, draw_fleet(stage, Correlations(), advice.machines.count, FRESH_SEED + 1, goal.moves))
     ratios = ["no speed works", "–"]
@@ -102,7 +102,7 @@ def row(name: str, stage: Stage, copies: int) -> list[str]:
             f"{loop_bandwidth(outcome.stage) / loop_bandwidth(least_stage):.2f}",
             f"{outcome.measured.force(goal) / measured.force(goal):.2f}",
         ]
-    return [
+    cells = [
         *(name, outcome.remedy.name, f"{first:.1f}", f"{whole:.1f}"),
         f"{outcome.measured.slowest(goal):.3g} s ({low:.3g} to {high:.3g})",
         f"{np.count_nonzero(np.isfinite(times))} of {copies}",
@@ -110,6 +110,8 @@ def row(name: str, stage: Stage, copies: int) -> list[str]:
         f"{np.count_nonzero(times <= high)} of {copies}",
         *ratios,
     ]
+    print(cells, flush=True)
+    return cells
 
 
 def main() -> None:

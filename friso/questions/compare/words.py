@@ -321,7 +321,7 @@ _SAYS: Sequence[Alternatives[Comparison]] = (
         (
             lambda of: _joints(of) and _settings(of),
             "Controller settings do here what a joint does, and no joint is needed: half of the machines are in "
-            "position {settings}; {joints}.",
+            "position {settings}, and {joints}.",
         ),
         (_joints, "Only a joint brings these machines to rest, half of them {joints}. No setting does so alone."),
         (
