@@ -24,7 +24,10 @@ KINDS = ("pid", "cascade")
 
 
 def settling(flat: Mapping[str, Any], within: float) -> float:
-    """Return the longer settling time [s] of a move there and back, into a band [m]; infinite if it stays out."""
+    """Return the longer settling time [s] of a move there and back, into a band [m]; infinite if it stays out.
+
+    The position is the one that the controller is given, of a screw the motor's if its encoder is there.
+    """
     acceleration, ramp, back = (flat[f"motion.{key}"] for key in ("acceleration", "acceleration_time", "return_at"))
     far = acceleration * ramp**2
     corners = [0.0, ramp, 2 * ramp, back, back + ramp, back + 2 * ramp, flat["motion.duration"]]
@@ -36,12 +39,12 @@ def settling(flat: Mapping[str, Any], within: float) -> float:
     scales = np.full(14, 1e-10)
     scales[[V, MOTOR_V, CART_V, PART_V, NOTCH_RATE]] = 1e-8
     scales[[INTEGRAL, NOTCH]] = 1e-10, 1e-6
-    rates = equations(flat)
+    rates, seen = equations(flat), MOTOR if flat.get("encoder.position") == "motor" else Y
     for number, ((begin, end), piece) in enumerate(zip(pairwise(corners), pieces, strict=True)):
         run = solve_ivp(rates, (0.0, end - begin), state, "LSODA", rtol=RTOL, atol=scales, max_step=STEP, args=piece)
         state = run.y[:, -1]
         if number in (2, 5):
-            outside = np.flatnonzero(np.abs(run.y[Y] - piece[0]) > within)
+            outside = np.flatnonzero(np.abs(run.y[seen] - piece[0]) > within)
             last = outside[-1] if outside.size else -1
             longest = max(longest, np.inf if last == run.t.size - 1 else run.t[last + 1])
     return float(longest)

@@ -202,6 +202,7 @@ def tune(
     present, case = moving(ideal, unseen, goal, stage), None
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report, answered)
     sensitivities: Sensitivities | None = None
+    work = settings.tuning_work
     interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
         if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
@@ -209,6 +210,8 @@ def tune(
             first = session.outcomes[0]
             if first.certainty == "works":
                 cap = cap.above(first.factor)
+                if cap.reason != "stated":
+                    session.budget, work = budget.shortened(), settings.alternatives_share * work
                 listed = [remedy.up_to(cap) for remedy in listed]
         report("the stage as it is", 0)
         case, present = checked(ideal), present.surveyed(ideal, unseen, goal)
@@ -218,7 +221,7 @@ def tune(
         if not unmet:
             listed = []  # nothing has to change
         for joint in (False, True):
-            with allowance(settings.tuning_work) as session.allowed:
+            with allowance(work) as session.allowed:
                 several = [remedy for remedy in listed if remedy.buys_joint == joint]
                 session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
         session.makes_leaves()

@@ -127,6 +127,10 @@ class RemedySettings(Settings):
     """Work for all remedies of the controller but the first, about 18 s on one core, and as much for remedies that buy
     a joint. Remedies left then are not tried, and the answer says so."""
 
+    alternatives_share: float = setting(0.5, "")
+    """Fraction of generations and work of other searches once the speed of the controller works and no limit of it is
+    stated. They find alternatives near that speed, which need not be the very best."""
+
     others_time: float = setting(36.0, "s")
     """Time for which other remedies are tried once one works, as is said then: twice `tuning_work`, on one core."""
 

@@ -163,6 +163,15 @@ def _first_modes(tuning: Advice) -> str:
     return "; the file states no mode: first find out whether those of the machine allow this"
 
 
+def _unseen(flat: Mapping[str, Any]) -> str:
+    """Say how far the load may stay from its place where the position is measured at the motor."""
+    if flat.get("encoder.position") != "motor":
+        return ""
+    load = {key: value for key, value in flat.items() if not key.startswith("motor_friction.")}
+    wound = breakaway(load) / flat["transmission.stiffness"] + flat.get("transmission.backlash", 0.0) / 2
+    return f"; that is the motor's place, and the load stays up to {with_unit(wound, 'm')} off by its friction"
+
+
 def _second(tuning: Advice) -> str:
     """Say what the second remedy is, brings and costs, in the words of the first."""
     second = tuning.working[1]
@@ -225,6 +234,7 @@ _WORDS: Words[Advice] = {
     "force": lambda of: _against(_measured(of).force(of.goal), of.present.force(of.goal), FORCE),
     "margin": lambda of: f"{_measured(of).least_margin(of.goal):.2f}",
     "factor": lambda of: factor_text(_first(of).factor),
+    "unseen": lambda of: _unseen(of.stage.flat()),
     "first_modes": lambda of: _first_modes(of),
     "second": lambda of: _second(of),
     "cap": cap_words,
@@ -260,7 +270,7 @@ _SAYS: Sequence[Alternatives[Advice]] = (
     ),
     (
         (lambda of: not of.needed, ""),
-        (lambda of: of.working, "Then {settled}, with {force} and a modulus margin of {margin}{first_modes}."),
+        (lambda of: of.working, "Then {settled}, with {force} and a modulus margin of {margin}{unseen}{first_modes}."),
         (always, "{as_it_is}"),
     ),
     (
