@@ -53,6 +53,7 @@ from friso.questions.tune.words import (
     price,
     rows,
     slowest_time,
+    unseen,
     why_unmet,
 )
 from friso.remedies import method
@@ -1398,6 +1399,17 @@ def test_once_a_speed_works_others_stay_near_it_and_a_stated_limit_stands() -> N
     assert SpeedCap(4.0, "unknown").above(2.0) == SpeedCap(2.0 * settings.faster_than_least, "least")
     assert SpeedCap(2.1, "mode").above(2.0) == SpeedCap(2.1, "least")
     assert SpeedCap(10.0, "stated").above(2.0) == SpeedCap(10.0, "stated")
+
+
+@pytest.mark.parametrize(("place", "says"), [("motor", "188 µm"), ("load", "")])
+def test_what_an_encoder_at_the_motor_does_not_see_is_said(place: str, says: str) -> None:
+    """The load's friction, 3 N, winds a transmission of 16 kN/m; the motor's own friction does not."""
+    law = {"model": "lugre", "static": 3.0, "coulomb": 2.0, "stribeck_velocity": 1e-3, "stribeck_exponent": 2.0}
+    law |= {"bristle_stiffness": 1e5, "bristle_damping": 100.0, "viscous": 1.0}
+    flat = {f"{table}.{key}": value for table in ("friction", "motor_friction") for key, value in law.items()}
+    text = unseen({**flat, "transmission.stiffness": 1.6e4, "encoder.position": place})
+    assert says in text
+    assert bool(text) == bool(says)
 
 
 def test_tuned_numbers_are_in_the_units_of_the_file_and_others_stay_as_they_are_written() -> None:

@@ -163,7 +163,7 @@ def _first_modes(tuning: Advice) -> str:
     return "; the file states no mode: first find out whether those of the machine allow this"
 
 
-def _unseen(flat: Mapping[str, Any]) -> str:
+def unseen(flat: Mapping[str, Any]) -> str:
     """Say how far the load may stay from its place where the position is measured at the motor."""
     if flat.get("encoder.position") != "motor":
         return ""
@@ -234,7 +234,7 @@ _WORDS: Words[Advice] = {
     "force": lambda of: _against(_measured(of).force(of.goal), of.present.force(of.goal), FORCE),
     "margin": lambda of: f"{_measured(of).least_margin(of.goal):.2f}",
     "factor": lambda of: factor_text(_first(of).factor),
-    "unseen": lambda of: _unseen(of.stage.flat()),
+    "unseen": lambda of: unseen(of.stage.flat()),
     "first_modes": lambda of: _first_modes(of),
     "second": lambda of: _second(of),
     "cap": cap_words,
