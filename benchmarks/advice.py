@@ -116,7 +116,7 @@ def row(name: str, stage: Stage, copies: int) -> list[str]:
 
 def main() -> None:
     """Print the answers and the table."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--copies", type=int, default=COPIES)
     parser.add_argument("--only", nargs="*")
     chosen = parser.parse_args()

@@ -370,7 +370,7 @@ class Stage(Section):
         A key that the file lacks is written in SI, and one without a unit as a number.
         """
         quantity = numeric_keys({**self.flat(), key: value})[key].on(self.axis_kind)
-        if not quantity.unit:
+        if isinstance(quantity, Number):
             return float(f"{value:.{digits}g}")
         unit = self.unit_in_file(key) or quantity.unit
         return exactly(float(f"{value / quantity.factor(unit):.{digits}g}"), unit)

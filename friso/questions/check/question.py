@@ -52,7 +52,7 @@ class CheckAnswer(Answer):
     draws: Draws | None
     laws: VerdictsByLaw | None
     cut: bool
-    stage_file: str
+    stage_file: str = ""
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that says what stops the hunting, for a file of a stage that hunts."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class ExportAnswer(Answer):
     """Gains in the terms of drives; `result` is a `Gains`."""
 
-    stage_file: str
+    stage_file: str = ""
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that compares a log of the drive with these gains with the stage."""

@@ -31,7 +31,7 @@ LEAST_DELAY = 4
 class RigAnswer(Answer):
     """An experiment on the machine as built; `result` is its `Outcome` with logs and their truth."""
 
-    stage_file: str
+    stage_file: str = ""
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that identifies the stage from the logs written."""
