@@ -311,6 +311,14 @@ def _split(entry: str) -> tuple[str, str]:
     return match[0], _checked_unit(rest)
 
 
+def unit_of(text: Any) -> str:
+    """Return the unit of a text with a number and a unit; "" for an uncertain value and for anything else."""
+    try:
+        return _split(text)[1] if isinstance(text, str) else ""
+    except _Refused:
+        return ""
+
+
 def in_unit_of(before: Any, entry: Any) -> Any:
     """Return a number completed by the unit of the text `before`; other entries unchanged.
 

@@ -398,7 +398,7 @@ def test_map_with_the_chosen_point_and_cells_of_all_kinds(designed: Design) -> N
     assert (field.codes[1, 1], field.codes[2, 2]) == (1.0, 0.0)
     assert np.isnan(field.codes[0, 0])
     assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (designed.controller.crossover, 1.0)
-    assert [line.label.split(":")[0] for line in panel.series] == ["edge of hunting at 1 mm", "machine's limit"]
+    assert [line.label.split(":")[0] for line in panel.series] == ["edge of hunting at 1 mm", "the machine's limit"]
 
 
 def test_window_with_edges_beyond_the_search(designed: Design) -> None:

@@ -248,7 +248,7 @@ def test_only_what_is_left_out_is_assumed(stage: Stage) -> None:
     inertia = {f"flexure.inertia_{axis}": "2e-4 kg*m^2" for axis in "xyz"}
     assert assumptions(stage.replace({**inputs, **inertia})) == []
     (text,), (everything,) = assumptions(stage.replace(inputs)), assumptions(stage)
-    words = ("moments of inertia of an aluminium cube of 0.5 kg", "centre of mass", "actuation", "sensor", "no load")
+    words = ("moments of inertia of an aluminium block of 0.5 kg", "centre of mass", "actuation", "sensor", "no load")
     assert [word in text for word in words] == [True, False, False, False, False]
     assert all(word in everything for word in words)
 
@@ -381,7 +381,8 @@ def test_the_drawing_is_to_scale(stage: Stage) -> None:
 def test_the_block_of_the_stage_has_its_moments_of_inertia(stage: Stage) -> None:
     value = Mechanism.of(stage.flat())
     x, y, z = block_size(value)
-    assert (x, y, z) == pytest.approx(((0.5 / 2700) ** (1 / 3),) * 3)
+    edge = (0.5 / 2700) ** (1 / 3)
+    assert (x, y, z) == pytest.approx((edge**2 / 0.06, edge, 0.06))
     flat = replace(value, body=replace(value.body, inertia=(1e-4, 1e-4, 2e-4)))
     assert block_size(flat)[2] == pytest.approx(0, abs=1e-9)
     ElementTree.fromstring(drawing_svg(flat, 1e-3))

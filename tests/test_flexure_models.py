@@ -20,7 +20,7 @@ from friso.leaf_springs.beam_system import BeamFailure, Configuration, LeafBeams
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.joint import first_interfering, parasitic_mode
-from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
+from friso.leaf_springs.mechanism import Mechanism, MovingBody, block_inertia
 from friso.leaf_springs.settings import LeafSpringSettings
 
 MANY = settings(max_examples=40)
@@ -44,7 +44,7 @@ def mechanism(
     base = Mechanism(
         leaves, length, width, thickness, spacing, 210e9, poisson, 7850.0, 1.1e9, 4e8, body, centre, centre, 0.01
     )
-    return replace(base, body=replace(body, inertia=cube_inertia(base.body.mass)))
+    return replace(base, body=replace(body, inertia=block_inertia(base.body.mass)))
 
 
 @st.composite

@@ -15,7 +15,7 @@ import shells
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
+from friso.leaf_springs.mechanism import Mechanism, MovingBody, block_inertia
 from friso.materials import materials
 
 LeafModel = Callable[[Mechanism, float], Evaluation]
@@ -66,7 +66,7 @@ def mechanism(name: str) -> Mechanism:
         MovingBody(mass, (0.0, 0.0, 0.0), (length + beyond, 0.0, 0.0)),
         *((length + beyond, 0.0, 0.0),) * 2,
     )
-    return Mechanism(**{**bare.__dict__, "body": MovingBody(mass, cube_inertia(mass), bare.body.centre)})
+    return Mechanism(**{**bare.__dict__, "body": MovingBody(mass, block_inertia(mass), bare.body.centre)})
 
 
 @cache

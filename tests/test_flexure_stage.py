@@ -12,7 +12,7 @@ from friso.errors import InputError
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import parasitic_mode
-from friso.leaf_springs.mechanism import Mechanism
+from friso.leaf_springs.mechanism import Mechanism, block_inertia
 from friso.materials import materials
 from friso.stage import Stage, load, loads, save, violations
 from friso.studies.cells import allowed_cells, flat_cells
@@ -95,10 +95,12 @@ def test_a_mode_of_another_sign_counts_by_its_size(stage: Stage) -> None:
 
 
 def test_defaults_are_the_stated_ones(stage: Stage) -> None:
-    """Stage: an aluminium cube at the leaf ends; actuator and sensor at its centre of mass."""
+    """Stage: an aluminium block at the leaf ends, as deep as their row; actuator and sensor at its centre of mass."""
     value = Mechanism.of(stage.flat())
-    edge = (0.5 / 2700) ** (1 / 3)
-    assert value.body.inertia == pytest.approx((0.5 / 6 * edge**2,) * 3, rel=1e-12)
+    edge, depth = (0.5 / 2700) ** (1 / 3), 0.06
+    height = 0.5 / 2700 / (edge * depth)
+    squares = np.array([height, edge, depth]) ** 2
+    assert value.body.inertia == pytest.approx(0.5 / 12 * (squares.sum() - squares), rel=1e-12)
     assert value.body.centre == (0.07, 0.0, 0.0)
     assert value.actuation == value.sensor == (0.07, 0.0, 0.0)
     assert value.stress_concentration == 1.5
@@ -296,3 +298,14 @@ def test_refused(table: str, key: str, said: str) -> None:
 def test_stiffness_stated_twice_or_not_at_all(stage: Stage, key: str, asked: Callable[[Stage], object]) -> None:
     with refused(key):
         asked(stage)
+
+
+@pytest.mark.parametrize(("width", "depth"), [(0.0, 0.0), (0.2, 0.05), (0.05, 0.2), (0.3, 0.2)])
+def test_a_block_of_unknown_inertia_fits_its_leaves(width: float, depth: float) -> None:
+    """It weighs what the stage weighs, and is at least as wide as the leaves and as deep as their row."""
+    moments, mass = np.array(block_inertia(2.0, width, depth)), 2.0
+    x, y, z = np.sqrt(6 / mass * (moments.sum() - 2 * moments))
+    assert x * y * z * 2700 == pytest.approx(mass)
+    assert y >= width * (1 - 1e-9)
+    assert z >= depth * (1 - 1e-9)
+    assert x <= (mass / 2700) ** (1 / 3) * (1 + 1e-9)

@@ -31,7 +31,7 @@ from friso.design_method.population import (
     under_law,
     worst_edges,
 )
-from friso.design_method.prepare import prepared, with_leaves
+from friso.design_method.prepare import by_rules, prepared, with_leaves
 from friso.design_method.requirements import LeafTask, Relaxation, relaxed_requirements
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
@@ -57,11 +57,13 @@ def own_law(stages: Sequence[Stage]) -> OtherLaws:
 class Need:
     """Whether a machine needs an isolator, with the result that decides it.
 
-    `without` are the edges of hunting without an isolator, at each corner of the specification.
+    `without` are the edges of hunting without an isolator, at each corner of the specification. `present` is the
+    crossover [Hz] of the stage as it is.
     """
 
     without: Corners
     spec: Spec
+    present: float
 
     @property
     def isolator(self) -> bool:
@@ -70,6 +72,11 @@ class Need:
         Its highest edge of hunting, times the factor of safety, then exceeds the machine's limit.
         """
         return self.spec.safety.hunting * self.without.highest > self.spec.limit
+
+    @property
+    def limit_is_present(self) -> bool:
+        """Tell whether the limit is merely the present crossover, as a template fills it in."""
+        return bool(np.isclose(self.spec.limit, self.present, rtol=settings.present_share))
 
 
 class NoDesign(Exception):
@@ -158,7 +165,7 @@ class Design:
     @property
     def need(self) -> Need:
         """Return the result that decides whether an isolator is needed."""
-        return Need(self.without, self.spec)
+        return Need(self.without, self.spec, by_rules(self.original).flat()[CROSSOVER])
 
     @property
     def needed(self) -> bool:
@@ -241,7 +248,7 @@ def design(
     without, outcome = both(
         partial(over, rigid(flat), settings.lowest_edge * limit, settings.highest_edge * limit, label), fitted
     )
-    need = Need(worst_edges(without), spec)
+    need = Need(worst_edges(without), spec, by_rules(stage).flat()[CROSSOVER])
     if isinstance(outcome, NoDesign):
         raise outcome.of(need)
     fit, candidates = outcome

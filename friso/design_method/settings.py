@@ -86,6 +86,10 @@ class DesignSettings(Settings):
     tried_strokes: int = setting(4, "")
     """Strokes tried over a range in the specification. Each takes a design."""
 
+    present_share: float = setting(1e-3, "")
+    """Relative difference of a limit from the present crossover up to which it is that crossover, rounded in a
+    template."""
+
     lowest_edge: float = setting(1 / 40, "")
     """Lowest crossover of the search, over the machine's limit. Slower loops hunt with any joint."""
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from friso.errors import InputError, StageError
+from friso.platform.system import shell_word
 from friso.quantities import Quantity, exactly, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
@@ -87,6 +88,11 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
             LOGGER.warning(f"{key}={wanted[key]} is taken as {in_units[key]}")
         wanted = in_units
     return stage.replace(wanted) if wanted else stage
+
+
+def file_of(source: StageLike, changes: Changes = None) -> str:
+    """Return the path of a stage file as a word of a command line; "" for another source, or with changed keys."""
+    return "" if isinstance(source, Stage | Mapping) or changes_of(changes) else shell_word(str(source))
 
 
 def tables_of(source: StageLike) -> dict[str, Any]:

@@ -21,7 +21,7 @@ STANDARD_GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s^2]."""
 
 ALUMINIUM_DENSITY = 2700.0
-"""Density [kg/m^3] of the cube that stands in for a stage whose inertia is not given."""
+"""Density [kg/m^3] of the block that stands in for a stage whose inertia is not given."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Mechanism:
             stress_concentration=section["stress_concentration"],
             load=section.get("load", 0.0),
         )
-        inertia = _triple(section, "inertia", cube_inertia(bare.body.mass))
+        inertia = _triple(section, "inertia", block_inertia(bare.body.mass, bare.width, bare.depth))
         centre = _triple(section, "centre", bare.body.centre)
         actuation = _triple(section, "actuation", centre)
         body, sensor = MovingBody(bare.body.mass, inertia, centre), _triple(section, "sensor", actuation)
@@ -158,13 +158,18 @@ class Mechanism:
         return (np.arange(int(self.leaves)) - (int(self.leaves) - 1) / 2) * float(self.spacing)
 
 
-def cube_inertia(mass: Any) -> tuple[Any, Any, Any]:
-    """Return the moments of inertia [kg m^2] of an aluminium cube of a mass [kg].
+def block_inertia(mass: Any, width: Any = 0.0, depth: Any = 0.0) -> tuple[Any, Any, Any]:
+    """Return the moments of inertia [kg m^2] of an aluminium block of a mass [kg] that bears on its leaves.
 
-    The cube stands in for a stage of unknown inertia. It does not depend on the leaves.
+    The block stands in for a stage of unknown inertia. It is a cube, unless the `width` of the leaves or the `depth` of
+    their row [m] is larger; then it reaches as far as they do, and is flatter along the leaves.
     """
-    moment = mass / 6 * (mass / ALUMINIUM_DENSITY) ** (2 / 3)
-    return moment, moment, moment
+    volume = mass / ALUMINIUM_DENSITY
+    edge = volume ** (1 / 3)
+    across, along = np.maximum(edge, width), np.maximum(edge, depth)
+    squares = (volume / (across * along)) ** 2, across**2, along**2
+    x, y, z = (mass / 12 * (sum(squares) - square) for square in squares)
+    return x, y, z
 
 
 def _triple(section: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:

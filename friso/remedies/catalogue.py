@@ -7,7 +7,7 @@ that hunts comes from a survey of a few joints.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from friso.errors import InputError
 from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at, limits, settled_margin
 from friso.hunting import find_attractors
 from friso.quantities import exactly
+from friso.remedies.caps import SpeedCap, speed_cap
 from friso.remedies.machines import Goal
 from friso.remedies.settings import settings
 from friso.stage import Stage, numeric_keys
@@ -109,7 +110,8 @@ class Remedy:
     """A remedy: its `name`, the stage from which it starts, and the variables it changes.
 
     `buys_joint` is true if it needs a joint; otherwise only the controller changes. `makes` names the remedy whose
-    joint this remedy builds from leaf springs.
+    joint this remedy builds from leaf springs. No gain goes beyond that of the present controller made `fastest` times
+    as fast.
     """
 
     name: str
@@ -117,6 +119,7 @@ class Remedy:
     variables: tuple[Variable, ...]
     buys_joint: bool = False
     makes: str = ""
+    fastest: float = np.inf
 
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
         """Return the changed keys at points of the search, shape (points, variables).
@@ -128,7 +131,25 @@ class Remedy:
         for variable, share in zip(self.variables, shares.T, strict=True):
             change = variable.change({**flat, **changed}, variable.at(share))
             changed |= change
-        return changed
+        return {**changed, **self._capped(flat, changed)}
+
+    def _capped(self, flat: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the changed gains that the stage `flat` has already, none faster than allowed."""
+        if np.isinf(self.fastest):
+            return {}
+        most = {key: value for key, value in sped_up(flat, self.fastest).items() if key in changed and value}
+        return {
+            key: (np.minimum if value > flat[key] else np.maximum)(changed[key], value) for key, value in most.items()
+        }
+
+    def up_to(self, cap: SpeedCap) -> Remedy:
+        """Return the remedy with all gains, and the range of the bandwidth, within a cap of the speed."""
+        if cap.reason == "stated":
+            return self
+        variables = (
+            replace(one, high=max(cap.factor, one.low)) if one.name == BANDWIDTH else one for one in self.variables
+        )
+        return replace(self, variables=(*variables,), fastest=cap.factor)
 
     @property
     def verifiable(self) -> bool:
@@ -151,26 +172,32 @@ class Remedy:
     def tuned(self, shares: np.ndarray) -> Stage:
         """Return the stage at a point of the search, `shares` with coordinates 0 to 1, (variables,).
 
-        Numbers are rounded to four digits.
+        Numbers are rounded in the units of the file; those that do not change stay as they are written.
         """
         changed = self.changes(shares[None])
-        return self.stage.with_numbers({key: float(f"{values[0]:.4g}") for key, values in changed.items()})
+        numbers = {key: float(values[0]) for key, values in changed.items()}
+        return self.stage.with_rounded(numbers, settings.typed_digits)
 
 
-def remedies(stage: Stage, goal: Goal) -> list[Remedy]:
-    """Return the remedies that a goal allows, from the smallest change to the largest."""
+def remedies(stage: Stage, goal: Goal, drive: Stage | None = None) -> list[Remedy]:
+    """Return the remedies that a goal and the cap of the speed allow, from the smallest change to the largest.
+
+    The sampling that caps the speed is that of the stage `drive`, by default `stage` itself.
+    """
     listed: list[Remedy] = []
     if goal.controller:
         listed += [Remedy(BANDWIDTH, stage, (bandwidth_factor(1.0),)), *_gains("gains", stage)]
         listed += [*_notch(stage, goal), *_against_friction(stage, goal), *_structures(stage)]
     if goal.joint and least_breakaway(stage.flat()) > 0:
         listed += _isolators(stage, goal)
-    return listed
+    cap = speed_cap(drive or stage, goal)
+    return [remedy.up_to(cap) for remedy in listed]
 
 
 def with_bandwidth(remedy: Remedy) -> Remedy:
     """Return a remedy that also varies the bandwidth."""
-    return Remedy(f"{remedy.name}, and bandwidth", remedy.stage, (*remedy.variables, bandwidth_factor()))
+    faster = replace(bandwidth_factor(), high=min(remedy.fastest, settings.fastest_factor))
+    return replace(remedy, name=f"{remedy.name}, and bandwidth", variables=(*remedy.variables, faster))
 
 
 def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint: bool = False) -> list[Remedy]:

@@ -21,6 +21,7 @@ from friso.frequency.crossover import Limits, limits, loop_bandwidth
 from friso.hunting import Case
 from friso.platform.extras import missing
 from friso.progress import Progress, silent
+from friso.remedies.caps import SpeedCap, speed_cap
 from friso.remedies.catalogue import BANDWIDTH, Remedy, remedies, with_bandwidth
 from friso.remedies.least import ChangeSize, change_size, least_factors
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
@@ -58,7 +59,8 @@ class Advice:
     is true if the search was ended early.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
-    written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
+    written. `cap` is how much faster the controller could become. `unmade` gives the reason why no leaf springs make
+    the joint of a remedy.
     """
 
     stage: Stage
@@ -75,6 +77,7 @@ class Advice:
     correlations: Correlations = field(default_factory=Correlations)
     unmade: Mapping[str, Unmade] = field(default_factory=dict)
     unmet: tuple[str, ...] = ()
+    cap: SpeedCap = field(default_factory=lambda: SpeedCap(settings.fastest_factor, "stated"))
 
     @property
     def needed(self) -> bool:
@@ -121,21 +124,12 @@ class Advice:
 
     @property
     def recommended(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that are described in full.
-
-        First comes the cheapest change. The remedy that settles soonest follows, or the next one if the first already
-        settles soonest.
-        """
-        return _recommended(self.working, self.goal)
+        """Return the remedies that are described in full: the two that cost the machine least."""
+        return self.working[: settings.described]
 
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
         """Return the outcome of a remedy's joint when made of leaf springs, or None."""
         return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
-
-    @property
-    def fastest(self) -> RemedyOutcome | None:
-        """Return the working remedy with the shortest settling time, or None."""
-        return min(self.working, key=lambda outcome: slowest(outcome, self.goal), default=None)
 
 
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
@@ -149,36 +143,23 @@ def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
 def _working(outcomes: Iterable[RemedyOutcome], stage: Stage, goal: Goal) -> tuple[RemedyOutcome, ...]:
     """Return the remedies of a stage that work: those for all moves first, of these the cheapest for the machine.
 
-    Parts to be bought cost most. The speed of the controller, one knob of every controller, comes before other changes
-    up to a factor that machines allow whose modes nobody stated. Others follow by what they cost the machine, force
-    times bandwidth, however many keys spell them. Leaf springs that make the joint of another remedy are left out.
+    Parts to be bought cost most. The speed of the controller, one knob of every controller, comes before other changes.
+    Others follow by what they cost the machine, force times bandwidth over margin, and only then by how many knobs they
+    turn and how far, however many keys spell these. Leaf springs that make the joint of another remedy are left out.
     """
     own = loop_bandwidth(stage)
-    modes_known = goal.bandwidth_limit is not None or stage.parasitic is not None
 
-    def rank(outcome: RemedyOutcome) -> tuple[bool, bool, bool, float, ChangeSize]:
+    def rank(outcome: RemedyOutcome) -> tuple[bool, bool, bool, float, int, float]:
         assert outcome.measured is not None
         assert outcome.stage is not None
         size, ratio = change_size(stage, outcome.stage), loop_bandwidth(outcome.stage) / own
         ratio = max(1.0, ratio) if np.isfinite(ratio) else np.inf
-        knob = outcome.remedy.name == BANDWIDTH and (modes_known or ratio <= settings.fastest_unasked)
-        cost = outcome.measured.force(goal) * ratio
-        return not outcome.measured.holds_for_all_moves(goal), size.bought, not knob, cost, size
+        cost = outcome.measured.force(goal) * ratio / outcome.measured.least_margin(goal)
+        remedy, some = outcome.remedy, not outcome.measured.holds_for_all_moves(goal)
+        return some, size.bought, remedy.name != BANDWIDTH, cost, len(remedy.variables), size.factor
 
     works = (outcome for outcome in outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
     return tuple(sorted(works, key=rank))
-
-
-def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Choose which working remedies to describe in full; none if no remedy works.
-
-    These are the first remedy and the one that settles soonest. If the first settles soonest, the second remedy follows
-    instead.
-    """
-    if not working:
-        return ()
-    fastest = min(working, key=lambda outcome: slowest(outcome, goal))
-    return tuple(working[:2]) if fastest is working[0] else (working[0], fastest)
 
 
 def tune(
@@ -195,17 +176,17 @@ def tune(
     """Optimise and verify every remedy that the goal allows, or the remedies named in `chosen`.
 
     Machines are drawn with the `seed` and the `correlations` of uncertain keys. `budget` sets the size of the searches.
-    `begins` is called before the work starts. `answered` is called with the outcome of a changed bandwidth alone, if
-    that is tried first. Raises InputError for a motion after which nothing has to settle.
+    `begins` is called before the work starts. `answered` is called with the first outcome that works, as soon as it is
+    verified. Raises InputError for a motion after which nothing has to settle.
     """
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _check_motion(stage)
     moves = goal.moves_of(stage)
     moves.check(stage)
-    goal = replace(goal, moves=moves)
+    goal, cap = replace(goal, moves=moves), speed_cap(stage, goal)
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
-    listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
+    listed = [remedy for remedy in remedies(ideal, goal, stage) if chosen is None or remedy.name in chosen]
     later = settings.setting_pairs * (_generations(budget) + 4 + settings.progress_steps)
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later)
     progress(0, 0, "compiling")
@@ -219,13 +200,19 @@ def tune(
     machines = machines_of_search(ideal, of_ideal, budget, seed, goal, stage)
     progress(0, 0, "the stage as it is")
     present, case = moving(ideal, unseen, goal, stage), None
-    session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report)
+    session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report, answered)
     sensitivities: Sensitivities | None = None
+    work = settings.tuning_work
     interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
         if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
             session.tries(listed.pop(0))
-            answered(session.outcomes[0])
+            first = session.outcomes[0]
+            if first.certainty == "works":
+                cap = cap.above(first.factor)
+                if cap.reason != "stated":
+                    session.budget, work = budget.shortened(), settings.alternatives_share * work
+                listed = [remedy.up_to(cap) for remedy in listed]
         report("the stage as it is", 0)
         case, present = checked(ideal), present.surveyed(ideal, unseen, goal)
         unmet = missed_parts(present, goal) or unsettled_parts(confirmed(ideal, goal), present, goal)
@@ -234,7 +221,7 @@ def tune(
         if not unmet:
             listed = []  # nothing has to change
         for joint in (False, True):
-            with allowance(settings.tuning_work) as session.allowed:
+            with allowance(work) as session.allowed:
                 several = [remedy for remedy in listed if remedy.buys_joint == joint]
                 session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
         session.makes_leaves()
@@ -260,6 +247,7 @@ def tune(
         correlations=correlations,
         unmade=session.unmade,
         unmet=unmet,
+        cap=cap,
     )
 
 
@@ -306,6 +294,7 @@ class _Session:
     further: Fleet
     budget: Budget
     report: _Report
+    answered: Callable[[RemedyOutcome], None] = lambda outcome: None
     outcomes: list[RemedyOutcome] = field(default_factory=list)
     searching: Search | None = None
     allowed: Allowance | None = None
@@ -321,15 +310,15 @@ class _Session:
     ) -> None:
         """Try remedies, smaller changes first; then `further` remedies.
 
-        `further` chooses remedies from the outcomes so far. Settings against friction with more keys than a working
+        `further` chooses remedies from the outcomes so far. Settings against friction with more knobs than a working
         remedy are left out, and so are combinations of remedies that work alone. Remedies that cannot be verified come
         last, and only if nothing works.
         """
         verifiable = [remedy for remedy in listed if remedy.verifiable]
         for own in (True, False):
             for remedy in verifiable:
-                keys = min((self._size(one).keys for one in self.outcomes if one.certainty == "works"), default=np.inf)
-                small = not remedy.of_setting or len(remedy.variables) <= keys
+                knobs = (len(one.remedy.variables) for one in self.outcomes if one.certainty == "works")
+                small = not remedy.of_setting or len(remedy.variables) <= min(knobs, default=np.inf)
                 if small and (remedy.stage is self.stage) == own and not self._combines(remedy):
                     self.tries(remedy)
         for remedy in further(self.outcomes, self.goal):
@@ -407,10 +396,6 @@ class _Session:
         if self.searching is not None and self.outcomes[-1].interrupted:
             self.outcomes[-1] = _so_far(self.searching, self.outcomes[-1])
 
-    def _size(self, outcome: RemedyOutcome) -> ChangeSize:
-        assert outcome.stage is not None
-        return change_size(self.stage, outcome.stage)
-
     def _begun(self, remedy: Remedy) -> Search:
         """Start the search for a remedy."""
         self.report.begins(_steps(remedy, self.budget))
@@ -447,14 +432,17 @@ class _Session:
                 break
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), tried, search.attracted, cut=search.cut)
+        worked_before = self.works
         self.outcomes[-1] = unsure or none
+        if self.works and not worked_before:
+            self.answered(self.outcomes[-1])
 
     def makes_leaves(self) -> None:
         """Size and verify leaf springs for the joints of remedies that are described in full.
 
         The work allowed for searches does not limit this.
         """
-        for one in _recommended(_working(self.outcomes, self.stage, self.goal), self.goal):
+        for one in _working(self.outcomes, self.stage, self.goal)[: settings.described]:
             if one.remedy.buys_joint:
                 self._made_of_leaves(one)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,11 @@ class Budget:
     surveyed: int = 8
     fresh: int = 100
     further: int = 300
+
+    def shortened(self) -> Budget:
+        """Return the budget of searches for alternatives, once a remedy works."""
+        some = settings.alternatives_share
+        return replace(self, generations=round(some * self.generations), refined=round(some * self.refined))
 
 
 @dataclass(frozen=True)

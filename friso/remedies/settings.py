@@ -19,7 +19,25 @@ class RemedySettings(Settings):
     machines."""
 
     fastest_unasked: float = setting(4.0, "")
-    """Largest factor on the bandwidth that is advised first where nobody stated modes or a limit of the machine."""
+    """Largest factor on the controller's speed that is advised where nobody stated modes or a limit of the machine."""
+
+    faster_than_least: float = setting(1.3, "")
+    """Factor above the least speed that works up to which other remedies are searched, unless a limit of the bandwidth
+    is stated. Within it they cost the machine about as much as the least one."""
+
+    mode_share: float = setting(0.5, "")
+    """Largest bandwidth advised unasked, over the frequency of the lowest mode. Above it a mode that the file has
+    wrong by a little takes the margin, with or without a notch."""
+
+    sampling_share: float = setting(0.1, "")
+    """Largest bandwidth advised unasked, over the sampling rate. Above it the phase that sampling costs depends on when
+    the drive reads and writes, which files seldom tell."""
+
+    described: int = setting(2, "")
+    """Remedies that are described in full, the cheapest first. More are a catalogue; the table has all."""
+
+    typed_digits: int = setting(4, "")
+    """Significant digits of tuned numbers, in the units of the file. Fewer cost margin by rounding."""
 
     machine_factor: int = setting(2, "")
     """Factor on the number of machines drawn for searches, so that others stand in for those that are left out."""
@@ -108,6 +126,13 @@ class RemedySettings(Settings):
     tuning_work: float = setting(1.5e9, "")
     """Work for all remedies of the controller but the first, about 18 s on one core, and as much for remedies that buy
     a joint. Remedies left then are not tried, and the answer says so."""
+
+    alternatives_share: float = setting(0.5, "")
+    """Fraction of generations and work of other searches once the speed of the controller works and no limit of it is
+    stated. They find alternatives near that speed, which need not be the very best."""
+
+    others_time: float = setting(36.0, "s")
+    """Time for which other remedies are tried once one works, as is said then: twice `tuning_work`, on one core."""
 
     search_work: float = setting(4e8, "")
     """Work for a search, about 5 s on one core. Less ends a search of four keys early."""

@@ -30,7 +30,7 @@ from friso.hunting import (
     kernels_to_judge,
     unstable,
 )
-from friso.remedies.catalogue import Remedy
+from friso.remedies.catalogue import BANDWIDTH, Remedy
 from friso.remedies.machines import Fleet, Goal, MoveRange
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
@@ -342,6 +342,15 @@ class RemedyOutcome:
         if self.stage is None:
             return "given up" if self.cut or self.points is None else "does not work"
         return "unsure" if self.doubts else "works" if self.moves_from is None else "large moves"
+
+    @property
+    def factor(self) -> float:
+        """Return how many times as fast the whole controller is by a remedy that varies its bandwidth; 1 otherwise."""
+        names = [variable.name for variable in self.remedy.variables]
+        if BANDWIDTH not in names or not self.shares.size:
+            return 1.0
+        number = names.index(BANDWIDTH)
+        return float(self.remedy.variables[number].at(self.shares[number]))
 
     def least_cost(self, goal: Goal) -> float:
         """Return the least cost of the points tried (see `TriedPoints.cost`); infinite without any."""

@@ -6,6 +6,7 @@ from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from functools import cached_property
+from math import isclose
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from pydantic import field_validator, model_validator
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
-from friso.quantities import Number, Quantity, as_toml, exactly, in_unit_of, quoted
+from friso.quantities import Number, Quantity, as_toml, exactly, in_unit_of, quoted, unit_of
 from friso.stage.contacts import with_guess
 from friso.stage.controllers import (
     ANTI_WINDUP,
@@ -358,6 +359,32 @@ class Stage(Section):
         keys = numeric_keys({**self.flat(), **numbers})
         texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
         return changed(self.as_written(), texts | dict.fromkeys(without), derived_from_it=True)
+
+    def unit_in_file(self, key: str) -> str:
+        """Return the unit in which the file writes a key; "" for a key that it lacks or that has an uncertain value."""
+        return unit_of(_under(self.as_written(), key))
+
+    def in_file_unit(self, key: str, value: float, digits: int) -> float | str:
+        """Write the value [SI] of a key of this stage in the unit of the file, rounded to significant `digits`.
+
+        A key that the file lacks is written in SI, and one without a unit as a number.
+        """
+        quantity = numeric_keys({**self.flat(), key: value})[key].on(self.axis_kind)
+        if isinstance(quantity, Number):
+            return float(f"{value:.{digits}g}")
+        unit = self.unit_in_file(key) or quantity.unit
+        return exactly(float(f"{value / quantity.factor(unit):.{digits}g}"), unit)
+
+    def with_rounded(self, numbers: Mapping[str, float], digits: int) -> "Stage":
+        """Return the stage with some keys set to SI numbers, rounded to significant `digits` in the units of the file.
+
+        Keys that have their number already stay as they are written. Unknown keys stay so. Raises StageError if the
+        result is no valid stage.
+        """
+        flat = self.flat()
+        new = {key: value for key, value in numbers.items() if not (key in flat and isclose(flat[key], value))}
+        texts = {key: self.in_file_unit(key, value, digits) for key, value in new.items()}
+        return changed(self.as_written(), texts, derived_from_it=True)
 
     def variants(self) -> "Mapping[str, Stage]":
         """Return the stage as "given" and, if it has a joint, with it "locked" and "free".

@@ -22,6 +22,8 @@ from friso.studies.draws import Draws
 from friso.studies.settings import settings
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from friso.hunting import LoopState, ParameterMargin
     from friso.hunting.criteria import Verdict
     from friso.remedies.catalogue import Suggestion
@@ -50,6 +52,13 @@ class CheckAnswer(Answer):
     draws: Draws | None
     laws: VerdictsByLaw | None
     cut: bool
+    stage_file: str = ""
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """Return the command that says what stops the hunting, for a file of a stage that hunts."""
+        from friso.hunting.criteria import ATTRACTED
+
+        return [f"friso tune {self.stage_file}"] if self.stage_file and self.verdict in ATTRACTED else []
 
     @property
     def varied(self) -> Sequence[str]:
@@ -169,7 +178,8 @@ def check(
     m
     """
     chosen, tolerance = inputs.read_stage(stage, set, uncertain_too=True), inputs.tolerance_of(rtol)
-    return checked_stage(chosen, inputs.correlations_of(stage, chosen), tolerance, draws, seed, laws, progress)
+    correlations, file = inputs.correlations_of(stage, chosen), inputs.file_of(stage, set)
+    return checked_stage(chosen, correlations, tolerance, draws, seed, laws, progress, file)
 
 
 def checked_stage(
@@ -180,12 +190,13 @@ def checked_stage(
     seed: int = 0,
     laws: bool = False,
     progress: Progress = silent,
+    stage_file: str = "",
 ) -> CheckAnswer:
     """Check a stage, and draw machines if its keys are uncertain, with these correlations.
 
     `draws` is the number of machines; by default, as many as a fixed work allows, and none if the loop is unstable.
-    With `laws`, the stage is checked under other friction laws, too. `tolerance` is that of the solver. Raises
-    InputError for a number of draws that is not usable.
+    With `laws`, the stage is checked under other friction laws, too. `tolerance` is that of the solver.
+    `stage_file` is its path as a word of a command line. Raises InputError for a number of draws that is not usable.
     """
     loose = max(tolerance, LONG_RUN_RTOL)
     sample = uncertain = None
@@ -225,7 +236,7 @@ def checked_stage(
         from friso.studies.laws.verdicts import verdicts_by_law
 
         across = verdicts_by_law(chosen, loose, progress=progress)
-    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut)
+    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut, stage_file=stage_file)
 
 
 def _as_built(case: Case) -> Case:

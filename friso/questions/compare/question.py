@@ -36,7 +36,7 @@ class CompareAnswer(Answer):
 def compare(
     stage: StageLike,
     *,
-    machines: int = 2000,
+    machines: int = 400,
     seed: Seed = 1,
     within: LengthLike | None = None,
     bandwidth_limit: FrequencyLike | None = None,

@@ -66,10 +66,15 @@ def label(result: OptionResult) -> str:
     return result.option.label
 
 
-def in_prose(result: OptionResult) -> str:
+def in_prose(option: Option) -> str:
     """Name an option with its letter, to stand within a sentence."""
-    kind = result.option.kind
+    kind = option.kind
     return f"{kind.prose or f'the {kind.title}'} ({kind.letter})"
+
+
+def named(result: OptionResult) -> str:
+    """Name the option of a result with its letter, to stand within a sentence."""
+    return in_prose(result.option)
 
 
 def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
@@ -204,7 +209,7 @@ def details(comparison: Comparison) -> list[str]:
 def brought(comparison: Comparison) -> list[str]:
     """Say for every option that brings the machines to rest how many it brings there, and at what cost."""
     resting, count = _resting(comparison), comparison.machines.count
-    says = [f"{in_prose(result)}: {_number(result, count)} at rest{_cost(result, comparison)}" for result in resting]
+    says = [f"{named(result)}: {_number(result, count)} at rest{_cost(result, comparison)}" for result in resting]
     return [f"{text[:1].upper()}{text[1:]}." for text in says] + [text for text in [_too_late(resting)] if text]
 
 
@@ -214,7 +219,7 @@ def _too_late(resting: Sequence[OptionResult]) -> str:
     The text is empty if there is no such option.
     """
     there = [(result, float(np.isfinite(result.measures.settling).mean())) for result in resting]
-    late = [f"{percent(fraction, 3)} with {in_prose(result)}" for result, fraction in there if fraction < ENOUGH_SHARE]
+    late = [f"{percent(fraction, 3)} with {named(result)}" for result, fraction in there if fraction < ENOUGH_SHARE]
     return f"At the far end, before the reference returns, {listed(late, 'and')} are in position." if late else ""
 
 
@@ -273,15 +278,15 @@ def _at_one_bandwidth(comparison: Comparison) -> bool:
 
 
 _WORDS: Words[Comparison] = {
-    "letters": lambda of: listed([option.letter for option in of.not_run], "and"),
+    "left": lambda of: listed([in_prose(option) for option in of.not_run], "and"),
     "unstable": lambda of: str(of.results[0].unstable),
     "count": lambda of: str(of.machines.count),
     "none": lambda of: "none of these options" if of.not_run else "no option",
     "share": lambda of: percent(ENOUGH_SHARE),
     "within": lambda of: with_unit(of.within, "m"),
-    "settings": lambda of: _names(_settings(of)),
-    "joints": lambda of: _names(_joints(of)),
-    "option": lambda of: in_prose(_first(of)),
+    "settings": lambda of: _times(_settings(of)),
+    "joints": lambda of: _times(_joints(of)),
+    "option": lambda of: named(_first(of)),
     "number": lambda of: _number(_first(of), of.machines.count),
     "force": lambda of: plain_factor(of.paired(_first(of)).force.value),
     "effort": lambda of: axis_shown().effort,
@@ -297,7 +302,7 @@ _SAYS: Sequence[Alternatives[Comparison]] = (
     (
         (
             lambda of: of.not_run,
-            "Interrupted: this is the answer of the options that were run; {letters} were not.",
+            "Interrupted: this is the answer of the options that were run, without {left}.",
         ),
         (
             lambda of: of.results[0].unstable,
@@ -315,14 +320,15 @@ _SAYS: Sequence[Alternatives[Comparison]] = (
         (lambda of: of.results[0].rests, "These machines need neither a joint nor other settings{in_the_end}."),
         (
             lambda of: _joints(of) and _settings(of),
-            "Controller settings do here what a joint does: with {settings} no joint is needed.",
+            "Controller settings do here what a joint does, and no joint is needed: half of the machines are in "
+            "position {settings}, and {joints}.",
         ),
-        (_joints, "Only a joint brings these machines to rest: {joints}. No setting does so alone."),
+        (_joints, "Only a joint brings these machines to rest, half of them {joints}. No setting does so alone."),
         (
             lambda of: any(result.option.kind.joint for result in of.results),
-            "Controller settings suffice ({settings}); a joint does not.",
+            "Controller settings suffice, a joint does not: half of the machines are in position {settings}.",
         ),
-        (always, "Controller settings suffice ({settings})."),
+        (always, "Controller settings suffice: half of the machines are in position {settings}."),
     ),
     (
         (lambda of: of.results[0].rests, ""),
@@ -402,7 +408,17 @@ def _standstill(comparison: Comparison) -> list[str]:
 
 def _names(results: Sequence[OptionResult]) -> str:
     """Join the names of options by "or"."""
-    return listed([in_prose(result) for result in results], "or")
+    return listed([named(result) for result in results], "or")
+
+
+def _times(results: Sequence[OptionResult]) -> str:
+    """Join the median settling times of options, each with the name of its option."""
+    return listed([f"{_soon(result.settling.value)} with {named(result)}" for result in results], "or")
+
+
+def _soon(median: float) -> str:
+    """Write a median settling time [s]; it is infinite where most machines are late at the far end of their move."""
+    return f"in {with_unit(median, 's')}" if math.isfinite(median) else "only in the end"
 
 
 def population(comparison: Comparison) -> list[str]:

@@ -12,7 +12,7 @@ from friso.design_method.method import Design, UnfinishedDesign
 from friso.design_method.population import Corners
 from friso.design_method.verification import MachineOutcomes
 from friso.frequency.crossover import COMFORTABLE_MARGIN, Range
-from friso.questions.design.window import stiffest, view
+from friso.questions.design.window import limit_name, stiffest, view
 from friso.questions.design.words import hertz, size
 from friso.questions.flexure.figures import modes_figure
 from friso.questions.flexure.numbers import newtons_per
@@ -65,7 +65,7 @@ def _front(design: Design) -> Figure:
     ]
     limits = (
         Limit((multiple * design.controller.crossover,), f"{multiple:g} times the crossover chosen", INK),
-        Limit((multiple * design.spec.limit,), f"{multiple:g} times the machine's limit", ORANGE),
+        Limit((multiple * design.spec.limit,), f"{multiple:g} times {limit_name(design)}", ORANGE),
     )
     axes = Axis("Drive stiffness", "N/mm", prefixed=False), Axis("First interfering frequency", "Hz")
     line = Series(*_points(design.candidates), "front, by the closed forms", GREY, width=1.8)
@@ -107,7 +107,7 @@ def _map(design: Design) -> Figure:
     edge, limit = design.edges.highest, design.spec.limit
     lines: list[tuple[float, str, Dash]] = [
         (edge, f"edge of hunting at {size(stroke)} mm: {hertz(edge)}", "dashed"),
-        (limit, f"machine's limit: {hertz(limit)}", "solid"),
+        (limit, f"{limit_name(design)}: {hertz(limit)}", "solid"),
     ]
     upright = [
         Series(np.full(2, at), np.array(up), label, INK, dash, 1.8)

@@ -33,12 +33,17 @@ def stiffest(design: Design) -> float:
     return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 
 
+def limit_name(design: Design) -> str:
+    """Name the limit of the crossover: the machine's own, unless it is only the present crossover."""
+    return "your crossover of now" if design.need.limit_is_present else "the machine's limit"
+
+
 def upper(design: Design) -> list[CrossoverBound]:
     """Return the upper bounds of the crossover, the lowest first."""
     multiple = design.spec.safety.parasitic
     front = f"the highest first interfering frequency of the front over {multiple:g}"
     bounds = [
-        CrossoverBound(design.spec.limit, "the machine's limit"),
+        CrossoverBound(design.spec.limit, limit_name(design)),
         CrossoverBound(stiffest(design), front),
         CrossoverBound(comfortable(design)[1], f"above it the modulus margin is below {COMFORTABLE_MARGIN:g}"),
     ]

@@ -18,6 +18,7 @@ from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.platform.system import shell_word
 from friso.quantities import outwards, percent
+from friso.questions.design import window
 from friso.questions.map.words import in_sentence
 from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import choose, pretty, with_unit
@@ -25,6 +26,10 @@ from friso.stage.stage import numeric_keys
 
 MOST_RELAXATIONS = 5
 """Number of relaxations listed in a message."""
+
+
+OTHER_LIMIT = '--crossover "20 Hz" states another limit'
+"""Which option states the highest crossover of the machine."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +117,10 @@ def lost_laws(design: Design) -> str:
 
 
 def need_words(need: Need) -> str:
-    """Say whether the machine needs an isolator, and why."""
+    """Say whether the machine needs an isolator, and why.
+
+    A limit that is no more than the present crossover is not told as what the machine allows.
+    """
     limit, factor, without = hertz(need.spec.limit), need.spec.safety.hunting, need.without
     if not without.hunts:
         return f"No isolator is needed: without one the machine {edge(without)}."
@@ -121,13 +129,15 @@ def need_words(need: Need) -> str:
         where = "in the worst corner of friction and masses, " if corners else ""
         return (
             f"An isolator is needed: without one the machine hunts, {where}even at {hertz(without.searched[1])}, the "
-            f"highest crossover tried; it allows {limit}."
+            "highest crossover tried."
         )
     where = " in the worst corner of friction and masses" if corners else ""
     above = f"{hertz(factor * without.highest)} or more, {factor:g} times the edge of hunting{where}"
-    if need.isolator:
-        return f"An isolator is needed: without one the crossover must be {above}; the machine allows {limit}."
-    return f"No isolator is needed: without one the crossover must be {above}, and the machine allows {limit}."
+    needs = f"{'an' if need.isolator else 'no'} isolator is needed: without one the crossover must be {above}"
+    if need.limit_is_present:
+        faster = f", so a machine that allows that needs none ({OTHER_LIMIT})" if need.isolator else ""
+        return f"If {limit}, your crossover of now, is the limit, {needs}{faster}."
+    return f"{needs[:1].upper()}{needs[1:]}{'; the' if need.isolator else ', and the'} machine allows {limit}."
 
 
 def brings(design: Design) -> str:
@@ -169,21 +179,36 @@ def _verified(design: Design) -> tuple[str, str]:
             "settling": lower_first(settling(free)),
             "met": "" if limit is None else f" ({'as' if met else 'not as'} specified: {seconds(float(limit))})",
             "locked": restless(locked, among=True),
+            "late": seconds(locked.slower_than(0.05)),
+            "change": "" if met else _what_to_change(design),
         }
     )
     return (VERMILLION if free.missed or not met else GREEN), says
 
 
 def _says_of_moves(design: Design) -> str:
-    """Return the template on simulated moves, which names the locked joint where it makes a difference."""
-    if design.verification.locked.missed:
-        return "Of {tried} simulated moves {rest}; {settling}{met}; with the joint locked, {locked}."
+    """Return the template on simulated moves, with what speaks most for the isolator.
+
+    That is that moves do not end with the joint locked, that they end later, or the distance from the edge of hunting.
+    """
+    free, locked = design.verification.compared, design.verification.locked
+    if locked.missed:
+        return "Of {tried} simulated moves {rest}; {settling}{met}{change}; with the joint locked, {locked}."
+    if locked.slower_than(0.05) > free.slower_than(0.05):
+        return "Of {tried} simulated moves {rest}; {settling}{met}{change}; with the joint locked, 95 % in {late}."
     if design.needed:
         return (
-            "Of {tried} simulated moves {rest}; {settling}{met}; so they do with the joint locked, but closer to the "
-            "edge of hunting than the safety factor allows."
+            "Of {tried} simulated moves {rest}; {settling}{met}{change}; so they do with the joint locked, but closer "
+            "to the edge of hunting than the safety factor allows."
         )
-    return "Of {tried} simulated moves {rest}; {settling}{met}."
+    return "Of {tried} simulated moves {rest}; {settling}{met}{change}."
+
+
+def _what_to_change(design: Design) -> str:
+    """Say which bound of the crossover to raise where moves settle too late, or which time to allow instead."""
+    bound = window.upper(design)[0]
+    held = f"the crossover of {hertz(design.controller.crossover)} ({bound.reason})"
+    return f"; raise what bounds {held}, or allow {seconds(design.verification.free.slower_than(0.05))}"
 
 
 def lower_first(text: str) -> str:

@@ -5,12 +5,14 @@ They come in the units of drives, and as the parameters of a kind of drive.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.axis import speak_of
 from friso.drives.gains import gains_of
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import Changes, FormatName, StageLike, changes_of, choice, stage_of
+from friso.interface.inputs import Changes, FormatName, StageLike, changes_of, choice, file_of, stage_of
 from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -19,6 +21,12 @@ if TYPE_CHECKING:
 
 class ExportAnswer(Answer):
     """Gains in the terms of drives; `result` is a `Gains`."""
+
+    stage_file: str = ""
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """Return the command that compares a log of the drive with these gains with the stage."""
+        return [f"friso identify NEW_LOG.csv --against {self.stage_file}"] if self.stage_file else []
 
     @property
     def condition(self) -> str:
@@ -73,4 +81,5 @@ def export(
     overrides = {key: value for key, value in pairs.items() if "." in key}
     chosen = stage_of(stage, overrides)
     speak_of(chosen.axis_kind)
-    return ExportAnswer(gains_of(chosen, {key: pairs[key] for key in pairs if key not in overrides}, to))
+    gains = gains_of(chosen, {key: pairs[key] for key in pairs if key not in overrides}, to)
+    return ExportAnswer(gains, stage_file=file_of(stage, overrides))

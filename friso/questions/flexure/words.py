@@ -51,7 +51,8 @@ def assumptions(stage: Stage) -> list[str]:
     if "flexure.centre_x" not in flat:
         parts.append("centre of mass in the middle of the leaf ends")
     if not all(f"flexure.inertia_{axis}" in flat for axis in AXES):
-        parts.append(f"moments of inertia of an aluminium cube of {flat['masses.stage']:g} kg")
+        block = f"an aluminium block of {flat['masses.stage']:g} kg"
+        parts.append(f"moments of inertia of {block} that reaches from leaf to leaf")
     points = []
     for point, place in (("actuation", "the centre of mass of the stage"), ("sensor", "the point of actuation")):
         if f"flexure.{point}_x" not in flat:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.axis import speak_of
@@ -10,6 +12,7 @@ from friso.equations.as_built import whole_samples
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import LOGGER, Changes, ExperimentName, Seed, StageLike
+from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
@@ -18,12 +21,23 @@ from friso.virtual_rig.run import as_built_keys
 if TYPE_CHECKING:
     from friso.shown.pages import Report
 
+TRUTH = "truth"
+"""Folder of the true signals behind the logs."""
+
 LEAST_DELAY = 4
 """Smallest delay, in samples, that is mentioned."""
 
 
 class RigAnswer(Answer):
     """An experiment on the machine as built; `result` is its `Outcome` with logs and their truth."""
+
+    stage_file: str = ""
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """Return the command that identifies the stage from the logs written."""
+        folders = {file.parent for file in files if file.suffix == ".csv" and file.parent.name != TRUTH}
+        logs = " ".join(f"{shell_word(str(folder))}/*.csv" for folder in sorted(folders))
+        return [f"friso identify {logs} --stage {self.stage_file}"] if self.stage_file and logs else []
 
     @property
     def failure(self) -> str:
@@ -71,7 +85,7 @@ def rig(
     speak_of(chosen.axis_kind)
     _announce(chosen)
     inputs.mention_unstable_loop(chosen)
-    return RigAnswer(chosen_experiment.run(chosen, seed, progress))
+    return RigAnswer(chosen_experiment.run(chosen, seed, progress), stage_file=inputs.file_of(stage, set))
 
 
 def _announce(stage: Stage) -> None:

@@ -30,6 +30,9 @@ from friso.shown.files import Content
 from friso.stage import Stage
 from friso.stage.correlations import correlations_file, correlations_text
 
+TUNED = "tuned.toml"
+"""Name of the stage file of the cheapest remedy that works."""
+
 NOT_SURE, LARGE_MOVES = "-not-sure", "-for-large-moves"
 """Suffixes of stage files whose remedies are not sure to work, or work for large moves only."""
 
@@ -74,7 +77,7 @@ def further_files(tuning: Advice) -> dict[str, Content]:
         unsure = {"works": "", "large moves": LARGE_MOVES}.get(outcome.certainty, NOT_SURE)
         files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
     least = tuning.least
-    return {**_stage_file(tuning, "tuned.toml", least.stage if least else None), **files}
+    return {**_stage_file(tuning, TUNED, least.stage if least else None), **files}
 
 
 def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Content]:

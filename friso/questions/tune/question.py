@@ -66,23 +66,24 @@ class TuneAnswer(Answer):
         return self.result.interrupted
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """Return the commands that design or check the leaf springs of an isolator.
+        """Return the command that writes the gains for the drive, and those for the leaf springs of isolators.
 
-        There are none if `friso design` does not know the controller.
+        There are none of the latter if `friso design` does not know the controller.
         """
         from friso.design_method.prepare import check_designable
-        from friso.questions.tune.blocks import NOT_SURE, OF_LEAVES
+        from friso.questions.tune.blocks import NOT_SURE, OF_LEAVES, TUNED
 
+        gains = [f"friso export gains {shell_word(str(file))}" for file in files if file.name == TUNED]
         try:
             check_designable(self.result.stage)
         except InputError:
-            return []
+            return gains
         isolators = [
             file
             for file in files
             if file.name.startswith("tuned-isolator") and file.suffixes == [".toml"] and NOT_SURE not in file.name
         ]
-        return [
+        return gains + [
             f"friso {'flexure' if file.stem.endswith(OF_LEAVES) else 'design'} {shell_word(str(file))}"
             for file in isolators
         ]
@@ -152,17 +153,19 @@ def tune(
 
 
 def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
-    """Log the first remedy tried if it works, while others are still tried."""
+    """Log the first remedy that works, and how long others are still tried."""
     from friso.questions.tune.words import changes, slowest_time
-    from friso.shown.drawing.prefixes import listed
+    from friso.remedies.settings import settings
+    from friso.shown.drawing.prefixes import listed, with_unit
     from friso.shown.unknown import unknown_condition
 
-    if outcome.certainty != "works" or outcome.stage is None or outcome.measured is None:
+    if outcome.stage is None or outcome.measured is None:
         return
     changed = listed(changes(stage, outcome.stage), "and")
     when, condition = slowest_time(outcome.measured, goal), unknown_condition(stage, [*stage.uncertain()])
     LOGGER.info(
-        f"{condition}this works: {changed}, in position after {when}; others are tried",
+        f"{condition}this works: {changed}, in position after {when}; others are tried for up to "
+        f"{with_unit(settings.others_time, 's', 2)} of computing (Ctrl-C ends with this)",
         extra={"meanwhile": True},
     )
 

@@ -14,21 +14,23 @@ import numpy as np
 from friso.axis import axis_shown
 from friso.design_method.geometry import Geometry
 from friso.equations.breakaway import breakaway, least_breakaway
-from friso.frequency.crossover import loop_bandwidth
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
+from friso.remedies.catalogue import BANDWIDTH
 from friso.remedies.machines import Goal
 from friso.remedies.method import Advice
 from friso.remedies.search import TriedPoints
+from friso.remedies.settings import settings
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.shown.drawing.prefixes import (
     NOTHING,
     digits_that_differ,
     listed,
+    pretty,
     range_with_unit,
     share_with_interval,
     with_unit,
@@ -83,7 +85,9 @@ def changes(before: Stage, after: Stage) -> list[str]:
     """
     old, new = before.flat(), after.flat()
     keys = numeric_keys(new)
-    numbers = [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
+    numbers = [
+        _change(key, old.get(key), new[key], before, keys[key].unit) for key in new if _changes(key, old, new, keys)
+    ]
     own = [key for key in {**new, **old} if key.startswith(f"{CONTROLLER}.")]
     words = [f'{key} = "{new[key]}"' for key in own if isinstance(new.get(key), str) and new[key] != old.get(key)]
     if old.get(LOCKED) and not new.get(LOCKED):
@@ -98,15 +102,23 @@ def _changes(key: str, old: Mapping[str, Any], new: Mapping[str, Any], keys: Map
     return key not in old or not math.isclose(old[key], new[key], rel_tol=1e-9)
 
 
-def _change(key: str, old: Any, new: float, unit: str) -> str:
-    """Write a key with its new value and, if it had one, its old value."""
-    text = f"{key} = {number(new, unit)}"
-    return text if old is None else f"{text} (was {number(old, unit)})"
+def _change(key: str, old: Any, new: float, before: Stage, unit: str) -> str:
+    """Write a key with its new value and, if it had one, its old value; `unit` is that of SI."""
+    text = f"{key} = {number(key, new, before, unit)}"
+    return text if old is None else f"{text} (was {number(key, old, before, unit)})"
 
 
-def number(value: float, unit: str) -> str:
-    """Write the value of a key with its unit, if it has one."""
-    return with_unit(value, unit, 4) if unit else f"{value:.4g}"
+def number(key: str, value: float, before: Stage, unit: str) -> str:
+    """Write the value of a key [unit] in the unit of the file `before`; a key that it lacks with a prefix that suits.
+
+    The value has as many digits as tuned numbers have.
+    """
+    if not unit:
+        return f"{value:.{settings.typed_digits}g}"
+    if not before.unit_in_file(key):
+        return with_unit(value, unit, settings.typed_digits)
+    text, _, written = str(before.in_file_unit(key, value, settings.typed_digits)).partition(" ")
+    return f"{float(text):.10g} {pretty(written)}"
 
 
 def answer(tuning: Advice) -> list[str]:
@@ -144,10 +156,51 @@ def _modes_unknown(tuning: Advice) -> bool:
     return tuning.stage.parasitic is None and not tuning.stage.flexure and tuning.goal.bandwidth_limit is None
 
 
-def _bandwidth_of(outcome: RemedyOutcome) -> str:
-    """Write the bandwidth of the loop with a remedy: where it last crosses 0 dB."""
-    own = loop_bandwidth(outcome.stage) if outcome.stage else math.inf
-    return f"{with_unit(own, 'Hz')}" if math.isfinite(own) else "that speed"
+def _first_modes(tuning: Advice) -> str:
+    """Ask to look at the modes of the machine before its bandwidth is raised, where none is known."""
+    if not _modes_unknown(tuning) or _first(tuning).remedy.buys_joint:
+        return ""
+    return "; the file states no mode: first find out whether those of the machine allow this"
+
+
+def unseen(flat: Mapping[str, Any]) -> str:
+    """Say how far the load may stay from its place where the position is measured at the motor."""
+    if flat.get("encoder.position") != "motor":
+        return ""
+    load = {key: value for key, value in flat.items() if not key.startswith("motor_friction.")}
+    wound = breakaway(load) / flat["transmission.stiffness"] + flat.get("transmission.backlash", 0.0) / 2
+    return f"; that is the motor's place, and the load stays up to {with_unit(wound, 'm')} off by its friction"
+
+
+def _second(tuning: Advice) -> str:
+    """Say what the second remedy is, brings and costs, in the words of the first."""
+    second = tuning.working[1]
+    assert second.measured is not None
+    set_to = listed(changes(tuning.stage, _stage_of(second)), "and")
+    force = _against(second.measured.force(tuning.goal), tuning.present.force(tuning.goal), FORCE)
+    margin = f"a modulus margin of {second.measured.least_margin(tuning.goal):.2f}"
+    settled = _settled(second.measured, tuning.goal)
+    return f"Or ({second.remedy.name}) set {set_to}: then {settled}, with {force} and {margin}."
+
+
+_CAPPED = {
+    "stated": "",
+    "least": "more than {least} times the speed that is needed",
+    "unknown": "more than {factor} times the present speed",
+    "mode": "a bandwidth of more than {mode} of the lowest mode",
+    "sampling": "a bandwidth of more than {sampling} of the sampling rate",
+}
+"""What is not tried unasked, by the reason of the cap."""
+
+
+def cap_words(tuning: Advice) -> str:
+    """Say which controllers are too fast to be advised unasked; empty if the user stated a limit."""
+    return _CAPPED[tuning.cap.reason].format(
+        least=factor_text(settings.faster_than_least),
+        factor=factor_text(settings.fastest_unasked),
+        mode=percent(settings.mode_share),
+        sampling=percent(settings.sampling_share),
+    )
 
 
 def _drive_timed(tuning: Advice) -> bool:
@@ -180,10 +233,16 @@ _WORDS: Words[Advice] = {
     "settled": lambda of: _settled(_measured(of), of.goal),
     "force": lambda of: _against(_measured(of).force(of.goal), of.present.force(of.goal), FORCE),
     "margin": lambda of: f"{_measured(of).least_margin(of.goal):.2f}",
-    "fastest": lambda of: of.fastest.remedy.name if of.fastest else "",
-    "soonest": lambda of: _settled(of.fastest.measured, of.goal),  # type: ignore[union-attr]
+    "factor": lambda of: factor_text(_first(of).factor),
+    "unseen": lambda of: unseen(of.stage.flat()),
+    "first_modes": lambda of: _first_modes(of),
+    "second": lambda of: _second(of),
+    "cap": cap_words,
+    "state": lambda of: (
+        f"state {'the lowest mode ([parasitic]) or ' if _modes_unknown(of) else ''}"
+        'the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz")'
+    ),
     "as_it_is": lambda of: as_it_is(of),
-    "bandwidth": lambda of: _bandwidth_of(_first(of)),
     "limit": lambda of: Quantity("N", positive, "200 N").on(of.stage.axis_kind).example,
     "rest": _rest,
     "part": lambda of: "joint" if of.goal.controller else "controller",
@@ -196,6 +255,11 @@ _SAYS: Sequence[Alternatives[Advice]] = (
     ),
     (
         (lambda of: not of.needed, "The stage meets the goal as it is: {brings}."),
+        (
+            lambda of: of.working and _first(of).remedy.name == BANDWIDTH,
+            "Make the controller {factor} times as fast, the cheapest change that works{for_all}{so_far} ({name}): set "
+            "{changes}.",
+        ),
         (lambda of: of.working, "Set {changes}: the cheapest change that works{for_all}{so_far} ({name})."),
         (
             lambda of: of.for_large_moves,
@@ -206,20 +270,14 @@ _SAYS: Sequence[Alternatives[Advice]] = (
     ),
     (
         (lambda of: not of.needed, ""),
-        (lambda of: of.working, "Then {settled}, with {force} and a modulus margin of {margin}."),
+        (lambda of: of.working, "Then {settled}, with {force} and a modulus margin of {margin}{unseen}{first_modes}."),
         (always, "{as_it_is}"),
     ),
     (
-        (lambda of: not of.needed or not of.working, ""),
-        (
-            lambda of: _modes_unknown(of) and not _first(of).remedy.buys_joint,
-            "No modes of the machine are in the file: first find out whether they allow {bandwidth} "
-            "(--bandwidth-limit).",
-        ),
-        (
-            lambda of: of.fastest is not of.least and of.fastest and of.fastest.measured,
-            "Soonest: with {fastest}, {soonest}.",
-        ),
+        (lambda of: not of.needed, ""),
+        (lambda of: not of.working and of.goal.controller and cap_words(of), "Not tried: {cap}; for that, {state}."),
+        (lambda of: not of.working, ""),
+        (lambda of: of.working[1:], "{second}"),
         (always, "{as_it_is}"),
     ),
 )
@@ -232,8 +290,11 @@ _EXPLAINED: Alternatives[Advice] = (
     (_drive_timed, "The [drive] of the file counts for the margin alone, not for moves and hunting."),
     (
         _modes_unknown,
-        "Not known: modes of the machine. None is assumed; they make fast controllers unstable, so state [parasitic], "
-        'or the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz").',
+        "Not known: modes of the machine. None is assumed; they make fast controllers unstable.",
+    ),
+    (
+        lambda of: cap_words(of) and of.goal.controller and of.needed,
+        "Not tried: {cap}; for that, {state}.",
     ),
     (
         lambda of: of.goal.force_limit is None and FORCE_LIMIT not in of.stage.flat(),

@@ -284,7 +284,7 @@ class Comparison:
 
 def compare(
     stage: Stage,
-    count: int = 2000,
+    count: int = 400,
     seed: int = 1,
     within: float = 1e-6,
     correlations: Correlations | None = None,

@@ -14,7 +14,7 @@ import numpy as np
 
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
+from friso.leaf_springs.mechanism import Mechanism, MovingBody, block_inertia
 from friso.materials import materials
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
@@ -64,7 +64,7 @@ def mechanism(young: float, spacing: float, height: float) -> Mechanism:
         density=float(steel.density),
         yield_strength=float(steel.yield_strength),
         fatigue=float(steel.fatigue),
-        body=MovingBody(mass, cube_inertia(mass), centre),
+        body=MovingBody(mass, block_inertia(mass), centre),
         actuation=(0.0, 0.0, 0.0),  # "underneath the flexure mechanism" (Sec. 3.4.1)
         sensor=(0.0, 0.0, 0.0),
     )
