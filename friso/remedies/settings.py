@@ -39,6 +39,9 @@ class RemedySettings(Settings):
     typed_digits: int = setting(4, "")
     """Significant digits of tuned numbers, in the units of the file. Fewer cost margin by rounding."""
 
+    listed_changes: int = setting(6, "")
+    """Largest number of changed keys that a row of the table lists; the stage file of the remedy has the others."""
+
     machine_factor: int = setting(2, "")
     """Factor on the number of machines drawn for searches, so that others stand in for those that are left out."""
 

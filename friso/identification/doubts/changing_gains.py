@@ -18,7 +18,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
     A law is the force as a linear function of error, its derivatives and integral. The parts are divided by an instant,
     by speed of the reference, or by place. One linear controller has equal gains in all parts, whatever the machine
-    does. With drifting clocks the phase of the law changes as well, but not its size.
+    does. Of the divisions that explain the force, the one counts whose laws differ by no more than a factor. With drifting clocks the phase of the law changes as well, but not its size.
     """
     if "reference" not in case.log or case.commanded:
         return
@@ -29,7 +29,8 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     left = least_squares(*_deviations(signals, stretch))[1]
     ends = doubt_settings.shares_of_a_part
     shares = np.linspace(min(ends), max(ends), doubt_settings.levels_of_a_part)
-    best, where, ratio = doubt_settings.power_left_by_changing_gains * float(left @ left), "", 1.0
+    most = doubt_settings.power_left_by_changing_gains * float(left @ left)
+    scaled, best, where, ratio = np.inf, most, "", 1.0
     for name, signal in course.items():
         for level in np.quantile(signal, shares):
             below = signal < level
@@ -37,9 +38,12 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
                 continue
             one, two = (_deviations(signals[rows], stretch[rows]) for rows in (below, ~below))
             (law, rest), (_, other) = least_squares(*one), least_squares(*two)
-            if rest @ rest + other @ other < best:
-                best, where = float(rest @ rest + other @ other), name.format(level)
-                ratio = _ratio(two[0] @ law, two[1])
+            if (squares := float(rest @ rest + other @ other)) >= most:
+                continue
+            times = _ratio(two[0] @ law, two[1])
+            again = least_squares(np.concatenate([one[0], times * two[0]]), np.concatenate([one[1], two[1]]))[1]
+            if again @ again < scaled:
+                scaled, best, where, ratio = float(again @ again), squares, name.format(level), times
     if not where or not abs(np.log(ratio)) > doubt_settings.logarithm_of_a_gain:
         return
     one_law, two_laws = (np.sqrt(squares / len(signals)) for squares in (left @ left, best))

@@ -58,10 +58,11 @@ def blocks(tuning: Advice) -> list[AnswerBlock]:
             sentences=answer(tuning),
             columns=axis_shown().named(COLUMNS),
             rows=rows(tuning),
-            draw=partial(tune_figures, tuning),
             numbers=partial(tune_document, tuning),
         ),
-        AnswerBlock(title="What the changes bring and cost", details=explained(tuning)),
+        AnswerBlock(
+            title="What the changes bring and cost", details=explained(tuning), draw=partial(tune_figures, tuning)
+        ),
         AnswerBlock(title="What does not work, and why", details=failing(tuning)),
         *(AnswerBlock(title=title, details=texts, behind=True) for title, texts in behind.items()),
     ]

@@ -42,16 +42,7 @@ from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.tables import leading_friction
 
-COLUMNS = (
-    "Works",
-    "Machines that meet the goal",
-    "For moves of",
-    "95 % settle within",
-    "Median",
-    "Largest {effort}",
-    "Modulus margin",
-    "Stiffness under load",
-)
+COLUMNS = ("Works", "95 % settle within", "Largest {effort}", "Modulus margin", "Set to")
 
 ABSENT = "never"
 
@@ -544,44 +535,50 @@ _SURVEYED = {
 
 
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
-    """Return the remedies side by side, the stage as it is first."""
-    shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
-    words = {
-        "works": "yes",
-        "large moves": "large moves",
-        "unsure": "not sure",
-        NONE_FOUND: "none found",
-        "does not work": "no",
-    }
-    table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
+    """Return the remedies with settings side by side, the stage as it is first."""
+    table = [("as it is", _row(tuning.present, tuning, NOTHING, "no" if tuning.needed else "yes"))]
     if "bandwidth" in tuning.unmet:
-        table[0][1][1] = NOTHING  # no machine meets a limit that its controller breaks
+        table[0][1][0] = "no"  # no machine meets a limit that its controller breaks
     for outcome in tuning.outcomes:
-        works = words.get(verdict := _verdict(outcome, tuning), verdict)
-        cells = [works, *[NOTHING] * (len(COLUMNS) - 1)]
-        if outcome.measured is not None:
-            cells = _row(outcome.measured, tuning, works)
-            cells[1] = cells[1] if outcome.remedy.verifiable else NOTHING
-        table.append((outcome.remedy.name, cells))
+        if outcome.measured is not None and outcome.stage is not None:
+            works = _WORKS.get(verdict := _verdict(outcome, tuning), verdict)
+            row = _row(outcome.measured, tuning, _set_to(tuning.stage, outcome.stage), works)
+            row[0] = row[0] if outcome.remedy.verifiable else works
+            table.append((outcome.remedy.name, row))
     return table
 
 
-def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
-    """Return the texts of one row of the table: how machines perform, under `COLUMNS`.
+_WORKS = {
+    "works": "yes",
+    "large moves": "large moves",
+    "unsure": "not sure",
+    NONE_FOUND: "none found",
+    "does not work": "no",
+}
+"""Words of the table on whether a remedy works."""
 
-    The first text is `works`, which says whether the remedy works.
+
+def _row(measured: Performance, tuning: Advice, set_to: str, works: str) -> list[str]:
+    """Return the texts of one row of the table: what is set, and how machines perform, under `COLUMNS`.
+
+    `works` says whether it works; beside it stands for which share of the machines, and for which moves if not for all.
     """
     goal = tuning.goal
+    moves = "" if works == "yes" or measured.held_moves(goal) is None else f", for {held_range(measured, goal)}"
     return [
-        works,
-        share_with_interval(measured.share(goal)),
-        held_range(measured, goal),
+        f"{works}: {share_with_interval(measured.share(goal))}{moves}",
         slowest_time(measured, goal),
-        time(measured.median),
         with_unit(measured.force(goal), "N"),
         f"{measured.least_margin(goal):.2f}",
-        with_unit(measured.stiffness, "N/m"),
+        set_to,
     ]
+
+
+def _set_to(before: Stage, after: Stage) -> str:
+    """List the first changed keys with their new values, and how many more the stage file of the remedy has."""
+    keys = [one.partition(" (was ")[0] for one in changes(before, after)]
+    more = len(keys) - settings.listed_changes
+    return ", ".join([*keys[: settings.listed_changes], *([f"and {more} more"] if more > 0 else [])])
 
 
 def assumptions(tuning: Advice) -> list[str]:
