@@ -16,9 +16,10 @@ from friso.identification.settings import doubt_settings
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Fit a control law to the whole record and to two parts of it, and compare the gains.
 
-    A law is the force as a linear function of error, its derivatives and integral. The parts are divided by an instant,
-    by speed of the reference, or by place. One linear controller has equal gains in all parts, whatever the machine
-    does. Of the divisions that explain the force, the one counts whose laws differ by no more than a factor. With drifting clocks the phase of the law changes as well, but not its size.
+    A law is the force as a linear function of error, its derivatives and integral. The parts are divided by an
+    instant, by speed of the reference, or by place. One linear controller has equal gains in all parts, whatever
+    the machine does. Of the divisions that explain the force, the one counts whose laws differ by no more than a
+    factor. With drifting clocks the phase of the law changes as well, but not its size.
     """
     if "reference" not in case.log or case.commanded:
         return
