@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Mapping
 from math import inf, pi
-from operator import add, mul, neg, pos, sub, truediv
+from operator import add, mul, neg, pos, pow, sub, truediv
 
 LONGEST_EXPRESSION = 200
 """Longest arithmetic expression in characters."""
@@ -15,7 +15,7 @@ _NAMED: Mapping[str, float] = {
     "float('inf')": inf,
     **{f"{module}{name}": value for name, value in (("pi", pi), ("inf", inf)) for module in ("", "math.", "np.")},
 }
-_PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
+_PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow}
 _SIGNS = {ast.USub: neg, ast.UAdd: pos}
 
 _OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
@@ -26,7 +26,7 @@ _OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
 def number_in(text: str) -> float | None:
     """Return the number that a text stands for, or None if it is no number.
 
-    Arithmetic with +, -, *, /, brackets, pi and inf is evaluated. Python code is never executed.
+    Arithmetic with +, -, *, /, **, brackets, pi and inf is evaluated. Python code is never executed.
     """
     if len(text) > LONGEST_EXPRESSION or _OTHER.search(text):
         return None
@@ -45,7 +45,7 @@ def _worked_out(node: ast.expr) -> float:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return float(value)
         case ast.BinOp(left, sign, right) if type(sign) in _PAIRS:
-            return _PAIRS[type(sign)](_worked_out(left), _worked_out(right))
+            return float(_PAIRS[type(sign)](_worked_out(left), _worked_out(right)))
         case ast.UnaryOp(sign, operand) if type(sign) in _SIGNS:
             return _SIGNS[type(sign)](_worked_out(operand))
     name = ast.unparse(node)

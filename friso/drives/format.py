@@ -149,7 +149,7 @@ class ParameterFormat:
     whole: Callable[[str, Beside], str] = lambda text, beside: text
 
 
-TOLD = ("machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn")
+TOLD = ("machine_unit", "force_per_output", "length_per_unit", "velocity_per_output", "travel_per_turn")
 """Keys of [drive] that hold the units of a drive. They are given to friso init --from or read from a file, and friso
 export needs them."""
 

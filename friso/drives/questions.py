@@ -108,12 +108,13 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
     asked: list[OpenQuestion] = []
     if not {"masses.cart", "masses.stage"} & answers.texts.keys():
         asked += _of_table("masses", Masses, ("stage",), {"stage": moving_mass(kind)}, kind)
+    guessed = "friction.guess" in answers
     model = str(answers.texts.get("friction.model", "lugre"))
     if model not in FRICTION.classes:
         raise InputError("friction.model", quoted(model), f"one of {', '.join(sorted(FRICTION.classes))}")
     law: type[Section] = friction_law(model)
-    names = [name for name in numeric_fields(law) if law.model_fields[name].is_required()]
-    instead = "; or --set friction.model=none" if model == "lugre" else ""
+    names = [name for name in numeric_fields(law) if law.model_fields[name].is_required() and not guessed]
+    instead = '; or --set friction.guess="ball screw", or friction.model=none' if model == "lugre" else ""
     meaning = dict.fromkeys(names, f"friction of the guide{instead}")
     asked += _of_table("friction", law, names, meaning, kind)
     if not moved and "motion.kind" not in answers:

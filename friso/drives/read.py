@@ -6,6 +6,7 @@ Others wrote the text, so its size is limited and no value is trusted unchecked.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +61,16 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
         stage = _with_answers(of_axis, kind, chosen, path, user_answers)
     except InputError as error:
         raise error if error.origin else error.found_in(f"{path}, {chosen.name}") from None
-    return StageOfAxis(stage, path, kind, chosen.name, tuple(shortened(one_line(text)) for text in of_axis.left_out))
+    left = [*of_axis.left_out, *_silent_anti_windup(of_axis.tables["controller"])]
+    return StageOfAxis(stage, path, kind, chosen.name, tuple(shortened(one_line(text)) for text in left))
+
+
+def _silent_anti_windup(controller: Mapping[str, Any]) -> list[str]:
+    """Say what is assumed of an integral at the limit of the force where neither file nor firmware states it."""
+    integral = {"ki", "velocity_integral_time", "position_integral_time"} & controller.keys()
+    if not integral or "force_limit" not in controller or "anti_windup" in controller:
+        return []
+    return ["what the integral does at the limit of the force: it is taken to rest there (controller.anti_windup)"]
 
 
 def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
@@ -78,7 +88,31 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
                 return kind, kind.axes(kind.whole(text, lambda name: _beside(path, name)))
             except InputError as error:
                 raise error.found_in(str(path)) from None
-    raise InputError("", "a file of another kind", expected, "", str(path))
+    raise InputError("", f"a file of another kind{_numbers_of(text)}", f"{expected}; {BY_HAND}", "", str(path))
+
+
+BY_HAND = (
+    'or by hand: friso init stage.toml, and in [controller] for a loop of P, I and D on the position kind = "pid" with '
+    "kp = P F/L, ki = I F/(L T), kd = D F T/L (F: force of an output of 1, L: length of a unit of position, T: unit of "
+    'time, the sample where gains are per sample); for a position loop above a velocity loop kind = "cascade" with kv '
+    "in 1/s, kp = force per velocity, velocity_integral_time = kp/ki"
+)
+"""How to enter the gains of a file that no format reads."""
+
+_NAME_OF_A_GAIN = r"[\w.\[\]]{0,80}(?:kp|ki|kd|kv|gain|prop|integ|deriv)\w{0,40}"
+_GAIN = re.compile(rf"(?<![\w.])({_NAME_OF_A_GAIN})[\"' ]{{0,3}}[:=>, \t]{{1,9}}[\"']?(-?\d[\d.eE+-]{{0,20}})", re.I)
+"""Pattern of what looks like a gain and its value."""
+
+
+def _numbers_of(text: str) -> str:
+    """Say which numbers of a text look like gains; "" for none."""
+    numbers = dict(_GAIN.findall(text[:MOST_LOOKED_AT]))
+    said = ", ".join(f"{one_line(name)} = {value}" for name, value in [*numbers.items()][:MOST_SAID])
+    return f", in which {said} may be gains" if said else ""
+
+
+MOST_LOOKED_AT, MOST_SAID = 100_000, 6
+"""Longest part of a file that is looked at for gains, and largest number of them that is said."""
 
 
 def _beside(path: Path, name: str) -> str | None:

@@ -24,7 +24,9 @@ seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & 
 AS_BUILT = ("drive", "rail", "cable", "floor")
 """Tables of the real drive and its surroundings, which analyses of the ideal machine leave out."""
 
-CONVERSIONS = frozenset({"machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn"})
+CONVERSIONS = frozenset(
+    {"machine_unit", "force_per_output", "length_per_unit", "velocity_per_output", "travel_per_turn"}
+)
 """Keys of [drive] that only convert units, and so do not describe the real drive."""
 
 
@@ -139,6 +141,8 @@ class Drive(UncertainSection):
     """Unit of positions in the drive, as stated to friso init --from; friso export needs it."""
     force_per_output: Annotated[Value | None, Quantity("N", positive, "20 N")] = None
     """Force per unit of the drive's output, as stated to friso init --from; friso export needs it."""
+    length_per_unit: Annotated[Value | None, Quantity("m", positive, "0.5 um")] = None
+    """Travel of the load per unit of the drive's position, as stated to friso init --from; friso export needs it."""
     velocity_per_output: Annotated[Value | None, Quantity("m/s", positive, "5 mm/s")] = None
     """Velocity per unit of the drive's output, as stated to friso init --from; friso export needs it."""
     travel_per_turn: Annotated[Value | None, Quantity("m", positive, "10 mm")] = None

@@ -1,9 +1,9 @@
 """ODrive configuration (odrivetool backup-config)
 
-Firmware 0.5.1 to 0.5.6, control in position: w = v_ff + pos_gain e; torque = inertia a_ff + vel_gain (w - v) +
+Firmware 0.5.1 to 0.6, control in position: w = v_ff + pos_gain e; torque = inertia a_ff + vel_gain (w - v) +
 vel_integrator_gain sum(w - v) T, turns for positions, 8000 times a second. v is the estimate of the encoder's
-phase-locked loop, which has a double pole at its bandwidth. Firmware up to 0.4 counts in encoder counts and amperes,
-and that from 0.6 on has other names.
+phase-locked loop, which has a double pole at its bandwidth. Firmware 0.6 has other names for the motor, the encoder and
+the limit of the torque, and is read under those of 0.5. Firmware up to 0.4 counts in encoder counts and amperes.
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ _OTHERS = """
 control_mode input_mode vel_limit vel_limit_tolerance vel_ramp_rate torque_ramp_rate circular_setpoints
 circular_setpoint_range steps_per_circular_range homing_speed inertia axis_to_mirror mirror_ratio
 torque_mirror_ratio load_encoder_axis input_filter_bandwidth enable_vel_limit enable_current_mode_vel_limit
-enable_torque_mode_vel_limit enable_gain_scheduling gain_scheduling_width enable_overspeed_error
+enable_torque_mode_vel_limit enable_gain_scheduling gain_scheduling_width gain_scheduling_min_ratio
+enable_overspeed_error absolute_setpoints
 vel_integrator_limit mechanical_power_bandwidth electrical_power_bandwidth spinout_mechanical_power_threshold
 spinout_electrical_power_threshold anticogging
 """
@@ -86,15 +87,17 @@ FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
 """Names in [controller] that parameters hold if the drive's own trajectories are fed forward."""
 
 
-_LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)[ \t]*([^#]*)(?:#.*)?")
+_LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)[ \t]*([^#]*?)(?:(?:#|//).*)?")
 """Pattern of a line for odrivetool that sets a parameter; a comment after it is ignored."""
 
 _OTHER_LINE = re.compile(
-    r"[ \t]*(?:$|#|import |from |odrv[0-9]{1,3}(?:[ \t]*=[ \t]*odrive\.\w+|(?:\.\w+)+)\([^()#]*\)[ \t]*(?:#|$))"
+    r"[ \t]*(?:$|#|import |from |odrv[0-9]{1,3}(?:[ \t]*=[ \t]*odrive\.\w+|(?:\.\w+)+)\([^()#]*\)[ \t]*(?:#|//|$)"
+    r"|(?=[^_=]*$)[^\w]*\w+(?:[^\w]+[^\W\d]\w*){2})"
 )
 """Pattern of a line that sets no parameter.
 
-It is empty, a comment, an import, or a call such as odrv0.save_configuration()."""
+It is empty, a comment, an import, a call such as odrv0.save_configuration(), or a sentence of notes: three words or
+more, without an equals sign or a name of several parts."""
 
 _OF_AXIS = re.compile(r"(?:(odrv[0-9]+)\.)?(axis[0-9]+)\.(.*)")
 """Pattern of the place of a parameter: drive, axis, and name."""
@@ -106,15 +109,23 @@ IN_TURNS = "motor.config.torque_constant"
 
 OLD = frozenset({"setpoints_in_cpr", "A_per_css", "counts_per_step", "current_ramp_rate", "CTRL_MODE"})
 NEW = frozenset({"torque_lim", "torque_ramp_rate", "turns_per_step", "input_mode", "CONTROL_MODE", "ControlMode"})
-NEWEST = frozenset({"config.motor", "config.encoder_bandwidth", "config.torque_soft_max"})
-"""Names that occur only in firmware up to 0.4 (`OLD`), from 0.5 (`NEW`), and from 0.6 (`NEWEST`).
+"""Names that occur only in firmware up to 0.4 (`OLD`), and from 0.5 on (`NEW`).
 
 Firmware up to 0.4 has gains in counts; 0.5 has gains in turns."""
+
+MOVED = {
+    "config.motor.torque_constant": "motor.config.torque_constant",
+    "config.motor.current_soft_max": "motor.config.current_lim",
+    "config.motor.current_control_bandwidth": "motor.config.current_control_bandwidth",
+    "config.torque_soft_max": "motor.config.torque_lim",
+    "config.encoder_bandwidth": "encoder.config.bandwidth",
+}
+"""Names of firmware 0.6, and those of 0.5 for the same parameters."""
 
 FASTEST_MOTOR = 1000.0
 """Speed in turns per second beyond any motor. A higher limit must be in counts."""
 
-TURNS_EXPECTED = "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6"
+TURNS_EXPECTED = "firmware whose gains are in turns and N m: 0.5.1 to 0.6"
 IN_TURNS_INSTEAD = (
     f"vel_gain and vel_integrator_gain times {IN_TURNS} and cpr, vel_limit through cpr (ODrive's migration guide)"
 )
@@ -141,7 +152,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     held: dict[tuple[str, str], dict[str, Any]] = {}
     for key, value in (_settings(text) if in_lines else _entries(text)).items():
         if place := _OF_AXIS.fullmatch(key):
-            held.setdefault((place[1] or "", place[2]), {})[place[3]] = value
+            held.setdefault((place[1] or "", place[2]), {})[MOVED.get(place[3], place[3])] = value
     several = len({drive for drive, _ in held}) > 1
     axes = tuple(
         AxisParameters(f"{drive}.{name}" if several else name, held[drive, name])
@@ -153,7 +164,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     for axis in axes:
         _refuse_other_firmware(axis)
         if IN_TURNS not in axis.values and not in_lines:
-            actual = f"{axis.name} without a {IN_TURNS}, which firmware 0.5.1 to 0.5.6 has"
+            actual = f"{axis.name} without a {IN_TURNS}, which firmware from 0.5.1 on has"
             raise InputError("", actual, TURNS_EXPECTED)
     return axes
 
@@ -180,14 +191,9 @@ def _settings(text: str) -> dict[str, Any]:
 
 
 def _refuse_other_firmware(axis: AxisParameters) -> None:
-    """Raise InputError for firmware other than 0.5.1 to 0.5.6.
-
-    Older firmware has gains in counts, and newer firmware has other names of parameters.
-    """
+    """Raise InputError for firmware up to 0.4, whose gains are in counts."""
     if IN_TURNS in axis.values:
         return
-    if name := _sign_of(axis, NEWEST):
-        raise InputError(name, "a name of firmware 0.6", TURNS_EXPECTED)
     if name := _sign_of(axis, OLD) or _fastest(axis):
         raise _in_counts(name, str(axis.values[name]))
 
@@ -345,12 +351,13 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     left = ["the position is the estimate of a phase-locked loop too, which follows a steady motion without an error"]
     if IN_TURNS not in axis.values:
         unknown = f"the firmware, which no {IN_TURNS} tells"
-        left.append(f"{unknown}: gains in turns and N m are assumed, as 0.5.1 to 0.5.6 has")
+        left.append(f"{unknown}: gains in turns and N m are assumed, as 0.5.1 and later have")
     if axis.flag(f"{CONFIG}.enable_gain_scheduling"):
         width = axis.number(f"{CONFIG}.gain_scheduling_width", 0.0)
+        least = axis.number(f"{CONFIG}.gain_scheduling_min_ratio", 0.0)
         left.append(
-            f"enable_gain_scheduling: within {width:g} turns the gains go to 0 with the error, and friso's results for "
-            "swings that small do not hold for this axis"
+            f"enable_gain_scheduling: within {width:g} turns the gains fall to {least:g} of theirs with the error, and "
+            "friso's results for swings that small do not hold for this axis"
         )
     if axis.flag(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
@@ -444,7 +451,7 @@ def text(settings: Mapping[str, float]) -> str:
 
 FORMAT = ParameterFormat(
     title="ODrive configuration (odrivetool backup-config)",
-    firmware="ODrive 0.5.1 to 0.5.6",
+    firmware="ODrive 0.5.1 to 0.6",
     source="Firmware/MotorControl/controller.cpp and encoder.cpp",
     recognises=recognises,
     axes=axes,

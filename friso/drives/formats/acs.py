@@ -1,0 +1,111 @@
+"""ACS SPiiPlus program with the variables of an axis
+
+The position loop commands a velocity, SLPKP times the position error [1/s], and a PI loop follows it. What a 1 of SLVKP
+and SLVKI exerts depends on the drive and on the motor, and is asked for.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
+from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
+from friso.errors import InputError
+from friso.quantities import Number, positive
+
+GAIN, TIME = "controller.kp", "controller.velocity_integral_time"
+SAMPLE_TIME = "drive.sample_time"
+
+_VARIABLE = re.compile(
+    r"(?<![\w.])([A-Z][A-Z0-9_]{2,20})[ \t]*\([ \t]*(\d{1,3})[ \t]*\)[ \t]*=(?!=)[ \t]*([^\s;!]{1,60})"
+)
+"""Pattern of a variable of an axis and its value; a comment begins with an exclamation mark."""
+
+_LEFT = {
+    "SLDZMIN": "the dead zone of the error",
+    "SLDZMAX": "the error at which it is left",
+    "SLZFF": "the zone in which the feedforward ends",
+    "SLFRC": "a feedforward of the friction",
+    "SLFRCN": "one of the other direction",
+    "SLAFF": "a feedforward of the acceleration",
+    "SLVSOF": "a low-pass of the velocity loop",
+    "SLVNFRQ": "a notch",
+    "SLVB0NF": "a biquad",
+    "SLIOFFS": "an offset of the output",
+}
+"""Variables that a stage does not take over, with what they are."""
+
+
+def recognises(name: str, text: str) -> bool:
+    """Tell whether a text sets the gain of an ACS velocity loop."""
+    return re.search(r"SLVKP[ \t]*\(", text) is not None
+
+
+def axes(text: str) -> tuple[AxisParameters, ...]:
+    """Return the axes whose gains the program sets. Raises InputError without one."""
+    values: dict[str, dict[str, Any]] = {}
+    for line in text.splitlines():
+        for name, axis, value in _VARIABLE.findall(line.partition("!")[0]):
+            values.setdefault(axis, {})[name] = value
+    every = tuple(AxisParameters(axis, values[axis]) for axis in sorted(values, key=int) if "SLPKP" in values[axis])
+    if not every:
+        raise InputError("", "no gain of a position loop", "the variables of a servo axis", "SLPKP(0)=140")
+    return every
+
+
+def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
+    """List what the program leaves open: the machine, and what the velocity loop exerts."""
+    asked = [
+        OpenQuestion(GAIN, f"force per velocity error that SLVKP = {axis.number('SLVKP'):g} makes", '"500 N*s/m"'),
+        OpenQuestion(SAMPLE_TIME, "period of the loops", '"50 us"'),
+    ]
+    if axis.is_set("SLVKI"):
+        what = f"integral time that SLVKI = {axis.number('SLVKI'):g} makes"
+        asked.append(OpenQuestion(TIME, what, '"5 ms"'))
+    return (*(one for one in asked if one.key not in answers), *of_the_machine(answers))
+
+
+def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
+    """Build the controller of an axis. Raises InputError for unusable numbers."""
+    if (kv := axis.number("SLPKP")) <= 0:
+        raise InputError("SLPKP", f"{kv:g}", "a gain greater than 0", "SLPKP(0)=140")
+    left = [f"{name} = {axis.number(name):g}: {what}" for name, what in _LEFT.items() if axis.is_set(name)]
+    table = {"kind": "cascade", "kv": si(kv, "1/s"), "velocity_feedforward": 1.0}
+    tables: dict[str, Mapping[str, Any]] = {"controller": table}
+    return AsStage(tables, tuple(left))
+
+
+def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
+    """Ask for SLVKP of now, beside which that of the stage is computed."""
+    return () if "slvkp" in answers else (OpenQuestion("slvkp", "SLVKP that makes the gain kp of the stage", "65"),)
+
+
+def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
+    """Compute the variables of an axis. Raises InputError for a controller other than a cascade."""
+    if flat["controller.kind"] != "cascade" or "controller.position_integral_time" in flat:
+        expected = "a proportional position loop above a velocity loop, as this drive has it"
+        raise lacks(f'kind = "{flat["controller.kind"]}", or an integral of the position', expected)
+    values = {"SLPKP": flat["controller.kv"], "SLVKP": answers.value("slvkp", Number(positive, "65"))}
+    return Parameters(values, frozenset({"kv", "kp", "velocity_feedforward"}))
+
+
+def text(settings: Mapping[str, float]) -> str:
+    """Write variables as a program sets them."""
+    return "".join(f"{name}(0)={value:.12g}\n" for name, value in settings.items())
+
+
+FORMAT = ParameterFormat(
+    title="ACS SPiiPlus program",
+    firmware="ACS SPiiPlus",
+    source="names of ACSPL+ variables; units of the velocity loop are asked for",
+    recognises=recognises,
+    axes=axes,
+    questions=questions,
+    stage=stage,
+    questions_back=questions_back,
+    parameters=parameters,
+    text=text,
+    suffix=".prg",
+)

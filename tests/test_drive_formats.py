@@ -1,0 +1,164 @@
+"""Parameter files of drives: their gains in SI by hand, the way back, and texts that are none."""
+
+from contextlib import suppress
+from math import pi, radians
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import friso
+from friso.drives.format import FORMATS
+from friso.drives.gains import gains_of
+from friso.drives.read import stage_from
+from friso.errors import InputError
+
+MOVE = {"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "0.1 s"}
+MACHINE = {"masses.stage": "3 kg", "friction.guess": "ball screw", "friction.coulomb": "6 N", **MOVE}
+JOINT = {"masses.stage": "0.02 kg*m^2", "friction.model": "none", "motion.kind": "hold", "motion.duration": "1 s"}
+CYCLES = {"drive.position_sample_time": "1 ms", "drive.sample_time": "125 us"}
+
+TEXTS = {
+    "kflop": "void main()\n{\n ch0->OutputMode=DAC_SERVO_MODE;\n ch0->P=2; /* of now */\n"
+    " ch0->I=3e-5;\n ch0->D=10; // D\n ch0->MaxI=150;\n ch0->MaxOutput=2047;\n"
+    " ch0->iir[0].B0=0.5;\n ch0->iir[0].B1=0.5;\n ch0->iir[0].A1=0.25;\n}\n",
+    "moteus": "# kept\nservo.pid_position.kp 50\nservo.pid_position.ki 400\nservo.pid_position.kd 2\n"
+    "servo.pid_position.ilimit 0.3\nservo.pid_position.iratelimit -1.0\nservo.max_position_slip nan\n",
+    "icub": '<device name="torso"><group name="POSITION_CONTROL">\n<param name="kp"> 900 1200 </param>\n'
+    '<param name="ki"> 0 9000 </param>\n<param name="kd"> 0 5 </param>\n<param name="maxOutput"> 4000 3000 </param>\n'
+    '<param name="maxInt"> 700 800 </param>\n<param name="stictionUp"> 0 10 </param></group></device>\n',
+    "ecmc": "# axis\naxis:\n  id: 2\ncontroller:\n  Kp: 12\n  Ki: 0.05\n  Kd: 0\n  deadband:\n    tol: 0.0004\n",
+    "acs": "! gains\nSLPKP(0)=140\nSLVKP(0)=65\nSLVKI(0)=150\nSLDZMIN(0)=0.0008\nSTOP\n",
+    "odrive": '{"axis0.config.motor.torque_constant": 0.06, "axis0.config.motor.current_soft_max": 18.0,\n'
+    '"axis0.config.encoder_bandwidth": 1000.0, "axis0.controller.config.pos_gain": 18,\n'
+    '"axis0.controller.config.vel_gain": 0.3, "axis0.controller.config.vel_integrator_gain": 1.2,\n'
+    '"axis0.controller.config.vel_integrator_limit": Infinity}\n',
+}
+ANSWERS: dict[str, dict[str, Any]] = {
+    "kflop": {**MACHINE, "force_per_output": "0.05 N", "length_per_unit": "0.5 um"},
+    "moteus": {**MACHINE, "travel_per_turn": "10 mm", "drive.sample_time": "50 us"},
+    "icub": {**JOINT, "force_per_output": "1 mN*m"},
+    "ecmc": {**MACHINE, **CYCLES, "controller.kp": "5 kN*s/m"},
+    "acs": {
+        **MACHINE,
+        "drive.sample_time": "50 us",
+        "controller.kp": "5 kN*s/m",
+        "controller.velocity_integral_time": "5 ms",
+    },
+    "odrive": {**MACHINE, "travel_per_turn": "10 mm"},
+}
+TURN = 2 * pi / 0.01  # [N] for 1 N m on a screw with a lead of 10 mm
+BY_HAND: dict[str, dict[str, float]] = {
+    "kflop": {
+        **{"kp": 2 * 0.05 / 5e-7, "ki": 3e-5 * 0.05 / 5e-7 / 90e-6, "kd": 10 * 0.05 / 5e-7 * 90e-6},
+        **{"force_limit": 2047 * 0.05, "integral_limit": 150 * 0.05, "filters.1.denominator.1": -0.25},
+    },
+    "moteus": {"kp": 50 * TURN / 0.01, "ki": 400 * TURN / 0.01, "kd": 2 * TURN / 0.01, "integral_limit": 0.3 * TURN},
+    "icub": {
+        "kp": 1.2 / radians(1),
+        "ki": 9.0 / radians(1),
+        "kd": 5e-3 / radians(1),
+        "force_limit": 3.0,
+        "integral_limit": 0.8,
+    },
+    "ecmc": {"kv": 12.0, "position_integral_time": 12 * 1e-3 / 0.05, "kp": 5e3},
+    "acs": {"kv": 140.0, "kp": 5e3, "velocity_integral_time": 5e-3},
+    "odrive": {"kv": 18.0, "kp": 0.3 * TURN / 0.01, "velocity_integral_time": 0.25, "force_limit": 18 * 0.06 * TURN},
+}
+"""What the formula of each drive makes of its file, in SI; a joint of the second column for iCub."""
+
+
+BACK = {"acs": {"slvkp": 65}, "ecmc": {"travel_per_turn": "10 mm", "mot_trq_const_mnm_p_a": 96}}
+"""What the way back asks for, beside the way from the file."""
+
+
+def written(folder: Path, kind: str) -> Path:
+    path = folder / f"axis{FORMATS[kind].suffix}"
+    path.write_text(TEXTS[kind], "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_gains_are_those_by_hand_and_lead_back(tmp_path: Path, kind: str) -> None:
+    read = stage_from(written(tmp_path, kind), "joint_1" if kind == "icub" else None, ANSWERS[kind])
+    flat = friso.loads(read.text()).flat()
+    for key, value in BY_HAND[kind].items():
+        assert flat[f"controller.{key}"] == pytest.approx(value, rel=1e-9), key
+    told = {key: value for key, value in ANSWERS[kind].items() if "." not in key}
+    back = gains_of(read.stage, told | BACK.get(kind, {}), kind).parameters
+    assert back is not None
+    numbers = [f"{value:.12g}" for value in back.values()]
+    text = FORMATS[kind].text(back)
+    assert all(number in text for number in numbers)
+    if kind in ("kflop", "moteus", "icub"):
+        path = tmp_path / f"again{FORMATS[kind].suffix}"
+        path.write_text(text, "utf-8")
+        again = stage_from(path, None, ANSWERS[kind]).stage.flat()
+        for key in ("kp", "ki", "kd"):
+            assert again[f"controller.{key}"] == pytest.approx(flat[f"controller.{key}"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("kflop", "rest there"),
+        ("moteus", "current"),
+        ("icub", "stictionUp"),
+        ("ecmc", "deadband.tol"),
+        ("acs", "dead zone"),
+    ],
+)
+def test_what_a_stage_does_not_take_over_is_told(tmp_path: Path, kind: str, told: str) -> None:
+    read = stage_from(written(tmp_path, kind), "joint_1" if kind == "icub" else None, ANSWERS[kind])
+    assert any(told in sentence for sentence in read.left_out)
+
+
+def test_the_velocity_loop_of_an_ecmc_motor_is_in_its_commands(tmp_path: Path) -> None:
+    path = tmp_path / "motor.cmd"
+    lines = {"MOT_TRQ_CONST_MNM_P_A": 96, "MOT_VELO_KP": 58, "MOT_VELO_TI": 120, "MOT_I_MAX_MA": 12000}
+    path.write_text("".join(f"epicsEnvSet({name},{value})\n" for name, value in lines.items()), "utf-8")
+    answers = {**MACHINE, **CYCLES, "controller.kv": "12 1/s", "travel_per_turn": "10 mm"}
+    flat = stage_from(path, None, answers).stage.flat()
+    assert flat["controller.kp"] == pytest.approx(58e-3 * 96e-3 * TURN**2)
+    assert flat["controller.velocity_integral_time"] == pytest.approx(12e-3)
+    assert flat["controller.force_limit"] == pytest.approx(12 * 96e-3 * TURN)
+
+
+def test_notes_about_an_odrive_are_read_with_their_comments(tmp_path: Path) -> None:
+    path = tmp_path / "notes.md"
+    path.write_text(
+        "# tuning\nThis is what we use now\nodrv0.axis0.motor.config.torque_constant = 8.27 / 190 // from KV\n"
+        "odrv0.axis0.encoder.config.cpr = 2**13\nodrv0.axis0.controller.config.pos_gain = 90\n"
+        "odrv0.axis0.controller.config.vel_gain = 0.21\n"
+        "odrv0.axis0.controller.config.vel_integrator_gain = 0.5 * 10 * 0.21 // half\n",
+        "utf-8",
+    )
+    flat = stage_from(path, None, ANSWERS["odrive"]).stage.flat()
+    assert flat["controller.kp"] == pytest.approx(0.21 * TURN / 0.01)
+    assert flat["controller.velocity_integral_time"] == pytest.approx(0.2)
+
+
+def test_a_file_of_another_kind_names_its_numbers_and_the_way_by_hand(tmp_path: Path) -> None:
+    path = tmp_path / "other.txt"
+    path.write_text("loopKp: 3.5\nposition 7\n", "utf-8")
+    with pytest.raises(InputError, match="another kind") as refused:
+        stage_from(path, None, {})
+    assert "loopKp = 3.5" in refused.value.actual
+    assert "position = 7" not in refused.value.actual
+    assert "kp = P F/L" in refused.value.expected
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+@given(data=st.data())
+def test_no_damage_to_a_file_raises_anything_but_one_message(
+    kind: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    text = TEXTS[kind]
+    first, size = data.draw(st.integers(0, len(text))), data.draw(st.integers(0, 40))
+    strange = st.text(st.sampled_from("0123456789.-+eE=:;<>()[]{}\"'#/!\n xKpP\u00b5"), max_size=12)
+    path = tmp_path_factory.mktemp("fuzzed") / "file.txt"
+    path.write_text(text[:first] + data.draw(strange) + text[first + size :], "utf-8")
+    with suppress(InputError):
+        stage_from(path, None, ANSWERS[kind])
