@@ -285,8 +285,7 @@ class ControllerSection(AgainstFriction):
         """
         canvas.box(flat[KIND])
 
-    @classmethod
-    def note(cls, flat: Mapping[str, Any]) -> str:
+    def note(self, flat: Mapping[str, Any]) -> str:
         """Say what a verdict on a stage with this controller assumes, in a sentence; "" for nothing."""
         return ""
 

@@ -136,13 +136,20 @@ class RationalController(ControllerSection):
         """
         return cls.key(f"{PARTS}.integral") in flat
 
-    @classmethod
-    def note(cls, flat: Mapping[str, Any]) -> str:
-        """Say that a verdict applies to the continuous equivalent of a sampled controller."""
-        if SAMPLE_TIME not in flat:
-            return ""
-        equivalent = "The verdict is on the continuous equivalent (Tustin) of the controller"
-        return f"{equivalent}, whose coefficients are for samples of {flat[SAMPLE_TIME]:g} s."
+    def note(self, flat: Mapping[str, Any]) -> str:
+        """Say what a verdict assumes of a sampled controller, and of its integral at the limit of the force."""
+        says = []
+        if SAMPLE_TIME in flat:
+            says.append(
+                "The verdict is on the continuous equivalent (Tustin) of the controller, whose coefficients are for "
+                f"samples of {flat[SAMPLE_TIME]:g} s."
+            )
+        if self.force_limit is not None and self.anti_windup is None and self.integrates(flat):
+            says.append(
+                "The file does not say what the integral does at the limit of the force: it is taken to rest there "
+                '(anti_windup = "clamp"); an output that is only clipped is "none".'
+            )
+        return " ".join(says)
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: RationalTerms) -> sp.Expr:
