@@ -16,6 +16,7 @@ from scipy.signal import bilinear, lfilter, ss2tf
 from friso.errors import InputError
 from friso.identification.inverse_model import least_squares, unit_of, within_stretches
 from friso.identification.logs.log import Log
+from friso.identification.readings.common import noise_of
 from friso.identification.settings import witness_settings as settings
 from friso.quantities import percent, plain_factor
 from friso.stage.controllers import CONTROLLER, NO_SETTINGS, settings_of
@@ -30,13 +31,15 @@ class Replay:
     """Force of the controller on a log, compared with the logged force.
 
     The logged force, of RMS `force` [N], is `slope` times the commanded one, and leaves the share `left` of its own
-    variation. It comes `lag` [s] after the command. Time of the log runs `clock` times as slowly as the controller's.
-    `mass` [kg] times the reference's acceleration, and `direction` [N] in its direction, are in it besides. `slopes`
-    are those before and after an instant at which gains were switched.
+    variation, of which the share `noise` differs from sample to sample. It comes `lag` [s] after the command. Time
+    of the log runs `clock` times as slowly as the controller's. `mass` [kg] times the reference's acceleration, and
+    `direction` [N] in its direction, are in it besides. `slopes` are those before and after an instant at which
+    gains were switched.
     """
 
     slope: float
     left: float
+    noise: float = 0.0
     lag: float = 0.0
     clock: float = 1.0
     mass: float = 0.0
@@ -47,7 +50,8 @@ class Replay:
     @property
     def explains(self) -> bool:
         """Tell whether the controller explains the course of the logged force, whatever its size."""
-        return self.left <= settings.force_left_by_the_controller
+        beyond_noise = np.sqrt(max(self.left**2 - self.noise**2, 0.0))
+        return bool(beyond_noise <= settings.force_left_by_the_controller)
 
     @property
     def steps(self) -> bool:
@@ -122,6 +126,7 @@ class Witness:
         return Replay(
             slope=float(solution[0]),
             left=float(np.std(left)) / spread,
+            noise=noise_of(left) / spread,
             lag=shift * self.step,
             clock=clock,
             mass=float(mass),
