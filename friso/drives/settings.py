@@ -1,0 +1,40 @@
+"""Settings of `friso.drives`, with a reason for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from friso.settings import Settings, setting
+
+
+@dataclass(frozen=True)
+class TargetSettings(Settings):
+    """Settings of controllers that leave friso."""
+
+    vector_samples: int = setting(4000, "")
+    """Samples of a test vector. Of most drives they last through a move; ten times as many make files of megabytes."""
+
+    text_samples: int = setting(400, "")
+    """Samples of the test in structured text, which stand in its source. Editors of PLCs slow down beyond thousands."""
+
+    output_rounding: float = setting(1e-12, "")
+    """Difference from friso that rounding explains, relative to the largest output. Compilers order sums otherwise;
+    over 1e5 samples it stayed below a tenth of this."""
+
+    single_reserve: float = setting(4.0, "")
+    """Difference from friso in single precision, relative to that of friso's own run in single precision. Compilers
+    that order sums otherwise have come to twice that."""
+
+    section_rounding: float = setting(1e-6, "")
+    """Largest relative difference between biquads and state space at which the biquads are told. Poles that nearly
+    coincide lose digits."""
+
+    section_points: int = setting(200, "")
+    """Frequencies at which biquads are compared with the state space; a notch is a tenth of a decade wide."""
+
+    cancelling_distance: float = setting(1e-9, "")
+    """Distance of a zero and a pole in z that cancel, and size of what is infinite. Rounding of a pole is 1e-15, of a
+    double one 1e-8."""
+
+
+settings = TargetSettings.live()

@@ -1,0 +1,94 @@
+"""Run a stage as built, and keep what its controller read and commanded at each sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from friso.drives.program import (
+    ACCELERATION,
+    DIRECTION,
+    JERK,
+    MOTOR_POSITION,
+    PER_NEWTON,
+    POSITION,
+    REFERENCE,
+    VELOCITY,
+    Program,
+)
+from friso.drives.target import Vector
+from friso.engine.simd_math import gaussian, quantised
+from friso.equations.as_built import VELOCITY_SEED_OFFSET
+from friso.equations.reference import value
+from friso.equations.structure import carrying_force
+from friso.errors import InputError
+from friso.stage import Stage
+from friso.virtual_rig.run import failures, run_flat
+from friso.virtual_rig.task import MoveTask, own_motion
+
+SEED = 0
+"""Seed of the noise of the encoders, as in `friso simulate`."""
+
+
+def replayed(stage: Stage, flat: Mapping[str, Any], program: Program, samples: int) -> Vector:
+    """Return the first samples of a stage's own motion as its drive runs it.
+
+    `flat` has the stage with a complete drive. Raises InputError for a run that fails.
+    """
+    task, period = own_motion(stage), program.period
+    duration = min(task.duration, samples * period)
+    begun = task.pieces[:, 0] < duration
+    task = replace(task, pieces=task.pieces[begun], duration=duration)
+    (recorded,) = run_flat({**flat}, stage.floor, task, [SEED], period, outputs=True)
+    if failed := failures(recorded):
+        raise InputError("STAGE", f"a run as built that fails ({failed[0][1]})", "a stage that friso simulate can run")
+    assert recorded.outputs is not None
+    time = recorded.time
+    rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]
+    seen: dict[Any, np.ndarray] = {
+        REFERENCE: recorded.logged["reference"][0],
+        VELOCITY: value(task.form, rows, time - rows[:, 0], 1),
+        ACCELERATION: value(task.form, rows, time - rows[:, 0], 2),
+        POSITION: recorded.logged["position"][0],
+    }
+    if MOTOR_POSITION in program.inputs:
+        side = "motor" if flat["encoder.velocity"] == "motor" else "load"
+        true = recorded.outputs[f"{side}_position"][0]
+        digit = np.float64(flat["drive.encoder_resolution"])
+        with np.errstate(
+            all="ignore"
+        ):  # whole numbers overflow on purpose, and a digit of 0 leaves readings as they are
+            noise = [gaussian(float(SEED + VELOCITY_SEED_OFFSET), float(k)) for k in range(len(time))]
+            noisy = true + flat["drive.encoder_noise"] * np.array(noise)
+            seen[MOTOR_POSITION] = np.array([quantised(one, digit) for one in noisy])
+    if JERK in program.inputs:
+        seen[JERK] = value(task.form, rows, time - rows[:, 0], 3)
+    if DIRECTION in program.inputs:
+        seen[DIRECTION] = _direction(task, rows)
+    per_newton = flat[str(PER_NEWTON)]
+    inputs = {str(one): seen[one] + 0.0 for one in program.inputs}
+    return Vector(_start(flat, task, program), inputs, recorded.logged["force"][0] * per_newton + 0.0)
+
+
+def _direction(task: MoveTask, rows: np.ndarray) -> np.ndarray:
+    """Return the direction of the reference in its pieces, `rows`: 1 ahead, -1 back, 0 at rest."""
+    degree = task.form.degree
+    if task.form.tones:
+        return rows[:, degree + 2]
+    rates = rows[:, 2 : degree + 2]
+    first = np.argmax(rates != 0, axis=1)
+    return np.sign(rates[np.arange(len(rates)), first])
+
+
+def _start(flat: Mapping[str, Any], task: MoveTask, program: Program) -> dict[str, float]:
+    """Return the inputs and the output with which a run begins: at rest, with what constant forces ask for."""
+    place = float(task.pieces[0, 1] + task.displacement)
+    force = (float(carrying_force(flat)) + flat["cable.stiffness"] * place) / flat["drive.motor_constant_ratio"]
+    begin = {str(one): 0.0 for one in program.inputs}
+    begin |= {str(REFERENCE): place, str(POSITION): place}
+    if MOTOR_POSITION in program.inputs:
+        begin[str(MOTOR_POSITION)] = place
+    return {**begin, "output": force * flat[str(PER_NEWTON)] + 0.0}
