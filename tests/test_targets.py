@@ -383,7 +383,7 @@ RIG = EXAMPLES / "thesis_rig.toml"
         ((RIG, "--to", "cobol"), "one of"),
         ((RIG, "--to", "c", "--name", "while"), "word of C"),
         ((RIG, "--to", "c", "--name", "2nd axis"), "begins with a letter"),
-        ((RIG, "--name", "axis"), "no name without code"),
+        ((RIG, "--name", "axis"), "option name is for"),
         ((RIG, "--to", "c", "--set", "travel=3 mm"), "motor_constant"),
         ((RIG, "--to", "c", "--set", "drive.delay=1 s", "--set", "drive.sample_time=50 us"), "at most"),
     ],
@@ -445,3 +445,121 @@ def test_one_more_target_is_one_declaration(monkeypatch: pytest.MonkeyPatch) -> 
     answer = friso.export(stage_of("adrc", "rigid_lugre"), to="plain")
     assert "Verdict: the stage does not hunt" in answer.target_files["stage.txt"]
     assert answer.system.dt == pytest.approx(125e-6)
+
+
+def machined(control: str, machine: str, samples: int = SHORT, **changes: Any) -> Parcel:
+    """Return a controller with its machine as a plant, without noise and digits of the encoder."""
+    ideal = {"drive.encoder_noise": None, "drive.encoder_resolution": None}
+    stage = stage_of(control, machine).replace({**ideal, **changes})
+    return packed(stage, TARGETS["c"], "axis", {}, samples, plant=True)
+
+
+@needs_compiler
+@pytest.mark.parametrize("machine", MACHINES)
+def test_a_machine_in_c_is_the_one_in_python(tmp_path: Path, machine: str) -> None:
+    """Both compilers, without a warning; over hundreds of samples it follows friso's run in Python to rounding."""
+    parcel = machined("cascade", machine)
+    folder = written(tmp_path / "c", "c", parcel)
+    for compiler in COMPILERS:
+        command = [compiler, *STRICT, TRAPS[compiler], "axis_machine.c", "axis_machine_test.c", "-lm", "-o", "run"]
+        subprocess.run(command, cwd=folder, check=True)
+        assert "200 samples" in ran(folder, folder / "run", "axis_machine_vector.csv")
+
+
+@pytest.mark.parametrize(("machine", "largest"), [("rigid_lugre", 1e-9), ("isolator", 2e-5), ("gms", 2e-5)])
+def test_a_machine_comes_closer_to_friso_with_more_steps(machine: str, largest: float) -> None:
+    """The differences that the header tells fall with the steps in a sample; impacts of a limiter magnify them."""
+    parcel = machined("cascade", machine)
+    assert parcel.machine is not None
+    one, _, many = parcel.machine.differences.values()
+    assert many < largest
+    assert many < one / 4
+    header = TARGETS["c"].files(parcel)["axis_machine.h"]
+    assert f"{many:.1e} m with 16 steps" in header
+
+
+_CLOSED = """
+#include "axis.h"
+#include "axis_machine.h"
+#include <stdio.h>
+#include <stdlib.h>
+int main(void)
+{
+    axis_parameters parameters; axis_state state; axis_machine_parameters of_machine; axis_machine machine;
+    char line[4096]; int k;
+    axis_defaults(&parameters); axis_machine_defaults(&of_machine);
+    axis_machine_init(&machine, &of_machine, 0.0, 0.0, 4);
+    for (int begun = 0; fgets(line, sizeof line, stdin) != NULL; begun = 1) {
+        double row[COUNT]; char *place = line;
+        for (k = 0; k < COUNT; k++) row[k] = strtod(place, &place);
+        row[PLACE] = axis_machine_position(&machine);
+        if (!begun) axis_init(&state, &parameters, ROW, 0.0);
+        else {
+            printf("%.17g\\n", row[PLACE]);
+            axis_machine_step(&machine, axis_step(&state, ROW));
+        }
+    }
+    return 0;
+}
+"""
+
+
+def closed_loop(folder: Path, parcel: Parcel) -> np.ndarray:
+    """Return the positions of machine and controller in C, which follow the reference of the parcel's run."""
+    written(folder, "c", parcel)
+    count = len(parcel.inputs)
+    text = _CLOSED.replace("ROW", ", ".join(f"row[{k}]" for k in range(count)))
+    text = text.replace("PLACE", str(parcel.inputs.index("position"))).replace("COUNT", str(count))
+    (folder / "closed.c").write_text(text)
+    command = [COMPILERS[0], "-std=c99", "-O2", "axis.c", "axis_machine.c", "closed.c", "-lm", "-o", "run"]
+    subprocess.run(command, cwd=folder, check=True)
+    lines = "\n".join(" ".join(map(repr, row[:-1])) for row in parcel.vector.table)
+    done = subprocess.run([folder / "run"], input=lines, capture_output=True, text=True, check=True)
+    return np.array(done.stdout.split(), float)
+
+
+def swing_of(deviation: np.ndarray) -> tuple[float, float]:
+    """Return peak to peak, and the period in samples, of the last half of a deviation."""
+    last = deviation[len(deviation) // 2 :]
+    level = (last.max() + last.min()) / 2
+    rises = np.flatnonzero((last[:-1] < level) & (last[1:] >= level))
+    fine = rises + (level - last[rises]) / (last[rises + 1] - last[rises])
+    return float(np.ptp(last)), float(np.diff(fine).mean())
+
+
+@needs_compiler
+def test_machine_and_controller_in_c_hunt_as_friso_s(tmp_path: Path) -> None:
+    """Amplitude and period of a hunting machine, both in C, are those of friso's run as built to 1e-3."""
+    parcel = machined("van_dijk_notch", "rigid_lugre", 160_000)
+    ours = closed_loop(tmp_path / "c", parcel) - parcel.vector.inputs["reference"]
+    theirs = parcel.vector.true_position - parcel.vector.inputs["reference"]
+    assert swing_of(theirs)[0] > 1e-5
+    np.testing.assert_allclose(swing_of(ours), swing_of(theirs), rtol=1e-3)
+
+
+@needs_compiler
+def test_machine_and_controller_in_c_settle_as_friso_s(tmp_path: Path) -> None:
+    """On the isolator, both come to rest at the end of the move, within a tenth of a micrometre."""
+    parcel = machined("van_dijk_notch", "isolator", 39_000)
+    ours = closed_loop(tmp_path / "c", parcel) - parcel.vector.inputs["reference"]
+    theirs = parcel.vector.true_position - parcel.vector.inputs["reference"]
+    for deviation in (ours, theirs):
+        assert np.abs(deviation[-2000:]).max() < 1e-7
+
+
+def test_a_machine_along_a_rail_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="alike along its travel"):
+        packed(friso.load(EXAMPLES / "thesis_drive.toml"), TARGETS["c"], "axis", {}, 10, plant=True)
+    for words, part in ((("--to", "st", "--machine"), "can hold a machine"), (("--machine",), "option machine is for")):
+        done = friso_inside(tmp_path, "export", RIG, *words, "--out", "out")
+        assert done.returncode == 2
+        assert part in " ".join(done.stderr.split())
+
+
+def test_a_stage_with_bias_and_no_integral_begins_at_rest() -> None:
+    """A constant force is held by an error, with which the exported controller begins, too."""
+    controller = {"kind": "cascade", "kv": "25 1/s", "kp": "90 N*s/m", "force_limit": "150 N"}
+    stage = stage_of("cascade", "rigid_lugre").replace({"controller": controller, "bias": {"cart": "-8 N"}})
+    parcel = packed(stage, TARGETS["c"], "axis", {}, 500)
+    assert parcel.vector.start["output"] == pytest.approx(8.0)
+    assert parcel.vector.output[0] == pytest.approx(8.0, abs=1.0)

@@ -124,9 +124,9 @@ class Language:
         return [line for line in written if line]
 
 
-def functions(absolute: str, root: str, floor: str, exp: str = "exp") -> Mapping[Any, str]:
+def functions(absolute: str, root: str, floor: str, exp: str, tanh: str = "tanh") -> Mapping[Any, str]:
     """Return the names of functions by what they stand for, in the form of `Language.functions`."""
-    return {sp.Abs: absolute, sp.sqrt: root, floored: floor, sp.exp: exp}
+    return {sp.Abs: absolute, sp.sqrt: root, floored: floor, sp.exp: exp, sp.tanh: tanh}
 
 
 PYTHON = Language(
@@ -141,3 +141,26 @@ PYTHON = Language(
     assign="{name} = {value}",
     power="pow",
 )
+
+
+def c_language(real: str = "double") -> Language:
+    """Return C with numbers of the type `real`."""
+    number: Callable[[float], str] = repr if real == "double" else lambda value: f"({real}){value!r}"
+    return Language(
+        both="&&",
+        either="||",
+        negation="!",
+        functions=functions("fabs", "sqrt", "floor", "exp"),
+        if_="if ({}) {{",
+        elif_="}} else if ({}) {{",
+        else_="} else {",
+        end="}",
+        assign="{name} = {value};",
+        power="pow",
+        number=number,
+    )
+
+
+def commented(lines: Iterable[str]) -> list[str]:
+    """Return a comment in C of some lines."""
+    return ["/*", *(f" * {line.replace('*/', '* /')}".rstrip() for line in lines), " */"]

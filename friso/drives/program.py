@@ -182,8 +182,11 @@ def _declared(form: AsBuilt, flat: Mapping[str, Any]) -> tuple[list[sp.Symbol], 
     )
     command, held = controller_as_built(form, loop)
     neutral = {key(name): sp.sympify(value) for name, value in NEUTRAL.items() if flat[name] == value}
-    output = _with(command, neutral) * (PER_NEWTON if flat[str(PER_NEWTON)] != 1 else 1)
-    kept = {one.symbol: Held(one.symbol, _with(one.update, neutral), _with(one.settled, neutral)) for one in held}
+    output = with_values(command, neutral) * (PER_NEWTON if flat[str(PER_NEWTON)] != 1 else 1)
+    kept = {
+        one.symbol: Held(one.symbol, with_values(one.update, neutral), with_values(one.settled, neutral))
+        for one in held
+    }
     needed: set[Any] = set()
     wanted: set[Any] = output.free_symbols & kept.keys()
     while wanted:
@@ -194,7 +197,7 @@ def _declared(form: AsBuilt, flat: Mapping[str, Any]) -> tuple[list[sp.Symbol], 
     return [*INPUTS, *(one for one in EXTRA_INPUTS if one in used)], output, memories
 
 
-def _with(expression: Any, values: Mapping[Any, Any]) -> Any:
+def with_values(expression: Any, values: Mapping[Any, Any]) -> Any:
     """Return an expression with symbols replaced, and the cases that then never hold left out."""
     return sp.sympify(expression).xreplace(values)
 
@@ -215,20 +218,20 @@ def program_of(flat: Mapping[str, Any]) -> Program:
         STEADY.force: OUTPUT / PER_NEWTON if flat[str(PER_NEWTON)] != 1 else OUTPUT,
         STEADY.deflected: sp.S.One,
     }
-    started = [_with(one.settled, begin) for one in memories]
+    started = [with_values(one.settled, begin) for one in memories]
     values = [output, *(one.update for one in memories)]
     free: set[Any] = set().union(*(e.free_symbols for e in (*values, *started)))
     keys = sorted(free - {*inputs, *symbols, OUTPUT}, key=str)
     if missing := [str(one) for one in keys if str(one) not in flat]:
         raise InputError("controller", ", ".join(missing), "equations in keys of the stage and what a drive measures")
     constants = Constants(keys)
-    hoisted = [constants.hoist(_in_arithmetic(value)) for value in values]
-    beginning = [constants.hoist(_in_arithmetic(value)) for value in started]
+    hoisted = [constants.hoist(in_arithmetic(value)) for value in values]
+    beginning = [constants.hoist(in_arithmetic(value)) for value in started]
     names = [*constants.index]
-    prepared, ready = _straight([_in_arithmetic(e) for e in constants.expressions], "p")
+    prepared, ready = straight([in_arithmetic(e) for e in constants.expressions], "p")
     prepared += zip(names, ready, strict=True)
-    steps, (command, *updates) = _straight(hoisted, "w")
-    begins, starts = _straight(beginning, "b")
+    steps, (command, *updates) = straight(hoisted, "w")
+    begins, starts = straight(beginning, "b")
     return Program(
         tuple(inputs),
         {one: float(flat[str(one)]) for one in keys},
@@ -258,7 +261,7 @@ def _discrete(form: AsBuilt, flat: Mapping[str, Any]) -> tuple[list[sp.Symbol], 
         raise InputError("controller.kind", f'"{kind}", of which friso cannot sample: {error}', expected) from None
 
 
-def _in_arithmetic(expression: Any) -> Any:
+def in_arithmetic(expression: Any) -> Any:
     """Return an expression in which limits are cases, and the sine of a number of turns is the series of the engine."""
 
     def turned(turn: Any) -> Any:
@@ -268,7 +271,7 @@ def _in_arithmetic(expression: Any) -> Any:
     return expression.replace(sine, turned)
 
 
-def _straight(values: Iterable[Any], letter: str) -> tuple[list[Assignment], list[Any]]:
+def straight(values: Iterable[Any], letter: str) -> tuple[list[Assignment], list[Any]]:
     """Write expressions as assignments to symbols that begin with a `letter`, and what then remains of them.
 
     Subexpressions that occur several times are computed once, and every case distinction is an assignment of its own.
@@ -282,7 +285,7 @@ def _straight(values: Iterable[Any], letter: str) -> tuple[list[Assignment], lis
             conditions[symbol] = whole
         else:
             writer.assign(symbol, whole)
-    return writer.steps, [writer.plain(_with(value, conditions)) for value in reduced]
+    return writer.steps, [writer.plain(with_values(value, conditions)) for value in reduced]
 
 
 class _Straight:
@@ -353,7 +356,7 @@ def linear_controller(flat: Mapping[str, Any], samples: int = 1) -> LinearContro
     sets = []
     for k in range(samples):
         passed: Any = {c: sp.Integer(k % round(flat[name] / flat["drive.sample_time"])) for c, name in counters.items()}
-        rows: Any = [_with(e, passed).doit(deep=False) for e in (*(one.update for one in states), output)]
+        rows: Any = [with_values(e, passed).doit(deep=False) for e in (*(one.update for one in states), output)]
         along: Sequence[Any] = [*(one.symbol for one in states), *inputs]
         jacobian = sp.Matrix(rows).jacobian(along).xreplace({DIRECTION: sp.S.Zero, **values})
         whole = np.array(jacobian.evalf(subs={}), dtype=float)

@@ -25,6 +25,20 @@ class TargetSettings(Settings):
     """Difference from friso in single precision, relative to that of friso's own run in single precision. Compilers
     that order sums otherwise have come to twice that."""
 
+    machine_samples: int = setting(200, "")
+    """Samples over which a machine as a plant is compared with friso. Behind the first impacts of a limiter runs that
+    begin a rounding apart differ by the stroke."""
+
+    machine_steps: tuple[int, ...] = setting((1, 4, 16), "")
+    """Steps in a sample for which the difference of a machine from friso is told; sixteen take seconds."""
+
+    usual_steps: int = setting(4, "")
+    """Steps in a sample of a machine as a plant: with one, the contact of a limiter is a few steps long."""
+
+    machine_rounding: float = setting(1e-9, "")
+    """Difference between a machine in C and in Python that rounding explains, relative to the largest position. Kinks
+    magnify rounding."""
+
     section_rounding: float = setting(1e-6, "")
     """Largest relative difference between biquads and state space at which the biquads are told. Poles that nearly
     coincide lose digits."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.drives.carried_out import single_difference
+from friso.drives.machine import MachineRun
 from friso.drives.program import MEANINGS, LinearController, Program, identifier
 from friso.drives.settings import settings
 from friso.errors import InputError
@@ -22,11 +23,13 @@ class Vector:
 
     `start` has the inputs and the output with which the run begins, by name. `inputs` are those of each sample by name,
     and `output` is what the drive commanded there. All are in SI, or in the unit of the output, of the shape (n,).
+    `true_position` is where the machine was [m], without the encoder.
     """
 
     start: Mapping[str, float]
     inputs: Mapping[str, np.ndarray]
     output: np.ndarray
+    true_position: np.ndarray
 
     @property
     def table(self) -> list[list[float]]:
@@ -46,7 +49,8 @@ class Parcel:
 
     `name` begins the names of files and identifiers. `header` says in lines of text which stage, friso and verdict the
     controller is of. `linear` is the controller for small motions. `units` are those of the parameters, by key, and of
-    the inputs; `unit` is that of the output. `digest` is that of the stage.
+    the inputs; `unit` is that of the output. `digest` is that of the stage. `machine` is the
+    machine as a plant, if it is wanted.
     """
 
     name: str
@@ -57,6 +61,7 @@ class Parcel:
     units: Mapping[str, str]
     unit: str
     digest: str
+    machine: MachineRun | None = None
 
     @property
     def inputs(self) -> list[str]:
@@ -94,13 +99,14 @@ class Target:
     """A form in which a controller leaves friso.
 
     `files` writes the files by name. `own_names` are names that the form takes for itself, and `ignores_case` tells
-    that names which differ in case alone are one.
+    that names which differ in case alone are one. A target that `holds_machine` can write the machine, too.
     """
 
     title: str
     files: Callable[[Parcel], Mapping[str, str]]
     own_names: frozenset[str] = frozenset()
     ignores_case: bool = False
+    holds_machine: bool = False
 
     def check_names(self, name: str, program: Program) -> None:
         """Check that names in the code are usable.

@@ -6,31 +6,16 @@ from the parameters in double precision either way.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
-from friso.drives.languages import Language, functions
+from friso.drives.c_machine import machine_files
+from friso.drives.languages import c_language, commented
 from friso.drives.program import EXTRA_INPUTS, INPUTS, OUTPUT, identifier
 from friso.drives.target import Parcel, Target
 
 _WORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile
 while sqrt fabs floor exp pow isfinite output command dropped state parameters"""
-
-_SPELLING = {"both": "&&", "either": "||", "negation": "!", "if_": "if ({}) {{", "elif_": "}} else if ({}) {{"}
-_SPELLING |= {"else_": "} else {", "end": "}", "assign": "{name} = {value};", "power": "pow"}
-_FUNCTIONS = functions("fabs", "sqrt", "floor")
-
-
-def _language(real: str) -> Language:
-    """Return C with numbers of the type `real`."""
-    number: Callable[[float], str] = repr if real == "double" else lambda value: f"({real}){value!r}"
-    return Language(functions=_FUNCTIONS, number=number, **_SPELLING)
-
-
-def _comment(lines: list[str]) -> list[str]:
-    """Return a comment of some lines."""
-    plain = [line.replace("*/", "* /") for line in lines]
-    return ["/*", *(f" * {line}".rstrip() for line in plain), " */"]
 
 
 def _arguments(parcel: Parcel, real: str) -> str:
@@ -58,7 +43,7 @@ def _header(parcel: Parcel) -> str:
     ]
     return "\n".join(
         [
-            *_comment(usage),
+            *commented(usage),
             f"#ifndef {upper}_H",
             f"#define {upper}_H",
             "",
@@ -92,7 +77,7 @@ def _header(parcel: Parcel) -> str:
 def _source(parcel: Parcel) -> str:
     """Return the source of the functions."""
     name, real, program = parcel.name, f"{parcel.name}_real", parcel.program
-    double, number = _language("double"), _language(real)
+    double, number = c_language(), c_language(real)
     own = {str(one) for one in (*program.sampled_constants, *program.memories)}
     of_parameters = {str(one) for one in program.parameters}
 
@@ -142,7 +127,7 @@ def _source(parcel: Parcel) -> str:
     defaults = [f"parameters->{field} = {value!r};" for field, (value, _) in parcel.parameters.items()]
     return "\n".join(
         [
-            *_comment([*parcel.header]),
+            *commented([*parcel.header]),
             f'#include "{name}.h"',
             "#include <tgmath.h>",
             "",
@@ -237,7 +222,10 @@ def _files(parcel: Parcel) -> Mapping[str, str]:
         f"{name}.c": _source(parcel),
         f"{name}_test.c": _test(parcel),
         f"{name}_vector.csv": parcel.vector.text(),
+        **(machine_files(parcel) if parcel.machine else {}),
     }
 
 
-TARGET = Target("C", _files, frozenset(_WORDS.split()) - {str(one) for one in (*INPUTS, *EXTRA_INPUTS)})
+TARGET = Target(
+    "C", _files, frozenset(_WORDS.split()) - {str(one) for one in (*INPUTS, *EXTRA_INPUTS)}, holds_machine=True
+)

@@ -11,7 +11,8 @@ import numpy as np
 
 from friso.drives.carried_out import carried_out
 from friso.drives.gains import output_of
-from friso.drives.program import MEANINGS, PER_NEWTON, linear_controller, program_of
+from friso.drives.machine import machine_of, machine_run
+from friso.drives.program import MEANINGS, OUTPUT, PER_NEWTON, linear_controller, program_of
 from friso.drives.settings import settings
 from friso.drives.target import Parcel, Target
 from friso.errors import InputError
@@ -25,8 +26,10 @@ from friso.stage.rig import LOOPS
 from friso.virtual_rig.run import as_built_keys
 
 
-def packed(stage: Stage, target: Target, name: str, user_values: Mapping[str, Any], samples: int) -> Parcel:
-    """Return a controller with a test of so many samples, and without a header.
+def packed(
+    stage: Stage, target: Target, name: str, user_values: Mapping[str, Any], samples: int, plant: bool = False
+) -> Parcel:
+    """Return a controller with a test of so many samples, and without a header; as a `plant`, with its machine.
 
     What the target cannot hold is refused before anything is run. Raises InputError for that, for a stage that is not
     usable, and for `user_values` that nothing asks for.
@@ -35,7 +38,11 @@ def packed(stage: Stage, target: Target, name: str, user_values: Mapping[str, An
     flat = {**as_built_keys(stage), str(PER_NEWTON): per_newton}
     program, axis, fields = program_of(flat), stage.axis_kind, stage.numeric_keys()
     target.check_names(name, program)
-    of_keys = {str(key): getattr(fields.get(str(key)), "unit", "") for key in program.parameters}
+    machine = machine_of(flat) if plant else None
+    of_keys = {
+        str(key): getattr(fields.get(str(key)), "unit", "")
+        for key in (*program.parameters, *(machine.parameters if machine else ()))
+    }
     of_inputs = {str(one): meaning[0] for one, meaning in MEANINGS.items()}
     units = {key: axis.unit(one) for key, one in (of_keys | of_inputs).items()} | {
         str(PER_NEWTON): f"{unit}/{axis.unit('N')}"
@@ -51,7 +58,11 @@ def packed(stage: Stage, target: Target, name: str, user_values: Mapping[str, An
         raise InputError(
             "controller", text, f"equations that reproduce it to {parcel.tolerance:.3g} {unit}: a fault of friso"
         )
-    return parcel
+    if machine is None:
+        return parcel
+    few, held = settings.machine_samples, vector.start[str(OUTPUT)]
+    run = machine_run(machine, flat, vector.output[:few], vector.true_position[:few], held)
+    return replace(parcel, machine=run)
 
 
 def parcel_of(
@@ -60,12 +71,13 @@ def parcel_of(
     target: Target,
     name: str,
     user_values: Mapping[str, Any],
+    plant: bool,
     progress: Progress,
 ) -> tuple[Parcel, CheckAnswer]:
     """Return a controller with all that belongs to it, and the check of its stage.
 
     Raises InputError for what `packed` refuses.
     """
-    parcel = packed(stage, target, name, user_values, settings.vector_samples)
+    parcel = packed(stage, target, name, user_values, settings.vector_samples, plant)
     check = checked_stage(stage, correlations, progress=progress)
     return replace(parcel, header=header(parcel, check)), check

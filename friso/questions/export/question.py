@@ -10,10 +10,12 @@ from friso.axis import speak_of
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
 from friso.drives.target import TARGETS
+from friso.errors import InputError
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, FormatName, StageLike
 from friso.progress import Progress, silent
+from friso.quantities import quoted
 
 if TYPE_CHECKING:
     from friso.questions.check.question import CheckAnswer
@@ -77,6 +79,7 @@ def export(
     set: Changes = None,
     to: FormatName | None = None,
     name: str | None = None,
+    machine: bool = False,
     progress: Progress = silent,
 ) -> ExportAnswer | ControllerAnswer:
     """What to take to the drive: gains in its units, its parameters, or the controller itself as code.
@@ -92,6 +95,8 @@ def export(
         A kind of drive, whose parameters are wanted, or a language; friso export --help lists them.
     name : str, optional
         Name of the controller in code and of its files; default: the name of the stage file.
+    machine : bool
+        Add the machine with its friction as a plant of fixed steps (c).
 
     Returns
     -------
@@ -117,9 +122,14 @@ def export(
     if to is None or to in FORMATS:
         chosen = inputs.stage_of(stage, overrides)
         speak_of(chosen.axis_kind)
-        if name is not None:
-            raise inputs.wrong("name", name, "no name without code to be named", "to=c")
+        for option, value in (("name", name), ("machine", machine)):
+            if value:
+                actual = quoted(to) if to else "nothing"
+                raise InputError("to", actual, f"a language, which the option {option} is for", "to=c")
         return ExportAnswer(gains_of(chosen, user_values, to))
+    if machine and not TARGETS[to].holds_machine:
+        able = ", ".join(target for target in TARGETS if TARGETS[target].holds_machine)
+        raise InputError("to", quoted(to), f"a language that can hold a machine ({able})", "to=c")
     from friso.questions.export.parcel import parcel_of
 
     chosen = inputs.read_stage(stage, overrides, leaves_out=())
@@ -128,5 +138,5 @@ def export(
         inputs.mention_sampling(chosen)
     own_name = name or re.sub(r"[\W_]+", "_", inputs.stem_of(stage)).strip("_")
     correlations = inputs.correlations_of(stage, chosen)
-    parcel, check = parcel_of(chosen, correlations, TARGETS[to], own_name, user_values, progress)
+    parcel, check = parcel_of(chosen, correlations, TARGETS[to], own_name, user_values, machine, progress)
     return ControllerAnswer(parcel, stage=chosen, check=check, to=to)

@@ -48,6 +48,7 @@ def replayed(stage: Stage, flat: Mapping[str, Any], program: Program, samples: i
     assert recorded.outputs is not None
     time = recorded.time
     rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]
+    true, motor = recorded.true["position"][0], recorded.true["position"][0]
     seen: dict[Any, np.ndarray] = {
         REFERENCE: recorded.logged["reference"][0],
         VELOCITY: value(task.form, rows, time - rows[:, 0], 1),
@@ -55,22 +56,27 @@ def replayed(stage: Stage, flat: Mapping[str, Any], program: Program, samples: i
         POSITION: recorded.logged["position"][0],
     }
     if MOTOR_POSITION in program.inputs:
-        side = "motor" if flat["encoder.velocity"] == "motor" else "load"
-        true = recorded.outputs[f"{side}_position"][0]
-        digit = np.float64(flat["drive.encoder_resolution"])
-        with np.errstate(
-            all="ignore"
-        ):  # whole numbers overflow on purpose, and a digit of 0 leaves readings as they are
-            noise = [gaussian(float(SEED + VELOCITY_SEED_OFFSET), float(k)) for k in range(len(time))]
-            noisy = true + flat["drive.encoder_noise"] * np.array(noise)
-            seen[MOTOR_POSITION] = np.array([quantised(one, digit) for one in noisy])
+        motor = recorded.outputs[f"{flat['encoder.velocity']}_position"][0]
+        seen[MOTOR_POSITION] = _read(flat, motor)
     if JERK in program.inputs:
         seen[JERK] = value(task.form, rows, time - rows[:, 0], 3)
     if DIRECTION in program.inputs:
         seen[DIRECTION] = _direction(task, rows)
-    per_newton = flat[str(PER_NEWTON)]
+    place, per_newton = float(task.pieces[0, 1] + task.displacement), flat[str(PER_NEWTON)]
+    force = (float(carrying_force(flat)) + flat["cable.stiffness"] * place) / flat["drive.motor_constant_ratio"]
+    begun_at = {REFERENCE: place, POSITION: float(true[0]), MOTOR_POSITION: float(motor[0])}
+    start = {str(one): begun_at.get(one, 0.0) for one in program.inputs} | {"output": force * per_newton + 0.0}
     inputs = {str(one): seen[one] + 0.0 for one in program.inputs}
-    return Vector(_start(flat, task, program), inputs, recorded.logged["force"][0] * per_newton + 0.0)
+    return Vector(start, inputs, recorded.logged["force"][0] * per_newton + 0.0, true)
+
+
+def _read(flat: Mapping[str, Any], positions: np.ndarray) -> np.ndarray:
+    """Return what the encoder of the velocity reads at positions [m], shape (n,), with its noise and digits."""
+    digit = np.float64(flat["drive.encoder_resolution"])
+    with np.errstate(all="ignore"):  # whole numbers overflow on purpose, and without digits there is a division by 0
+        noise = [gaussian(float(SEED + VELOCITY_SEED_OFFSET), float(k)) for k in range(len(positions))]
+        noisy = positions + flat["drive.encoder_noise"] * np.array(noise)
+        return np.array([quantised(one, digit) for one in noisy])
 
 
 def _direction(task: MoveTask, rows: np.ndarray) -> np.ndarray:
@@ -81,14 +87,3 @@ def _direction(task: MoveTask, rows: np.ndarray) -> np.ndarray:
     rates = rows[:, 2 : degree + 2]
     first = np.argmax(rates != 0, axis=1)
     return np.sign(rates[np.arange(len(rates)), first])
-
-
-def _start(flat: Mapping[str, Any], task: MoveTask, program: Program) -> dict[str, float]:
-    """Return the inputs and the output with which a run begins: at rest, with what constant forces ask for."""
-    place = float(task.pieces[0, 1] + task.displacement)
-    force = (float(carrying_force(flat)) + flat["cable.stiffness"] * place) / flat["drive.motor_constant_ratio"]
-    begin = {str(one): 0.0 for one in program.inputs}
-    begin |= {str(REFERENCE): place, str(POSITION): place}
-    if MOTOR_POSITION in program.inputs:
-        begin[str(MOTOR_POSITION)] = place
-    return {**begin, "output": force * flat[str(PER_NEWTON)] + 0.0}
