@@ -270,7 +270,7 @@ def test_the_system_of_python_control(control: str) -> None:
 def test_biquads_have_the_response_of_the_state_space(control: str) -> None:
     linear = parcel_of(control, "rigid_lugre").linear
     sections = biquads(linear)
-    assert {"reference", "position"} <= sections.keys()
+    assert {"reference_position", "position"} <= sections.keys()
     z = np.exp(1j * np.array([0.01, 0.3, 2.0]))[:, None, None] ** -np.arange(3)
     for name, rows in sections.items():
         upper, lower = ((rows[:, part] * z).sum(axis=-1) for part in (slice(0, 3), slice(3, 6)))
@@ -284,14 +284,14 @@ def test_bumpless_transfer_reset_and_enable() -> None:
     parcel = parcel_of("van_dijk_notch", "rigid_lugre")
     block = block_of(parcel)
     own = block.instance()
-    at_rest = {"reference": 0.1, "position": 0.1}
+    at_rest = {"reference_position": 0.1, "position": 0.1}
     assert block.run(own, Enable=False, Manual=3.0, **at_rest)["output"] == 3.0
     assert not own["active"]
     for _ in range(5):
         assert block.run(own, Enable=True, **at_rest)["output"] == pytest.approx(3.0, abs=1e-9)
     assert own["active"]
     for _ in range(20):
-        block.run(own, reference=0.1001)
+        block.run(own, reference_position=0.1001)
     assert own["output"] > 3.1
     assert block.run(own, Reset=True, Manual=-2.0, **at_rest)["output"] == -2.0
     assert block.run(own, Reset=False)["output"] == pytest.approx(-2.0, abs=1e-9)
@@ -531,8 +531,8 @@ def swing_of(deviation: np.ndarray) -> tuple[float, float]:
 def test_machine_and_controller_in_c_hunt_as_friso_s(tmp_path: Path) -> None:
     """Amplitude and period of a hunting machine, both in C, are those of friso's run as built to 1e-3."""
     parcel = machined("van_dijk_notch", "rigid_lugre", 160_000)
-    ours = closed_loop(tmp_path / "c", parcel) - parcel.vector.inputs["reference"]
-    theirs = parcel.vector.true_position - parcel.vector.inputs["reference"]
+    ours = closed_loop(tmp_path / "c", parcel) - parcel.vector.inputs["reference_position"]
+    theirs = parcel.vector.true_position - parcel.vector.inputs["reference_position"]
     assert swing_of(theirs)[0] > 1e-5
     np.testing.assert_allclose(swing_of(ours), swing_of(theirs), rtol=1e-3)
 
@@ -541,8 +541,8 @@ def test_machine_and_controller_in_c_hunt_as_friso_s(tmp_path: Path) -> None:
 def test_machine_and_controller_in_c_settle_as_friso_s(tmp_path: Path) -> None:
     """On the isolator, both come to rest at the end of the move, within a tenth of a micrometre."""
     parcel = machined("van_dijk_notch", "isolator", 39_000)
-    ours = closed_loop(tmp_path / "c", parcel) - parcel.vector.inputs["reference"]
-    theirs = parcel.vector.true_position - parcel.vector.inputs["reference"]
+    ours = closed_loop(tmp_path / "c", parcel) - parcel.vector.inputs["reference_position"]
+    theirs = parcel.vector.true_position - parcel.vector.inputs["reference_position"]
     for deviation in (ours, theirs):
         assert np.abs(deviation[-2000:]).max() < 1e-7
 

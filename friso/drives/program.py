@@ -32,7 +32,7 @@ OUTPUT, PER_NEWTON = state("output"), key("output.per_newton")
 """Symbols of the output, and of the output per newton of the commanded force."""
 
 REFERENCE, VELOCITY, ACCELERATION, POSITION = INPUTS = tuple(
-    map(state, ("reference", "reference_velocity", "reference_acceleration", "position"))
+    map(state, ("reference_position", "reference_velocity", "reference_acceleration", "position"))
 )
 MOTOR_POSITION, JERK, DIRECTION = EXTRA_INPUTS = tuple(
     map(state, ("motor_position", "reference_jerk", "reference_direction"))
@@ -40,7 +40,7 @@ MOTOR_POSITION, JERK, DIRECTION = EXTRA_INPUTS = tuple(
 """Inputs that only some controllers have."""
 
 MEANINGS: Mapping[sp.Symbol, tuple[str, str]] = {
-    REFERENCE: ("m", "reference"),
+    REFERENCE: ("m", "position of the reference"),
     VELOCITY: ("m/s", "velocity of the reference"),
     ACCELERATION: ("m/s^2", "acceleration of the reference"),
     POSITION: ("m", "measured position"),

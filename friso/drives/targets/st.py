@@ -15,7 +15,7 @@ _WORDS = """abs acos action and any array asin at atan bool by byte case concat 
 date deg delete dint div do dt dword else elsif end_case end_for end_if end_repeat end_struct end_type
 end_var end_while exit exp expt false find for from function function_block if in initial_step insert int
 interface jmp left len limit lint ln log lreal lword max method mid min mod mux namespace not of on or
-override pointer program property public real repeat replace resource ret retain return right rol ror sel
+override pointer program property public real reference repeat replace resource ret retain return right rol ror sel
 shl shr sin sint sqrt step string struct super tan task then this time to tod transition true trunc type
 udint uint ulint until usint using var when while with word wstring xor active dropped enable manual
 output command reset finite"""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from friso.drives.program import (
     ACCELERATION,
@@ -20,9 +21,10 @@ from friso.drives.program import (
     Program,
 )
 from friso.drives.target import Vector
-from friso.engine.simd_math import gaussian, quantised
+from friso.engine.simd_math import gaussian, quantised, sine
 from friso.equations.as_built import VELOCITY_SEED_OFFSET
-from friso.equations.reference import value
+from friso.equations.component import TIME
+from friso.equations.reference import declared
 from friso.equations.structure import carrying_force
 from friso.errors import InputError
 from friso.stage import Stage
@@ -49,19 +51,10 @@ def replayed(stage: Stage, flat: Mapping[str, Any], program: Program, samples: i
     time = recorded.time
     rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]
     true, motor = recorded.true["position"][0], recorded.true["position"][0]
-    seen: dict[Any, np.ndarray] = {
-        REFERENCE: recorded.logged["reference"][0],
-        VELOCITY: value(task.form, rows, time - rows[:, 0], 1),
-        ACCELERATION: value(task.form, rows, time - rows[:, 0], 2),
-        POSITION: recorded.logged["position"][0],
-    }
+    seen: dict[Any, np.ndarray] = {**_reference(task, rows, time), POSITION: recorded.logged["position"][0]}
     if MOTOR_POSITION in program.inputs:
         motor = recorded.outputs[f"{flat['encoder.velocity']}_position"][0]
         seen[MOTOR_POSITION] = _read(flat, motor)
-    if JERK in program.inputs:
-        seen[JERK] = value(task.form, rows, time - rows[:, 0], 3)
-    if DIRECTION in program.inputs:
-        seen[DIRECTION] = _direction(task, rows)
     place, per_newton = float(task.pieces[0, 1] + task.displacement), flat[str(PER_NEWTON)]
     force = (float(carrying_force(flat)) + flat["cable.stiffness"] * place) / flat["drive.motor_constant_ratio"]
     begun_at = {REFERENCE: place, POSITION: float(true[0]), MOTOR_POSITION: float(motor[0])}
@@ -79,11 +72,19 @@ def _read(flat: Mapping[str, Any], positions: np.ndarray) -> np.ndarray:
         return np.array([quantised(one, digit) for one in noisy])
 
 
-def _direction(task: MoveTask, rows: np.ndarray) -> np.ndarray:
-    """Return the direction of the reference in its pieces, `rows`: 1 ahead, -1 back, 0 at rest."""
-    degree = task.form.degree
-    if task.form.tones:
-        return rows[:, degree + 2]
-    rates = rows[:, 2 : degree + 2]
-    first = np.argmax(rates != 0, axis=1)
-    return np.sign(rates[np.arange(len(rates)), first])
+def _reference(task: MoveTask, rows: np.ndarray, time: np.ndarray) -> dict[sp.Symbol, np.ndarray]:
+    """Return the reference and its derivatives at times [s], shape (n,), within its pieces, `rows`, by input.
+
+    They are computed as the engine does, which has a sine of its own.
+    """
+    course = declared(task.form)
+    wanted = {
+        REFERENCE: course.position,
+        VELOCITY: course.velocity,
+        ACCELERATION: course.acceleration,
+        JERK: course.jerk,
+        DIRECTION: course.direction,
+    }
+    computed = sp.lambdify([TIME, *course.inputs], [*wanted.values()], [{"sine": sine}, "numpy"])
+    values = computed(time - rows[:, 0], *rows[:, 1:].T)
+    return {one: np.broadcast_to(value, time.shape) for one, value in zip(wanted, values, strict=True)}
