@@ -25,6 +25,7 @@ from target_stages import CONTROLLERS, EXAMPLES, MACHINES, stage_of
 
 import friso
 from friso.drives.program import Program
+from friso.drives.settings import TargetSettings
 from friso.drives.target import TARGETS, Parcel, Target
 from friso.drives.targets.difference import biquads
 from friso.equations.sampled import Sampled
@@ -41,6 +42,19 @@ TRAPS = {"gcc": "-fsanitize-undefined-trap-on-error", "clang": "-fsanitize-trap=
 COMPILERS = [name for name in TRAPS if shutil.which(name)]
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler (gcc, clang) is installed")
 SHORT, LONG = 1500, 100_000
+SETTINGS: list[dict[str, Any]] = [
+    {"controller.error_deadband": "2 um"},
+    {"controller.integral_deadband": "2 um", "controller.integral_deadband_exit": "5 um"},
+    {"controller.integral_reset": True},
+    {"controller.integral_leak": "0.1 Hz"},
+    {"controller.integral_limit": "1 N"},
+    {"controller.standstill_window": "20 um", "controller.standstill_factor": 2.0},
+    {"controller.stiction_push": "0.5 N", "controller.stiction_push_window": "2 um"},
+    {"controller.dither_amplitude": "1 N", "controller.dither_frequency": "200 Hz"},
+    {"controller.filters": [{"kind": "low_pass", "frequency": "900 Hz", "discretisation": "prewarped"}]},
+    {"drive.integral_discretisation": "forward_euler", "drive.filter_discretisation": "backward_euler"},
+    {"drive.integrator_deadband": "1 um", "drive.integrator_reset": True, "drive.feedforward_coulomb": "1 N"},
+]
 PAIRS = [(control, machine) for control in CONTROLLERS for machine in MACHINES]
 
 
@@ -107,6 +121,42 @@ def test_structured_text_reproduces_the_run(control: str, machine: str) -> None:
 def test_difference_equations_reproduce_the_run(tmp_path: Path, control: str, machine: str) -> None:
     folder = written(tmp_path / "d", "difference", parcel_of(control, machine))
     assert f"{SHORT} samples" in ran(folder, sys.executable, "axis_test.py")
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_settings_against_friction_leave_friso(settings: dict[str, Any]) -> None:
+    """Dead zones, gains at standstill, pushes, dither and the rest are in the code, which is compared with the run."""
+    stage = stage_of("van_dijk_notch", "rigid_lugre").replace(settings)
+    parcel = packed(stage, TARGETS["st"], "axis", {}, SHORT)
+    rows = parcel.vector.table
+    assert np.abs(outputs_in_text(parcel, rows)[:, 0] - np.array(rows)[1:, -1]).max() <= parcel.tolerance
+    assert parcel.program.steps != parcel_of("van_dijk_notch", "rigid_lugre").program.steps
+
+
+def test_every_kind_of_stage_leaves_friso() -> None:
+    """Every controller that the tests know, and every example, is written and reproduces its run in structured text."""
+    from variants import VARIANTS
+
+    stages = {**VARIANTS, **{path.stem: friso.load(path) for path in EXAMPLES.glob("controllers/*.toml")}}
+    count = 0
+    for name, stage in stages.items():
+        if "controller.kind" in stage.flat():
+            parcel = packed(stage, TARGETS["c"], "axis", {}, 300)
+            rows = parcel.vector.table
+            off = np.abs(outputs_in_text(parcel, rows)[:, 0] - np.array(rows)[1:, -1]).max()
+            assert off <= parcel.tolerance, name
+            count += all(TARGETS[target].files(parcel) for target in TARGETS)
+    assert count > 40
+
+
+def test_another_parser_reads_the_structured_text(tmp_path: Path) -> None:
+    """The parser blark, which knows TwinCAT's words, reads function block and program."""
+    parse = pytest.importorskip("blark.parse", reason="blark, a parser of structured text, is not installed")
+    parcel = parcel_of("cascade", "rigid_lugre")
+    with TargetSettings(text_samples=5).in_use():
+        folder = written(tmp_path / "st", "st", parcel)
+    for name in ("FB_axis.st", "FB_axis.TcPOU", "PRG_axis_test.st", "PRG_axis_test.TcPOU"):
+        assert [part.exception for part in parse.parse(folder / name) if part.exception] == []
 
 
 @pytest.mark.parametrize("control", CONTROLLERS)

@@ -16,7 +16,15 @@ import numpy as np
 import sympy as sp
 
 from friso.drives.languages import PYTHON
-from friso.drives.program import PER_NEWTON, Assignment, identifier, in_arithmetic, straight, with_values
+from friso.drives.program import (
+    PER_NEWTON,
+    Assignment,
+    constants_as_numbers,
+    identifier,
+    in_arithmetic,
+    straight,
+    with_values,
+)
 from friso.drives.settings import settings
 from friso.engine.printing import Constants
 from friso.equations.as_built import COMMANDED, PLACES, RATED, TIMES, AsBuilt, as_built
@@ -107,15 +115,15 @@ def machine_of(flat: Mapping[str, Any]) -> Machine:
     if others := [str(one) for one in keys if str(one) not in flat]:
         raise InputError("STAGE", f"equations with {', '.join(others)}", "a machine moved by its actuator alone")
     constants = Constants(keys)
-    parts = {
-        name: Part(*straight([constants.hoist(in_arithmetic(sp.sympify(value))) for value in values], name[0]))
-        for name, values in groups.items()
+    hoisted = {
+        name: [constants.hoist(in_arithmetic(sp.sympify(one))) for one in values] for name, values in groups.items()
     }
-    prepared, ready = straight([in_arithmetic(e) for e in constants.expressions], "p")
+    prepared, names, _ = constants_as_numbers(constants, [])
+    parts = {name: Part(*straight(values, name[0])) for name, values in hoisted.items()}
     return Machine(
         parameters={one: float(flat[str(one)]) for one in keys},
-        constants=[*constants.index],
-        prepared=[*prepared, *zip(constants.index, ready, strict=True)],
+        constants=names,
+        prepared=prepared,
         states=states,
         position=model.stage.position,
         rated=model.clock.seen.get(state(RATED)),

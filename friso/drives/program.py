@@ -225,13 +225,10 @@ def program_of(flat: Mapping[str, Any]) -> Program:
     if missing := [str(one) for one in keys if str(one) not in flat]:
         raise InputError("controller", ", ".join(missing), "equations in keys of the stage and what a drive measures")
     constants = Constants(keys)
-    hoisted = [constants.hoist(in_arithmetic(value)) for value in values]
-    beginning = [constants.hoist(in_arithmetic(value)) for value in started]
-    names = [*constants.index]
-    prepared, ready = straight([in_arithmetic(e) for e in constants.expressions], "p")
-    prepared += zip(names, ready, strict=True)
-    steps, (command, *updates) = straight(hoisted, "w")
-    begins, starts = straight(beginning, "b")
+    hoisted = [constants.hoist(in_arithmetic(value)) for value in (*values, *started)]
+    prepared, names, hoisted = constants_as_numbers(constants, hoisted)
+    steps, (command, *updates) = straight(hoisted[: len(values)], "w")
+    begins, starts = straight(hoisted[len(values) :], "b")
     return Program(
         tuple(inputs),
         {one: float(flat[str(one)]) for one in keys},
@@ -261,6 +258,29 @@ def _discrete(form: AsBuilt, flat: Mapping[str, Any]) -> tuple[list[sp.Symbol], 
         raise InputError("controller.kind", f'"{kind}", of which friso cannot sample: {error}', expected) from None
 
 
+def _is_condition(value: Any) -> bool:
+    """Tell whether a value is true or false; a symbol, which SymPy takes for either, is a number."""
+    return isinstance(value, Boolean) and not isinstance(value, sp.Expr)
+
+
+def constants_as_numbers(
+    constants: Constants, values: list[Any]
+) -> tuple[list[Assignment], list[sp.Symbol], list[Any]]:
+    """Return assignments of constants, their symbols, and the values that contain them.
+
+    A condition on parameters alone is a constant, too; it becomes 1 or 0, and is compared where it stands.
+    """
+    names = [*constants.index]
+    truths = [_is_condition(value) for value in constants.expressions]
+    numbers = [
+        Piecewise((1, value), (0, True)) if truth else in_arithmetic(value)
+        for value, truth in zip(constants.expressions, truths, strict=True)
+    ]
+    compared: dict[Any, Any] = {one: one > sp.S.Half for one, truth in zip(names, truths, strict=True) if truth}
+    prepared, ready = straight(numbers, "p")
+    return [*prepared, *zip(names, ready, strict=True)], names, [with_values(value, compared) for value in values]
+
+
 def in_arithmetic(expression: Any) -> Any:
     """Return an expression in which limits are cases, and the sine of a number of turns is the series of the engine."""
 
@@ -281,7 +301,7 @@ def straight(values: Iterable[Any], letter: str) -> tuple[list[Assignment], list
     conditions: dict[Any, Any] = {}  # languages differ in how they keep a truth value, so none is kept
     for symbol, value in shared:
         whole = value.xreplace(conditions)
-        if isinstance(whole, Boolean):
+        if _is_condition(whole):
             conditions[symbol] = whole
         else:
             writer.assign(symbol, whole)
@@ -358,6 +378,7 @@ def linear_controller(flat: Mapping[str, Any], samples: int = 1) -> LinearContro
         passed: Any = {c: sp.Integer(k % round(flat[name] / flat["drive.sample_time"])) for c, name in counters.items()}
         rows: Any = [with_values(e, passed).doit(deep=False) for e in (*(one.update for one in states), output)]
         along: Sequence[Any] = [*(one.symbol for one in states), *inputs]
+        rows = [in_arithmetic(sp.sympify(row)).replace(floored, sp.floor) for row in rows]
         jacobian = sp.Matrix(rows).jacobian(along).xreplace({DIRECTION: sp.S.Zero, **values})
         whole = np.array(jacobian.evalf(subs={}), dtype=float)
         n = len(states)

@@ -87,7 +87,7 @@ def controller_blocks(answer: ControllerAnswer) -> list[AnswerBlock]:
 
 
 def controller_document(answer: ControllerAnswer) -> dict[str, Any]:
-    """Return the verdict, the sizes, and the texts of the files."""
+    """Return the verdict, the sizes, and the names of the files."""
     parcel = answer.result
     words, fine = verdict_words(answer.check)
     return plain_json(
@@ -101,6 +101,6 @@ def controller_document(answer: ControllerAnswer) -> dict[str, Any]:
             "operations": parcel.program.operations,
             "memories": len(parcel.program.memories),
             "stage_sha256": parcel.digest,
-            "code": dict(answer.target_files),
+            "files": [*answer.target_files],
         }
     )
