@@ -17,6 +17,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import own_controller  # noqa: F401  (registers "pi-d")
 import pytest
 import structured_text
 import sympy as sp
@@ -137,7 +138,9 @@ def test_every_kind_of_stage_leaves_friso() -> None:
     """Every controller that the tests know, and every example, is written and reproduces its run in structured text."""
     from variants import VARIANTS
 
-    stages = {**VARIANTS, **{path.stem: friso.load(path) for path in EXAMPLES.glob("controllers/*.toml")}}
+    own = {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg"}  # of tests/own_controller.py
+    stages = {**VARIANTS, "own": stage_of("adrc", "gms").replace({"controller": own})}
+    stages |= {path.stem: friso.load(path) for path in EXAMPLES.glob("controllers/*.toml")}
     count = 0
     for name, stage in stages.items():
         if "controller.kind" in stage.flat():
