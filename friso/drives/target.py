@@ -72,11 +72,12 @@ class Parcel:
     def tolerance(self) -> float:
         """Return the difference in the output that rounding explains over the test vector, in double precision.
 
-        It is relative to the output, and to what each input contributes at once.
+        It is relative to the output, and some roundings of what each input contributes at once.
         """
         largest = [float(np.abs(self.vector.inputs[name]).max()) for name in self.linear.inputs]
         direct = np.abs([d[0] for *_, d in self.linear.samples]).max(axis=0)
-        return settings.output_rounding * float(np.abs(self.vector.output).max() + direct @ largest)
+        of_inputs = settings.input_roundings * float(np.finfo(float).eps) * float(direct @ largest)
+        return settings.output_rounding * float(np.abs(self.vector.output).max()) + of_inputs
 
     @property
     def single_tolerance(self) -> float:
