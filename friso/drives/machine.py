@@ -22,6 +22,7 @@ from friso.drives.program import (
     constants_as_numbers,
     identifier,
     in_arithmetic,
+    neutral,
     straight,
     with_values,
 )
@@ -94,7 +95,7 @@ def machine_of(flat: Mapping[str, Any]) -> Machine:
     assert model.clock is not None
     acting = state(f"waiting_{form.delay_samples}" if form.delay_samples else COMMANDED)
     plain: dict[Any, Any] = {acting: FORCE, **dict.fromkeys(map(state, PLACES), sp.S.One)}
-    plain |= dict.fromkeys(map(state, TIMES), sp.S.Zero)
+    plain |= dict.fromkeys(map(state, TIMES), sp.S.Zero) | neutral(flat)
     states, switches = model.symbols, model.switches
     kinks = [kink for kink in model.kinks if not isinstance(kink, Switch)]
     rates = [with_values(one, plain) for one in model.rhs]

@@ -181,10 +181,10 @@ def _declared(form: AsBuilt, flat: Mapping[str, Any]) -> tuple[list[sp.Symbol], 
         sp.S.Zero if rated is None else rated - POSITION,
     )
     command, held = controller_as_built(form, loop)
-    neutral = {key(name): sp.sympify(value) for name, value in NEUTRAL.items() if flat[name] == value}
-    output = with_values(command, neutral) * (PER_NEWTON if flat[str(PER_NEWTON)] != 1 else 1)
+    plain = neutral(flat)
+    output = with_values(command, plain) * (PER_NEWTON if flat[str(PER_NEWTON)] != 1 else 1)
     kept = {
-        one.symbol: Held(one.symbol, with_values(one.update, neutral), with_values(one.settled, neutral))
+        one.symbol: Held(one.symbol, with_values(one.update, plain), with_values(one.settled, plain))
         for one in held
     }
     needed: set[Any] = set()
@@ -195,6 +195,11 @@ def _declared(form: AsBuilt, flat: Mapping[str, Any]) -> tuple[list[sp.Symbol], 
     memories = [one for one in kept.values() if one.symbol in needed]
     used = output.free_symbols.union(*(one.update.free_symbols for one in memories))
     return [*INPUTS, *(one for one in EXTRA_INPUTS if one in used)], output, memories
+
+
+def neutral(flat: Mapping[str, Any]) -> dict[sp.Symbol, sp.Expr]:
+    """Return the properties of a drive that are neutral in `flat`, flat keys in SI, with their values."""
+    return {key(name): sp.sympify(value) for name, value in NEUTRAL.items() if flat[name] == value}
 
 
 def with_values(expression: Any, values: Mapping[Any, Any]) -> Any:
