@@ -184,8 +184,7 @@ def _declared(form: AsBuilt, flat: Mapping[str, Any]) -> tuple[list[sp.Symbol], 
     plain = neutral(flat)
     output = with_values(command, plain) * (PER_NEWTON if flat[str(PER_NEWTON)] != 1 else 1)
     kept = {
-        one.symbol: Held(one.symbol, with_values(one.update, plain), with_values(one.settled, plain))
-        for one in held
+        one.symbol: Held(one.symbol, with_values(one.update, plain), with_values(one.settled, plain)) for one in held
     }
     needed: set[Any] = set()
     wanted: set[Any] = output.free_symbols & kept.keys()
