@@ -85,7 +85,7 @@ def test_commands_write_their_files(host: str, axis: Path) -> None:
     assert document["cases"]["given"]["verdict"] in ("hunts", "settles", "bistable", "transient")
     assert {path.name for path in (axis / "Größe").iterdir()} >= {"report.html", ".friso-output"}
     assert Page((axis / "Größe" / "report.html").read_text(encoding="utf-8")).text
-    export = ("export", "gains", "axis.toml", "--out", "run")
+    export = ("export", "axis.toml", "--out", "run")
     for _ in range(2):
         friso(host, axis, *export)
     assert not list(axis.rglob(f"{DRAFTS}*"))

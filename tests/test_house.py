@@ -51,6 +51,7 @@ RECIPES = {
     "log format": "identification/logs",
     "doubt about a log": "identification/doubts",
     "parameter file": "drives/formats",
+    "target": "drives/targets",
 }
 """What CONTRIBUTING.md explains how to add, and the folder for its file."""
 

@@ -48,7 +48,7 @@ NEEDS: dict[str, tuple[object, ...]] = {
     "flexure": (LEAVES,),
     "design": (RIG, EXAMPLES / "specs" / "thesis.toml"),
     "logs": (RIG,),
-    "export": ("gains", RIG),
+    "export": (RIG,),
     "identify": (RIG,),
     "rig": ("stiffness", DRIVE),
     "compare": (DRIVE,),
@@ -112,7 +112,7 @@ def test_an_answer_whose_files_cannot_be_written_is_told(
         raise error
 
     monkeypatch.setattr(Drafts, "put_in_place", full)
-    done = friso_inside(tmp_path, *("export", "gains", RIG, "--json", "--out", "out"))
+    done = friso_inside(tmp_path, *("export", RIG, "--json", "--out", "out"))
     assert (done.returncode, json.loads(done.stdout)["files"]) == (1, [])
     assert f"no file was written: {words}" in " ".join(done.stderr.split())
     assert tree(tmp_path) == {}

@@ -173,7 +173,7 @@ def test_tune(locked: Stage, tmp_path: Path) -> None:
 def test_export(locked: Stage, tmp_path: Path) -> None:
     """The export has the controller's keys with units, its loop as a box, and the limit common to all controllers."""
     save(locked, tmp_path / "stage.toml")
-    document = json.loads(friso_inside(tmp_path, "export", "gains", "stage.toml", "--json").stdout)
+    document = json.loads(friso_inside(tmp_path, "export", "stage.toml", "--json").stdout)
     gains = {row["symbol"]: row["values"] for row in document["gains"]}
     assert gains["bandwidth"][0] == {"value": 6.0, "unit": "Hz"}
     assert gains["bandwidth"][1] == {"value": pytest.approx(12 * np.pi), "unit": "rad/s"}

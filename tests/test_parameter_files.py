@@ -478,15 +478,13 @@ def test_a_pid_as_a_cascade_is_the_same_controller() -> None:
 
 def test_export_writes_page_and_parameters(tmp_path: Path) -> None:
     stage = EXAMPLES / "twincat_cascade.toml"
-    done = friso_inside(
-        tmp_path, "export", "gains", stage, "--to", "odrive", "--set", "travel_per_turn=10 mm", "--out", "out"
-    )
+    done = friso_inside(tmp_path, "export", stage, "--to", "odrive", "--set", "travel_per_turn=10 mm", "--out", "out")
     assert (done.returncode, done.stderr) == (0, "")
     assert "[ kp (1 + 1/(Tn s)) ]" in done.stdout
     assert "controller.filters.1" in done.stdout
     assert "vel_gain" in (tmp_path / "out" / "parameters.txt").read_text()
     assert "[ kp (1 + 1/(Tn s)) ]" in (tmp_path / "out" / "gains.html").read_text("utf-8")
-    document = json.loads(friso_inside(tmp_path, "export", "gains", stage, "--json").stdout)
+    document = json.loads(friso_inside(tmp_path, "export", stage, "--json").stdout)
     assert document["gains"][0]["values"][0] == {"value": 25.0, "unit": "1/s"}
 
 
@@ -620,7 +618,7 @@ def test_what_is_left_out_is_as_many_lines_as_friso_says(tmp_path: Path) -> None
 def test_export_tells_every_coefficient(name: str) -> None:
     """A controller by coefficients has hardly a gain beside them; they are notes as the stage file has them."""
     stage = friso.load(friso.example(f"controllers/{name}"))
-    notes = " ".join(friso.export("gains", stage).to_dict()["notes"])
+    notes = " ".join(friso.export(stage).to_dict()["notes"])
 
     written = {
         key: value
@@ -635,8 +633,8 @@ def test_export_tells_every_coefficient(name: str) -> None:
 def test_export_tells_filters() -> None:
     notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz", "depth": 0.1}
     stage = friso.load(friso.example("thesis_rig"))
-    notes = " ".join(friso.export("gains", stage.replace({"controller.filters": [notch]})).sentences())
+    notes = " ".join(friso.export(stage.replace({"controller.filters": [notch]})).sentences())
     assert 'frequency = "120 Hz"' in notes
-    assert "filters" not in " ".join(friso.export("gains", stage).sentences())
+    assert "filters" not in " ".join(friso.export(stage).sentences())
     by_gains = {"kind": "pid", "kp": "3 N/mm", "kd": "6 N*s/m", "derivative_on": "measurement"}
-    assert 'derivative_on = "measurement"' in str(friso.export("gains", stage.replace({"controller": by_gains})))
+    assert 'derivative_on = "measurement"' in str(friso.export(stage.replace({"controller": by_gains})))

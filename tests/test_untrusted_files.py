@@ -38,7 +38,7 @@ def test_devices_and_pipes_are_refused_at_once(place: str, tmp_path: Path) -> No
         os.mkfifo(file)
     for read in (
         friso.load,
-        lambda path: friso.export("gains", path),
+        lambda path: friso.export(path),
         lambda path: friso.init(tmp_path / "new.toml", from_=path),
     ):
         with pytest.raises(InputError, match="a device or a pipe"):
@@ -181,7 +181,7 @@ def test_gains_beyond_all_drives_are_refused_or_left_out(gains: dict[str, str]) 
     controller = {"kind": "pid", **gains, "derivative_on": "measurement"}
     try:
         stage = friso.load(EXAMPLES / "lugre_stick_slip.toml").replace({"controller": controller})
-        document = friso.export("gains", stage).to_dict()
+        document = friso.export(stage).to_dict()
     except InputError:
         return
     json.dumps(document, allow_nan=False)
@@ -202,8 +202,8 @@ def test_an_argument_of_another_type_is_named(name: str) -> None:
 
 @pytest.mark.parametrize("choice", [np.array([1.0, 2.0]), 3, None, [], b"gains", float("nan")])
 def test_a_choice_of_another_type_is_refused(choice: Any) -> None:
-    asked = [lambda: friso.export(choice, RIG), lambda: friso.example(choice), lambda: friso.schema(choice)]
-    asked += [lambda: friso.export("gains", RIG, to=choice)] if choice is not None else []
+    asked = [lambda: friso.example(choice), lambda: friso.schema(choice)]
+    asked += [lambda: friso.export(RIG, to=choice)] if choice is not None else []
     for ask in asked:
         with refused():
             ask()
@@ -220,12 +220,12 @@ def test_changes_of_another_type_are_refused() -> None:
     array, stage = np.array([1.0, 2.0]), friso.load(RIG)
     for changes in (3.0, True, [float("nan")], [b"x"], array, {3: 4}, "masses.cart=1 kg"):
         with refused("set"):
-            friso.export("gains", RIG, set=changes)  # type: ignore[arg-type]
+            friso.export(RIG, set=changes)  # type: ignore[arg-type]
     for changes in ({"joint": {1: 2}}, {3: 4}, ["masses.stage"], array, "masses.stage"):
         with pytest.raises(InputError):
             stage.replace(changes)  # type: ignore[arg-type]
     with refused("stage"):
-        friso.export("gains", {3: 4})  # type: ignore[dict-item]
+        friso.export({3: 4})  # type: ignore[dict-item]
     with pytest.raises(InputError, match="set="):
         friso.check(RIG, {"masses.cart": "1 kg"})  # type: ignore[arg-type]
     with refused("within"):
@@ -273,7 +273,7 @@ def test_an_answer_to_no_question_is_refused(key: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ['masses.stage="0.6 kg', "masses.stage = '0.6 kg"])
 def test_a_quote_that_is_not_closed_is_shown(text: str) -> None:
     with pytest.raises(InputError) as caught:
-        friso.export("gains", RIG, set=[text])
+        friso.export(RIG, set=[text])
     _, line, caret = caught.value.actual.splitlines()
     assert line[caret.index("^")] in "\"'"
 
@@ -283,7 +283,7 @@ def test_changes_supply_what_a_file_lacks(tmp_path: Path) -> None:
     assert 'model = "lugre"' in text
     (tmp_path / "stage.toml").write_text(text.replace('model = "lugre"', ""), "utf-8")
     with pytest.raises(InputError, match=r"friction\.model"):
-        friso.export("gains", tmp_path / "stage.toml", to="odrive")
+        friso.export(tmp_path / "stage.toml", to="odrive")
     assert stage_of(tmp_path / "stage.toml", {"friction.model": "lugre"}) == friso.load(RIG)
 
 

@@ -86,7 +86,7 @@ def test_what_is_drawn_from_the_schema_is_taken_as_a_whole(caplog: pytest.LogCap
         assert friso.loads(stage.to_toml()) == stage
         for variant in stage.variants().values():
             structure(variant.flat())
-        assert friso.export("gains", stage).document()["gains"]
+        assert friso.export(stage).document()["gains"]
         assert machine_on_page(Machine(stage.to_toml(), "drawn"))["tables"]
         assert own_motion(stage).duration > 0
         assert as_built_keys(stage)["drive.sample_time"] > 0

@@ -30,7 +30,7 @@ MISTAKES = {
     "flexure": (RIG,),
     "design": (RIG, RIG),
     "logs": ("nowhere.csv",),
-    "export": ("gain", RIG),
+    "export": (RIG, "--to", "siemens"),
     "identify": ("nowhere.csv",),
     "rig": ("stifness", DRIVE),
     "compare": (DRIVE, "--machines", "19"),
@@ -52,7 +52,7 @@ RUNS = {
     "boundary": ("boundary", RIG, "--set", "joint.locked=true", "--x", "controller.crossover=9.5 Hz..10 Hz"),
     "flexure": ("flexure", LEAVES, "--out", "out"),
     "rig": ("rig", "stiffness", DRIVE, "--out", "out"),
-    "export": ("export", "gains", RIG, "--out", "out"),
+    "export": ("export", RIG, "--out", "out"),
 }
 
 

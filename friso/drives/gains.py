@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from friso.drives.conversions import MOTOR_CONSTANT, TRAVEL, Conversion, conversions
+from friso.drives.conversions import MOTOR_CONSTANT, TRAVEL, Conversion, Turn, conversions
 from friso.drives.diagram import loop_diagram
 from friso.drives.format import FORMATS, TOLD, ParameterFormat
 from friso.drives.questions import UserAnswers, refuse_open
@@ -58,6 +58,24 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     refuse_open(kind.questions_back(flat, answers), f"--to {to}")
     back = kind.parameters(flat, answers)
     return Gains(stage, loop_diagram(flat), rows, kind, back.values, _not_held(flat, back.held))
+
+
+def output_of(stage: Stage, user_values: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the unit of a controller's output, and the output per newton of its force.
+
+    It is amperes if the motor constant is known, else the unit of a drive's output if the stage has it, else newtons.
+    Raises InputError for an answer that nothing asks for.
+    """
+    for key in user_values:
+        if key not in (TRAVEL, MOTOR_CONSTANT):
+            raise InputError("--set", quoted(key), f"a key of the stage, {TRAVEL} or {MOTOR_CONSTANT}")
+    flat = stage.flat()
+    answers = UserAnswers({**_told(stage, flat), **user_values})
+    if per_ampere := Turn.of(flat, answers, stage.axis_kind.per_ampere).per_ampere:
+        return "A", 1 / per_ampere
+    if of_output := flat.get("drive.force_per_output"):
+        return "output of the drive", 1 / of_output
+    return stage.axis_kind.unit("N"), 1.0
 
 
 def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:

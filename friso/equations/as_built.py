@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from friso.equations.blocks import Loop
-    from friso.equations.component import Kink
+    from friso.equations.component import Held, Kink
     from friso.equations.model import Control, Model
 
 STATIC_FACTOR, COULOMB_FACTOR, MOTOR_FACTOR = PLACES = ("static_factor", "coulomb_factor", "motor_factor")
@@ -180,31 +180,44 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     """
     from dataclasses import replace
 
-    import sympy as sp
+    from friso.equations.component import TICK, gaussian, key, quantised, state
 
-    from friso.equations.cases import Piecewise
-    from friso.equations.component import STEADY, TICK, Held, gaussian, key, quantised, state
-    from friso.equations.sampled import Rest, sampled_controller
-
-    assert form.structure.controller is not None
-    drive = {name.split(".")[1]: key(name) for name in NEUTRAL}
+    drive = {name: key(f"drive.{name}") for name in ("encoder_noise", "encoder_resolution", "seed")}
 
     def read(seen: str, seed: sp.Expr) -> Any:
         noisy = state(seen) + drive["encoder_noise"] * gaussian(seed, TICK)
         return quantised(noisy, drive["encoder_resolution"])
 
-    reading = read("seen", key("drive.seed"))
-    rated = None if loop.rated is None else read(RATED, key("drive.seed") + VELOCITY_SEED_OFFSET)
+    reading = read("seen", drive["seed"])
+    rated = None if loop.rated is None else read(RATED, drive["seed"] + VELOCITY_SEED_OFFSET)
     error = loop.error.xreplace({loop.position: reading})
-    acceleration, speed, before = loop.reference_acceleration, loop.reference_velocity, state("error_before")
-    ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed
+    measured = replace(loop, error=error, position=reading, rated=rated)
+    return reading, *controller_as_built(form, measured, state(INJECTED))
+
+
+def controller_as_built(form: AsBuilt, measured: Loop, injected: Any = 0) -> tuple[sp.Expr, tuple[Held, ...]]:
+    """Return the force [N] that a drive commands at a sample, and the numbers that it keeps until the next.
+
+    `measured` has the readings of the encoders and the reference at the sample. An `injected` force [N] is added before
+    the limit of the force.
+    """
+    import sympy as sp
+
+    from friso.equations.cases import Piecewise
+    from friso.equations.component import STEADY, Held, key, state
+    from friso.equations.sampled import Rest, sampled_controller
+
+    assert form.structure.controller is not None
+    drive = {name.split(".")[1]: key(name) for name in NEUTRAL}
+    error, speed, before = measured.error, measured.reference_velocity, state("error_before")
+    ahead = drive["feedforward_mass"] * measured.reference_acceleration + drive["feedforward_viscous"] * speed
     ahead += drive["feedforward_coulomb"] * Piecewise((1, speed > 0), (-1, speed < 0), (0, True))
     rest = Rest(
         rests=sp.Abs(error) < drive["integrator_deadband"],
         restarts=sp.And(drive["integrator_reset"] > 0, error * before < 0),
     )
-    measured = replace(loop, error=error, position=reading, rated=rated)
-    extra = ahead + state(INJECTED)
-    command, held = sampled_controller(form.structure.controller, measured, form.velocity_samples, extra, rest)
+    command, held = sampled_controller(
+        form.structure.controller, measured, form.velocity_samples, ahead + injected, rest
+    )
     last = Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may not change
-    return reading, command, (*held, Held(before, last, STEADY.error))
+    return command, (*held, Held(before, last, STEADY.error))

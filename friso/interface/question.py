@@ -47,16 +47,16 @@ class Choices:
     rows: Callable[[], Iterable[tuple[str, str]]]
 
     @classmethod
-    def of_registry(cls, title: str, place: str) -> Choices:
-        """Return a list of what a registry holds, with one line on each.
+    def of_registry(cls, title: str, *places: str) -> Choices:
+        """Return a list of what registries hold, with one line on each.
 
-        `place` is the registry's module and its name in it, such as "friso.drives.format:FORMATS".
+        `places` are the registries' modules and their names in them, such as "friso.drives.format:FORMATS".
         """
 
         def rows() -> list[tuple[str, str]]:
-            """List the names in the registry, which is imported now."""
-            registry = resolve_name(place)
-            return [(name, registry.one_line(name)) for name in registry]
+            """List the names in the registries, which are imported now."""
+            registries = [resolve_name(place) for place in places]
+            return [(name, registry.one_line(name)) for registry in registries for name in registry]
 
         return cls(title, rows)
 

@@ -147,7 +147,7 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
         hertz = with_unit(bandwidth(rules.flat()), "Hz")
         LOGGER.warning(
             f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
-            f"controller, with its bandwidth when the joint is locked, {hertz}; friso export gains lists its gains"
+            f"controller, with its bandwidth when the joint is locked, {hertz}; friso export lists its gains"
         )
     if offset := offset_points(stage, spec):
         LOGGER.warning(

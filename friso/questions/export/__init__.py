@@ -1,4 +1,4 @@
-"""What to type into the drive: gains in the units of drives, and as a drive's parameters."""
+"""What to take to the drive: gains in its units, its parameters, or the controller as code."""
 
 from friso.interface.question import STOPS, Choices, Question
 
@@ -6,8 +6,11 @@ QUESTION = Question(
     __name__,
     85,
     STOPS,
-    'export gains examples/twincat_cascade.toml --set travel_per_turn="10 mm"',
-    takes=("what", "stage"),
-    metavars={"what": "gains"},
-    choices=Choices.of_registry("Formats of --to, and of friso init --from", "friso.drives.format:FORMATS"),
+    'export examples/twincat_cascade.toml --set travel_per_turn="10 mm"\n'
+    "The controller in C: friso export examples/twincat_cascade.toml --to c --out axis",
+    choices=Choices.of_registry(
+        "What --to may be; drives also for friso init --from",
+        "friso.drives.format:FORMATS",
+        "friso.drives.target:TARGETS",
+    ),
 )

@@ -68,7 +68,7 @@ def _with_unit(value: tuple[float, str]) -> str:
     return f"{rounded:.10g} {unit}".rstrip()
 
 
-def blocks(gains: Gains) -> list[AnswerBlock]:
+def gain_blocks(gains: Gains) -> list[AnswerBlock]:
     """Return the blocks: what to type in, the loop to which the gains belong, the gains, and a drive's parameters."""
     parameters = [AnswerBlock(title="Parameters", text=gains.text)] if gains.text else []
     return [

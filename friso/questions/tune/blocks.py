@@ -48,7 +48,7 @@ def basis(tuning: Advice) -> str:
 def blocks(tuning: Advice) -> list[AnswerBlock]:
     """Return the blocks: what to change, what that brings, what does not work, and everything behind that."""
     behind = {
-        "The numbers to type in, in the terms of drives (friso export gains)": gain_lines(tuning),
+        "The numbers to type in, in the terms of drives (friso export)": gain_lines(tuning),
         "What matters for the edge of hunting": sensitivity_sentences(tuning),
         "What is assumed, and how machines were drawn": assumptions(tuning),
     }

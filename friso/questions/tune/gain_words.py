@@ -11,7 +11,7 @@ from friso.remedies.verified import RemedyOutcome
 def gain_lines(tuning: Advice) -> list[str]:
     """Return the gains to type in for every remedy that works."""
     return [
-        f'The gains to type in for "{outcome.remedy.name}" are {gains} (friso export gains).'
+        f'The gains to type in for "{outcome.remedy.name}" are {gains} (friso export).'
         for outcome in tuning.working
         if (gains := gains_to_type_in(outcome, tuning))
     ]

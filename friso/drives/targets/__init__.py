@@ -1,0 +1,1 @@
+"""Targets of `friso export`, one file each; the registry finds them by the names of their modules."""
