@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from friso.app.settings import app_settings
 from friso.identification.logs.log import Log
 from friso.interface.answer import Answer
 from friso.shown.drawing.figure import Figure, Panel, Series
@@ -97,10 +98,6 @@ def _named(panel: Panel, label: str, colour: str) -> Panel:
     return replace(panel, series=tuple(lines))
 
 
-BEGUN = 0.01
-"""Share of its range by which a quantity has left its first value when a move has begun."""
-
-
 def with_log(figure: Figure, log: Log, reference: np.ndarray, time: np.ndarray) -> Figure:
     """Lay a logged run over a simulated one, whose `reference` [m] over `time` [s] begins to move at the same instant.
 
@@ -125,5 +122,5 @@ def with_log(figure: Figure, log: Log, reference: np.ndarray, time: np.ndarray) 
 
 def _begin(values: np.ndarray) -> int:
     """Return the index of the last value before a quantity leaves its first value."""
-    away = np.abs(values - values[0]) > BEGUN * np.ptp(values)
+    away = np.abs(values - values[0]) > app_settings.begun * np.ptp(values)
     return max(int(away.argmax()) - 1, 0)

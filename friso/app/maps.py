@@ -10,7 +10,7 @@ from typing import Any
 
 from friso.app.machine import Machine
 from friso.errors import InputError
-from friso.interface.inputs import read_stage, tolerance_of
+from friso.interface.inputs import read_stage
 from friso.progress import Progress, silent
 from friso.questions.map.figures import map_figure
 from friso.questions.map.question import SweepAnswer
@@ -23,9 +23,6 @@ from friso.studies.execute import local_crew
 from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory
 
-RTOL = 1e-6
-"""Relative tolerance of runs, that of `friso.sweep`."""
-
 
 def _studies(stage: Stage, all_axes: Sequence[Mapping[str, Any]], metric: str, log: bool) -> list[Study]:
     """Return a study of each of several sets of axes, which are ranges by key.
@@ -34,8 +31,7 @@ def _studies(stage: Stage, all_axes: Sequence[Mapping[str, Any]], metric: str, l
     """
     chosen = read_stage(stage, None, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
     with local_crew() as crew:
-        studies = [study_for(chosen, Varied({**axes}, log=log), metric, None, crew) for axes in all_axes]
-    return [replace(study, rtol=tolerance_of(RTOL)) for study in studies]
+        return [study_for(chosen, Varied({**axes}, log=log), metric, None, crew) for axes in all_axes]
 
 
 def sketched(stage: Stage, *, metric: str, log: bool, progress: Progress = silent, **axes: str) -> SweepAnswer:

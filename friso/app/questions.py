@@ -20,6 +20,7 @@ from friso.app.kept import KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
 from friso.app.maps import home_of, sketched, tracks_of, without_own
+from friso.app.settings import app_settings
 from friso.app.uploads import Uploads
 from friso.axis import speaking_of
 from friso.equations.motion import rests
@@ -163,11 +164,11 @@ def _other(name: str, asked: PageRequest, work: Work) -> Answer:
 
 def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the run: first its figures, then its sentences, which need measurements of the run."""
+    log = _logged(asked) if asked.options else None
     ghosts = _ghosts(asked, work, friso.simulate)
     stage = asked.machine.stage
     answer, lines = friso.simulate(stage), _lines("simulate", asked)
     others = {name: case for name, case in stage.variants().items() if name not in ("given", _given(stage))}
-    log = _logged(asked) if asked.options.get("files") else None
 
     def drawn(figure: Figure) -> Figure:
         """Lay the other state of the joint, the logged run and the pinned machine beside a run."""
@@ -186,6 +187,8 @@ def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def _logged(asked: PageRequest) -> Log:
     """Return the first of the dropped files as a log of positions."""
+    if unknown := {*asked.options} - {"files", "map", "unit", "scale", "dt"}:
+        raise InputError("options", ", ".join(sorted(unknown)), "files that were dropped, and what is said of them")
     files, assigned = _dropped(asked)
     with _named_as_dropped():
         return read_log(files[0], options_of(**{"dt": None, **assigned}))
@@ -338,20 +341,20 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def tracks(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict at values [SI] along the sliders of keys; none for a stage without a verdict."""
     stage, said = asked.machine.stage, asked.options.get("values")
-    lists = isinstance(said, Mapping) and all(isinstance(column, list) for column in said.values())
-    if not isinstance(said, Mapping) or not lists or any(len(column) > MOST_VALUES for column in said.values()):
-        raise InputError("values", "something else", f"at most {MOST_VALUES} values by key")
+    most, columns = app_settings.most_values, said.values() if isinstance(said, Mapping) else [None]
+    if not all(isinstance(one, list) and len(one) <= most and all(map(_is_number, one)) for one in columns):
+        raise InputError("values", "something else", f"at most {most} values by key")
     fields, sought = numeric_keys(stage.flat()), rests(stage.flat())
     values = {
         key: [exactly(float(value), fields[key].unit) for value in column]
-        for key, column in said.items()
+        for key, column in dict(said or {}).items()
         if sought and key in fields and isinstance(stage.flat().get(key), float)
     }
     yield {"kind": "answer", "tracks": tracks_of(stage, values, work.progress) if values else {}}
 
 
-MOST_VALUES = 40
-"""Largest number of values along the slider of a key."""
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:

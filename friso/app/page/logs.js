@@ -64,7 +64,7 @@ export class Logs {
   }
 
   /** What the run asks for to have the first log laid over it. */
-  told() {
+  laid() {
     return this.files.length ? this.options().options : {};
   }
 

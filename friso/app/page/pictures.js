@@ -137,7 +137,7 @@ export class Pictures {
     if (this.own[this.shown]) return;
     if (!this.plots) this.begin($("picture"));
     if (this.shown === "run") {
-      this.live.ask(this.body(this.own.logs.told()), { version: now(), then });
+      this.live.ask(this.body(this.own.logs.laid()), { version: now(), then });
     } else {
       clearTimeout(this.timer);
       if (dragged && this.shown === "bode") return this.loops.ask(this.body(), { version: now(), then: null });
@@ -156,7 +156,7 @@ export class Pictures {
   async ask() {
     const { shown } = this;
     if (!this.machine || this.own[shown] || this.of.machine.text !== machines.current().text) return; // asked once it is described
-    if (shown === "run") return this.live.ask(this.body(this.own.logs.told()), { version: now(), then: this.then });
+    if (shown === "run") return this.live.ask(this.body(this.own.logs.laid()), { version: now(), then: this.then });
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;
