@@ -886,6 +886,24 @@ def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Serv
     assert served.ask("verdict", RIG, UNSTABLE)[-1]["notes"] == [first["text"]]
 
 
+def test_the_cures_of_a_machine_are_those_of_its_check_and_stop_its_hunting(served: Served) -> None:
+    """A machine that does not hunt has none."""
+    check = served.ask("check", RIG, {"joint.locked": True})[-1]
+    faster, free = check["cures"]
+    assert faster["label"].removeprefix("Raise to ") in " ".join(check["sentences"])
+    assert free["values"] == {"joint.locked": False}
+    raised = {"joint.locked": True, "controller.crossover": f"{faster['values']['controller.crossover']} Hz"}
+    assert served.ask("verdict", RIG, raised)[-1]["verdict"] == "settles"
+    assert served.ask("check", RIG)[-1]["cures"] == []
+
+
+def test_tracks_have_the_verdicts_at_their_values_and_other_values_are_refused(served: Served) -> None:
+    tracks = served.ask("tracks", RIG, {"joint.locked": True}, values={"controller.crossover": [8.0, 12.0]})
+    assert tracks[-1]["tracks"] == {"controller.crossover": ["hunts", "settles"]}
+    for values in ({"controller.crossover": ["8 Hz"]}, [1.0], {"controller.crossover": [1.0] * 100}):
+        assert served.ask("tracks", RIG, {}, values=values)[-1]["kind"] == "refused"
+
+
 def test_a_reference_that_keeps_moving_has_no_verdict(served: Served, tmp_path: Path) -> None:
     """The word of the slider is that of the check; values that nobody knows are said beside it."""
     sine = tmp_path / "sine.toml"
