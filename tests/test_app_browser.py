@@ -246,7 +246,7 @@ def test_what_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None
     page.route("**/ask/run", lambda route: runs.append(route))
     with page.expect_request("**/ask/verdict"):
         with page.expect_request("**/ask/run"):
-            browsed.type("controller.crossover", "11 Hz")
+            browsed.type("controller.crossover", "9 Hz")
         page.wait_for_selector("#picture .figure.old[inert]")
         runs[0].continue_()
         page.wait_for_selector("#picture .figure:not(.old, [inert])")
@@ -273,7 +273,7 @@ document.body.append(place);
 
 def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
     """Plots below the visible part are drawn later, when the machine may have changed."""
-    old = browsed.page.evaluate(
+    other = browsed.page.evaluate(
         """async () => {
             const { look, mark, now } = await import('/shown.js');
             PLACE
@@ -284,10 +284,10 @@ def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(b
             while (due()) await new Promise((then) => setTimeout(then, 10));
             const boxes = [...place.querySelectorAll('.figure')];
             place.remove();
-            return boxes.map((box) => box.classList.contains('old'));
+            return boxes.map((box) => box.classList.contains('other'));
         }""".replace("PLACE", PLACE)
     )
-    assert old == [True, True]
+    assert other == [True, True]
 
 
 def test_plots_that_come_in_parts_stay_in_order_and_go_once_it_is_known_that_they_do(browsed: Browsed) -> None:
