@@ -192,8 +192,8 @@ def verdict(path: Path) -> tuple[str, str]:
     for values, truth in ((position, POSITION), (force, FORCE)):
         off = np.abs(np.interp(TIME, own, values) - truth)[5:-5].max() if right else np.inf
         right = right and bool(off < 2e-3 * np.ptp(truth))
-    told = "; ".join(log.warnings) if log.warnings else ""
-    return (RIGHT, told) if right else (MISREAD, told)
+    said = "; ".join(log.warnings) if log.warnings else ""
+    return (RIGHT, said) if right else (MISREAD, said)
 
 
 def table(folder: Path) -> list[tuple[str, str, str]]:

@@ -86,8 +86,8 @@ def test_gains_are_those_by_hand_and_lead_back(tmp_path: Path, kind: str) -> Non
     flat = friso.loads(read.text()).flat()
     for key, value in BY_HAND[kind].items():
         assert flat[f"controller.{key}"] == pytest.approx(value, rel=1e-9), key
-    told = {key: value for key, value in ANSWERS[kind].items() if "." not in key}
-    back = gains_of(read.stage, told | BACK.get(kind, {}), kind).parameters
+    units = {key: value for key, value in ANSWERS[kind].items() if "." not in key}
+    back = gains_of(read.stage, units | BACK.get(kind, {}), kind).parameters
     assert back is not None
     numbers = [f"{value:.12g}" for value in back.values()]
     text = FORMATS[kind].text(back)
@@ -101,7 +101,7 @@ def test_gains_are_those_by_hand_and_lead_back(tmp_path: Path, kind: str) -> Non
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "word"),
     [
         ("kflop", "rest there"),
         ("moteus", "current"),
@@ -110,9 +110,9 @@ def test_gains_are_those_by_hand_and_lead_back(tmp_path: Path, kind: str) -> Non
         ("acs", "dead zone"),
     ],
 )
-def test_what_a_stage_does_not_take_over_is_told(tmp_path: Path, kind: str, told: str) -> None:
+def test_what_a_stage_does_not_take_over_is_told(tmp_path: Path, kind: str, word: str) -> None:
     read = stage_from(written(tmp_path, kind), "joint_1" if kind == "icub" else None, ANSWERS[kind])
-    assert any(told in sentence for sentence in read.left_out)
+    assert any(word in sentence for sentence in read.left_out)
 
 
 def test_the_velocity_loop_of_an_ecmc_motor_is_in_its_commands(tmp_path: Path) -> None:

@@ -38,15 +38,15 @@ def test_a_heading_in_milliseconds_above_seconds_is_asked_about(tmp_path: Path) 
     assert read_log(write(tmp_path / "right.csv", 1e3 * M["time"], every, "ms")).sample_time == pytest.approx(1e-3)
 
 
-@pytest.mark.parametrize(("lost", "told"), [(11, True), (150, True), (2, False)])
-def test_rows_lost_in_the_middle_are_told_before_anything_is_identified(tmp_path: Path, lost: int, told: bool) -> None:
+@pytest.mark.parametrize(("lost", "said"), [(11, True), (150, True), (2, False)])
+def test_rows_lost_in_the_middle_are_told_before_anything_is_identified(tmp_path: Path, lost: int, said: bool) -> None:
     """Up to three samples are interpolated, which is told otherwise."""
     kept = np.ones(len(M["time"]), bool)
     kept[150 : 150 + lost] = False
     content = log_content(write(tmp_path / "a.csv", M["time"], kept), Mapping())
     lines = [line for line in content.warnings if "missing" in line]
-    assert bool(lines) == told
-    if told:
+    assert bool(lines) == said
+    if said:
         assert float(re.findall(r"time: (\S+) s of", lines[0])[0]) == pytest.approx(lost * 1e-3, rel=0.01)
     else:
         assert any(f"{lost} of" in line for line in content.warnings)

@@ -135,14 +135,14 @@ def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Conta
     flat, intervals = stage.flat(), stage.uncertain()
     contact = _contact_of(stage)
 
-    def known(key: str) -> ContactRange | None:
+    def stated(key: str) -> ContactRange | None:
         """Return the range of a key's value; None if the stage has none, or if nobody knows it."""
         if key in keys or key not in flat:
             return None
         interval = intervals.get(key)
         return (flat[key], flat[key]) if interval is None else (max(interval.low, flat[key] / 10), interval.high)
 
-    coulomb = known("friction.coulomb") or _from_static(known("friction.static"), contact)
+    coulomb = stated("friction.coulomb") or _from_static(stated("friction.static"), contact)
     if coulomb is None:
         return {}
     stiffness = bounds.get("friction.bristle_stiffness", (0.0, math.inf))

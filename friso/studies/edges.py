@@ -155,12 +155,12 @@ class _Search:
 
         It is NaN where a cycle may exist that was not closed, and for a stage that may not be.
         """
-        found = np.full(len(places), np.nan)
+        closed = np.full(len(places), np.nan)
         allowed = np.flatnonzero(self.space.allowed(places))
         if allowed.size:
             cycles = find_cycles(self.space.stages(places[allowed]))
-            found[allowed] = np.where(cycles.uncertain, np.nan, cycles.attracting)
-        return found
+            closed[allowed] = np.where(cycles.uncertain, np.nan, cycles.attracting)
+        return closed
 
     def edge(self, inside: np.ndarray, outside: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the ends of what is left of the ways from places inside to places outside, shape (count, 2).

@@ -73,7 +73,7 @@ class TuneAnswer(Answer):
         from friso.design_method.prepare import check_designable
         from friso.questions.tune.blocks import NOT_SURE, OF_LEAVES, TUNED
 
-        gains = [f"friso export gains {shell_word(str(file))}" for file in files if file.name == TUNED]
+        gains = [f"friso export {shell_word(str(file))}" for file in files if file.name == TUNED]
         try:
             check_designable(self.result.stage)
         except InputError:
