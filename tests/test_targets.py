@@ -27,7 +27,7 @@ from target_stages import CONTROLLERS, EXAMPLES, MACHINES, stage_of
 import friso
 from friso.drives.program import Program
 from friso.drives.settings import TargetSettings
-from friso.drives.target import TARGETS, Parcel, Target
+from friso.drives.target import TARGETS, CodeTarget, Parcel
 from friso.drives.targets.difference import biquads
 from friso.equations.sampled import Sampled
 from friso.errors import InputError
@@ -493,7 +493,7 @@ def test_one_more_target_is_one_declaration(monkeypatch: pytest.MonkeyPatch) -> 
     def files(parcel: Parcel) -> dict[str, str]:
         return {f"{parcel.name}.txt": "\n".join([*parcel.header, str(parcel.program.command)])}
 
-    monkeypatch.setitem(TARGETS.added, "plain", (Target("plain text", files), "Plain text"))
+    monkeypatch.setitem(TARGETS.added, "plain", (CodeTarget("plain text", files), "Plain text"))
     monkeypatch.setattr("friso.questions.export.parcel.checked_stage", lambda stage, *_, **__: check_of("settles"))
     answer = friso.export(stage_of("adrc", "rigid_lugre"), to="plain")
     assert "Verdict: the stage does not hunt" in answer.target_files["stage.txt"]

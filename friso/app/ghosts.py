@@ -122,5 +122,5 @@ def with_log(figure: Figure, log: Log, reference: np.ndarray, time: np.ndarray) 
 
 def _begin(values: np.ndarray) -> int:
     """Return the index of the last value before a quantity leaves its first value."""
-    away = np.abs(values - values[0]) > app_settings.begun * np.ptp(values)
+    away = np.abs(values - values[0]) > app_settings.begun_share * np.ptp(values)
     return max(int(away.argmax()) - 1, 0)

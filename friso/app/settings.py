@@ -11,7 +11,7 @@ from friso.settings import Settings, setting
 class AppSettings(Settings):
     """Settings of what the page computes by itself."""
 
-    begun: float = setting(0.01, "")
+    begun_share: float = setting(0.01, "")
     """Share of its range by which a quantity leaves its first value when a move begins. Noise of a log is smaller."""
 
     most_values: int = setting(40, "")

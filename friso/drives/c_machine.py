@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from friso.drives.languages import c_language, commented
-from friso.drives.machine import FORCE, GAMMA, MachineRun, Part
+from friso.drives.machine import FORCE, GAMMA, MachineRun, StraightCode
 from friso.drives.program import identifier
 from friso.drives.target import Parcel
 from friso.equations.component import STEADY
@@ -249,7 +249,9 @@ def _words(parcel: Parcel, run: MachineRun) -> dict[str, str]:
     start = {str(STEADY.position): "steady_position", str(STEADY.force): "steady_force"}
     rated = machine.position if machine.rated is None else machine.rated
 
-    def body(part: Part, names: Mapping[str, str], targets: Sequence[str], unused: Sequence[str] = ("c", "x")) -> str:
+    def body(
+        part: StraightCode, names: Mapping[str, str], targets: Sequence[str], unused: Sequence[str] = ("c", "x")
+    ) -> str:
         """Write a part as the body of a function that assigns the values to `targets`."""
         own = {str(symbol): identifier(str(symbol)) for symbol, _ in part.steps if str(symbol) not in names}
         written = {**own, **names}
@@ -261,7 +263,7 @@ def _words(parcel: Parcel, run: MachineRun) -> dict[str, str]:
 
     every, values = {**places, **constants}, [f"values[{k}]" for k in range(len(states) + len(modes))]
     along = ("c", "x", "m", "s")
-    prepared = Part(machine.prepared, ())
+    prepared = StraightCode(machine.prepared, ())
     fields = [
         f"    double {identifier(str(one))}; /* [{parcel.units.get(str(one)) or '1'}] {one} */"
         for one in machine.parameters

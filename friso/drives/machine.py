@@ -41,7 +41,7 @@ FORCE = state("actuator_force")
 
 
 @dataclass(frozen=True)
-class Part:
+class StraightCode:
     """Assignments, and then the values that follow from them."""
 
     steps: Sequence[Assignment]
@@ -49,7 +49,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Machine:
+class PlantCode:
     """A machine as a plant of fixed steps.
 
     - `parameters`: keys of the stage file by symbol, in SI; `constants` follow from them by `prepared`.
@@ -68,21 +68,21 @@ class Machine:
     states: Sequence[sp.Symbol]
     position: sp.Symbol
     rated: sp.Symbol | None
-    started: Part
+    started: StraightCode
     kinks: Sequence[sp.Symbol]
-    sides: Part
+    sides: StraightCode
     modes: Sequence[sp.Symbol]
-    mode_starts: Part
-    changes: Part
-    rates: Part
+    mode_starts: StraightCode
+    changes: StraightCode
+    rates: StraightCode
     places: Sequence[tuple[int, int]]
-    jacobian: Part
+    jacobian: StraightCode
     waiting: int
     late: float
     period: float
 
 
-def machine_of(flat: Mapping[str, Any]) -> Machine:
+def machine_of(flat: Mapping[str, Any]) -> PlantCode:
     """Return the machine of a stage with a complete drive, whose keys are in `flat`, in SI.
 
     Raises InputError for what changes along the rail or over time other than by the actuator.
@@ -120,8 +120,8 @@ def machine_of(flat: Mapping[str, Any]) -> Machine:
         name: [constants.hoist(in_arithmetic(sp.sympify(one))) for one in values] for name, values in groups.items()
     }
     prepared, names, _ = constants_as_numbers(constants, [])
-    parts = {name: Part(*straight(values, name[0])) for name, values in hoisted.items()}
-    return Machine(
+    parts = {name: StraightCode(*straight(values, name[0])) for name, values in hoisted.items()}
+    return PlantCode(
         parameters={one: float(flat[str(one)]) for one in keys},
         constants=names,
         prepared=prepared,
@@ -161,7 +161,7 @@ class MachineRun:
     per newton, and `tolerance` [m] the difference that rounding explains.
     """
 
-    machine: Machine
+    machine: PlantCode
     steps: int
     rows: Sequence[tuple[float, float]]
     differences: Mapping[int, float]
@@ -170,7 +170,7 @@ class MachineRun:
 
 
 def machine_run(
-    machine: Machine, flat: Mapping[str, Any], outputs: np.ndarray, positions: np.ndarray, held: float
+    machine: PlantCode, flat: Mapping[str, Any], outputs: np.ndarray, positions: np.ndarray, held: float
 ) -> MachineRun:
     """Return the run of a machine that follows `outputs`, shape (n,), beside friso's own `positions` [m], shape (n,).
 
@@ -194,7 +194,7 @@ def machine_run(
 class Running:
     """A machine that runs in Python, as the code that left friso does."""
 
-    def __init__(self, machine: Machine, position: float, force: float, steps: int) -> None:
+    def __init__(self, machine: PlantCode, position: float, force: float, steps: int) -> None:
         """Begin at rest at a position [m], held by a `force` [N]; a sample has so many `steps`."""
         self.machine, self.steps = machine, steps
         self._scope: dict[str, Any] = {"abs": abs, "exp": exp, "floor": floor, "sqrt": sqrt, "tanh": tanh}
@@ -212,7 +212,7 @@ class Running:
         self.modes = [*self._function(machine.mode_starts, names)(*self.states)]
         self.waiting = [force] * (machine.waiting + 1)
 
-    def _function(self, part: Part, names: Sequence[str]) -> Any:
+    def _function(self, part: StraightCode, names: Sequence[str]) -> Any:
         """Return a function of the named numbers that computes the values of a part."""
         values = ", ".join(PYTHON.expression(value, identifier) for value in part.values)
         lines = [*PYTHON.lines(part.steps, identifier), f"return [{values}]"]

@@ -32,8 +32,10 @@ GAINS = {
 
 @dataclass(frozen=True)
 class PidUnits:
-    """Units of a drive: the `force` of an output of 1 [N or N m], the `length` of a position of 1 [m or rad], and the
-    `time` in which the drive counts [s].
+    """Units of a drive whose output is a force.
+
+    They are the `force` of an output of 1 [N or N m], the `length` of a position of 1 [m or rad], and the `time` in
+    which the drive counts [s].
     """
 
     kind: AxisKind

@@ -14,6 +14,7 @@ from typing import Any
 
 from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, ParameterFormat
 from friso.drives.questions import UserAnswers, moving_mass, refuse_open
+from friso.drives.settings import drive_settings
 from friso.errors import InputError, shortened
 from friso.escapes import one_line
 from friso.platform.paths import flaw_of
@@ -106,13 +107,9 @@ _GAIN = re.compile(rf"(?<![\w.])({_NAME_OF_A_GAIN})[\"' ]{{0,3}}[:=>, \t]{{1,9}}
 
 def _numbers_of(text: str) -> str:
     """Say which numbers of a text look like gains; "" for none."""
-    numbers = dict(_GAIN.findall(text[:MOST_LOOKED_AT]))
-    said = ", ".join(f"{one_line(name)} = {value}" for name, value in [*numbers.items()][:MOST_SAID])
+    numbers = dict(_GAIN.findall(text[: drive_settings.characters_looked_at]))
+    said = ", ".join(f"{one_line(name)} = {value}" for name, value in [*numbers.items()][: drive_settings.gains_said])
     return f", in which {said} may be gains" if said else ""
-
-
-MOST_LOOKED_AT, MOST_SAID = 100_000, 6
-"""Longest part of a file that is looked at for gains, and largest number of them that is said."""
 
 
 def _beside(path: Path, name: str) -> str | None:

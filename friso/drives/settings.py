@@ -56,3 +56,17 @@ class TargetSettings(Settings):
 
 
 settings = TargetSettings.live()
+
+
+@dataclass(frozen=True)
+class DriveFileSettings(Settings):
+    """Settings of reading parameter files of drives."""
+
+    characters_looked_at: int = setting(100_000, "")
+    """Longest part of a file of another kind that is looked at for gains. Parameter files have fewer characters."""
+
+    gains_said: int = setting(6, "")
+    """Largest number of what may be gains that is said of a file of another kind. More fill the screen."""
+
+
+drive_settings = DriveFileSettings.live()

@@ -101,7 +101,7 @@ class Parcel:
 
 
 @dataclass(frozen=True)
-class Target:
+class CodeTarget:
     """A form in which a controller leaves friso.
 
     `files` writes the files by name. `own_names` are names that the form takes for itself, and `ignores_case` tells
@@ -138,4 +138,4 @@ class Target:
         return name.lower() if self.ignores_case else name
 
 
-TARGETS: Registry[Target] = Registry("friso.drives.targets", "TARGET", "friso.targets", Target)
+TARGETS: Registry[CodeTarget] = Registry("friso.drives.targets", "TARGET", "friso.targets", CodeTarget)

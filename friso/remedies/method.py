@@ -125,7 +125,7 @@ class Advice:
     @property
     def recommended(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that are described in full: the two that cost the machine least."""
-        return self.working[: settings.described]
+        return self.working[: settings.described_remedies]
 
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
         """Return the outcome of a remedy's joint when made of leaf springs, or None."""
@@ -442,7 +442,7 @@ class _Session:
 
         The work allowed for searches does not limit this.
         """
-        for one in _working(self.outcomes, self.stage, self.goal)[: settings.described]:
+        for one in _working(self.outcomes, self.stage, self.goal)[: settings.described_remedies]:
             if one.remedy.buys_joint:
                 self._made_of_leaves(one)
 

@@ -33,7 +33,7 @@ class RemedySettings(Settings):
     """Largest bandwidth advised unasked, over the sampling rate. Above it the phase that sampling costs depends on when
     the drive reads and writes, which files seldom tell."""
 
-    described: int = setting(2, "")
+    described_remedies: int = setting(2, "")
     """Remedies that are described in full, the cheapest first. More are a catalogue; the table has all."""
 
     typed_digits: int = setting(4, "")

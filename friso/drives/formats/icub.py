@@ -12,7 +12,7 @@ from math import radians
 from xml.etree import ElementTree
 
 from friso.axis import KINDS, axis_of
-from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
+from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks
 from friso.drives.pid_units import PidUnits, force_of, open_units, open_units_back
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
@@ -20,7 +20,7 @@ from friso.errors import InputError
 GROUP = "POSITION_CONTROL"
 NAMES = {"kp": "kp", "ki": "ki", "kd": "kd", "force_limit": "maxOutput", "integral_limit": "maxInt"}
 PUSHES = ("stictionUp", "stictionDown")
-OUTPUT, PERIOD, ROTARY = "an output of 1 (a unit of PWM)", 1e-3, KINDS["rotary"]
+OUTPUT, LOOP_PERIOD, ROTARY = "an output of 1 (a unit of PWM)", "1 ms", KINDS["rotary"]
 
 
 def recognises(name: str, text: str) -> bool:
@@ -61,7 +61,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
         f"{name} = {axis.number(name):g}, an output at the start of a motion" for name in PUSHES if axis.is_set(name)
     ]
     left.append("a unit of PWM is a voltage: the motor's own damping is that of [friction] viscous")
-    tables = {"axis": {"kind": ROTARY.name}, "controller": table, "drive": {"sample_time": si(PERIOD, "s")}}
+    tables = {"axis": {"kind": ROTARY.name}, "controller": table, "drive": {"sample_time": LOOP_PERIOD}}
     return AsStage(tables, tuple(left))
 
 

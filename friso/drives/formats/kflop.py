@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from friso.axis import LINEAR, axis_of
-from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, si
+from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters
 from friso.drives.pid_units import (
     LENGTH,
     PidUnits,
@@ -23,10 +23,10 @@ from friso.drives.pid_units import (
 )
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
-from friso.quantities import quoted
+from friso.quantities import Quantity, positive, quoted
 
-PERIOD = 90e-6
-"""Period of the servo loop of KFLOP and KOGNA [s]."""
+SERVO_PERIOD = "90 us"
+"""Period of the servo loop of KFLOP and KOGNA."""
 
 NAMES = {"kp": "P", "ki": "I", "kd": "D", "force_limit": "MaxOutput", "integral_limit": "MaxI"}
 OUTPUT, COUNT = "an output of 1", "one count of the encoder"
@@ -69,7 +69,7 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
 def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     """Build controller and drive of an axis. Raises InputError for unusable numbers."""
     kind, count = kind_of_length(answers)
-    units = PidUnits(kind, force_of(answers, kind), count / axis.number("InputGain0", 1.0), PERIOD)
+    units = PidUnits(kind, force_of(answers, kind), count / axis.number("InputGain0", 1.0), _period())
     table = units.table(axis, NAMES)
     if filters := [row for number in range(3) if (row := _biquad(axis, number))]:
         table["filters"] = filters
@@ -81,10 +81,15 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
             f"DeadBandRange = {width:g}: within so many counts the error counts {share:g} times, and friso's results "
             "for swings that small do not hold for this axis"
         )
-    tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": {"sample_time": si(PERIOD, "s")}}
+    tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": {"sample_time": SERVO_PERIOD}}
     if kind != LINEAR:
         tables["axis"] = {"kind": kind.name}
     return AsStage(tables, tuple(left))
+
+
+def _period() -> float:
+    """Return the period of the servo loop [s]."""
+    return float(Quantity("s", positive, SERVO_PERIOD).read(SERVO_PERIOD))
 
 
 def _biquad(axis: AxisParameters, number: int) -> dict[str, Any] | None:
@@ -97,7 +102,7 @@ def _biquad(axis: AxisParameters, number: int) -> dict[str, Any] | None:
         return None
     rows: dict[str, Any] = {side: [value[name] for name in parts] for side, parts in BIQUAD.items()}
     rows["denominator"] = [-part for part in rows["denominator"]]  # the program adds A1 and A2 times earlier outputs
-    return {"kind": "sampled_biquad", **rows, "sample_time": si(PERIOD, "s")}
+    return {"kind": "sampled_biquad", **rows, "sample_time": SERVO_PERIOD}
 
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
@@ -108,7 +113,7 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the parameters of an axis. Raises InputError for a controller other than a PID by its gains."""
     kind = axis_of(flat)
-    return PidUnits(kind, force_of(answers, kind), kind_of_length(answers)[1], PERIOD).parameters(flat, NAMES)
+    return PidUnits(kind, force_of(answers, kind), kind_of_length(answers)[1], _period()).parameters(flat, NAMES)
 
 
 def text(settings: Mapping[str, float]) -> str:

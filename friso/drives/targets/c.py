@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from friso.drives.c_machine import machine_files
 from friso.drives.languages import c_language, commented
 from friso.drives.program import EXTRA_INPUTS, INPUTS, OUTPUT, identifier
-from friso.drives.target import Parcel, Target
+from friso.drives.target import CodeTarget, Parcel
 
 _WORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile
@@ -226,6 +226,6 @@ def _files(parcel: Parcel) -> Mapping[str, str]:
     }
 
 
-TARGET = Target(
+TARGET = CodeTarget(
     "C", _files, frozenset(_WORDS.split()) - {str(one) for one in (*INPUTS, *EXTRA_INPUTS)}, holds_machine=True
 )

@@ -12,7 +12,7 @@ import sympy as sp
 from friso.drives.languages import PYTHON
 from friso.drives.program import OUTPUT, LinearController, identifier
 from friso.drives.settings import settings
-from friso.drives.target import Parcel, Target
+from friso.drives.target import CodeTarget, Parcel
 
 _WORDS = """False None True and as assert async await break class continue def del elif else except finally for from
 global if import in is lambda nonlocal not or pass raise return try while with yield abs sqrt floor exp
@@ -256,4 +256,4 @@ def _files(parcel: Parcel) -> Mapping[str, str]:
     }
 
 
-TARGET = Target("difference equations", _files, frozenset(_WORDS.split()))
+TARGET = CodeTarget("difference equations", _files, frozenset(_WORDS.split()))

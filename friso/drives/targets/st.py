@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from friso.drives.languages import Language, functions
 from friso.drives.program import OUTPUT, identifier
 from friso.drives.settings import settings
-from friso.drives.target import Parcel, Target
+from friso.drives.target import CodeTarget, Parcel
 
 _WORDS = """abs acos action and any array asin at atan bool by byte case concat configuration constant continue cos
 date deg delete dint div do dt dword else elsif end_case end_for end_if end_repeat end_struct end_type
@@ -209,4 +209,4 @@ def _files(parcel: Parcel) -> Mapping[str, str]:
     return files | {f"{parcel.name}_vector.csv": parcel.vector.text()}
 
 
-TARGET = Target("structured text", _files, frozenset(_WORDS.split()), ignores_case=True)
+TARGET = CodeTarget("structured text", _files, frozenset(_WORDS.split()), ignores_case=True)

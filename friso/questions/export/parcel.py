@@ -14,7 +14,7 @@ from friso.drives.gains import output_of
 from friso.drives.machine import machine_of, machine_run
 from friso.drives.program import MEANINGS, OUTPUT, PER_NEWTON, linear_controller, program_of
 from friso.drives.settings import settings
-from friso.drives.target import Parcel, Target
+from friso.drives.target import CodeTarget, Parcel
 from friso.errors import InputError
 from friso.progress import Progress
 from friso.questions.check.question import CheckAnswer, checked_stage
@@ -27,7 +27,7 @@ from friso.virtual_rig.run import as_built_keys
 
 
 def packed(
-    stage: Stage, target: Target, name: str, user_values: Mapping[str, Any], samples: int, plant: bool = False
+    stage: Stage, target: CodeTarget, name: str, user_values: Mapping[str, Any], samples: int, plant: bool = False
 ) -> Parcel:
     """Return a controller with a test of so many samples, and without a header; as a `plant`, with its machine.
 
@@ -68,7 +68,7 @@ def packed(
 def parcel_of(
     stage: Stage,
     correlations: Correlations,
-    target: Target,
+    target: CodeTarget,
     name: str,
     user_values: Mapping[str, Any],
     plant: bool,

@@ -31,9 +31,6 @@ from friso.stage import Stage
 from friso.virtual_rig.run import failures, run_flat
 from friso.virtual_rig.task import MoveTask, own_motion
 
-SEED = 0
-"""Seed of the noise of the encoders, as in `friso simulate`."""
-
 
 def replayed(stage: Stage, flat: Mapping[str, Any], program: Program, samples: int) -> Vector:
     """Return the first samples of a stage's own motion as its drive runs it.
@@ -44,7 +41,7 @@ def replayed(stage: Stage, flat: Mapping[str, Any], program: Program, samples: i
     duration = min(task.duration, samples * period)
     begun = task.pieces[:, 0] < duration
     task = replace(task, pieces=task.pieces[begun], duration=duration)
-    (recorded,) = run_flat({**flat}, stage.floor, task, [SEED], period, outputs=True)
+    (recorded,) = run_flat({**flat}, stage.floor, task, [0], period, outputs=True)
     if failed := failures(recorded):
         raise InputError("STAGE", f"a run as built that fails ({failed[0][1]})", "a stage that friso simulate can run")
     assert recorded.outputs is not None
@@ -67,7 +64,7 @@ def _read(flat: Mapping[str, Any], positions: np.ndarray) -> np.ndarray:
     """Return what the encoder of the velocity reads at positions [m], shape (n,), with its noise and digits."""
     digit = np.float64(flat["drive.encoder_resolution"])
     with np.errstate(all="ignore"):  # whole numbers overflow on purpose, and without digits there is a division by 0
-        noise = [gaussian(float(SEED + VELOCITY_SEED_OFFSET), float(k)) for k in range(len(positions))]
+        noise = [gaussian(float(VELOCITY_SEED_OFFSET), float(k)) for k in range(len(positions))]
         noisy = positions + flat["drive.encoder_noise"] * np.array(noise)
         return np.array([quantised(one, digit) for one in noisy])
 
