@@ -164,7 +164,8 @@ def test_tune(locked: Stage, tmp_path: Path) -> None:
     with patched({method: {"Budget": lambda: tiny, "remedies": lambda *goal: remedies(*goal)[:1]}}):
         document = answer(tmp_path, locked, "tune", "--only", "controller", "--within", "5 um", status=2)
     way = document["ways"]["bandwidth"]
-    assert (way["works"], way["verdict"]) == ("unsure", "settles")
+
+    assert way["works"] == "unsure"
     assert document["as_is"]["verdict"] == "bistable"
     (change,) = way["changes"]
     assert change.startswith(BANDWIDTH)
