@@ -104,6 +104,12 @@ class Signal:
     def __truediv__(self, divisor: Any) -> Signal:
         return self * (1 / sp.sympify(divisor))
 
+    def shared(self, share: Signal) -> Signal:
+        """Multiply a signal by a share, which is constant but for jumps."""
+        rate = None if self.rate is None else share.value * self.rate
+        value, settled = share.value * self.value, share.settled * self.settled
+        return Signal(value, self.scale, settled, share.settled * self.settled_rate, rate)
+
     def __neg__(self) -> Signal:
         return self * -1
 
@@ -160,9 +166,15 @@ class Blocks(ABC):
 
     def __init__(self, form: ControllerForm | None = None) -> None:
         self.form = form
+        self.winding: Any = sp.S.One
+        """Factor that settings against friction put on what integrals take in."""
+        self.paused: Any = sp.S.Zero
+        """Number that is 1 while a deadband pauses integrals."""
 
     nothing = Signal(sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero)
     """A signal that is always 0."""
+    whole = Signal(sp.S.One, sp.S.One, sp.S.One, sp.S.Zero, sp.S.Zero, sp.S.One)
+    """A signal that is always 1."""
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
@@ -234,15 +246,81 @@ class Blocks(ABC):
         """Return the signal clamped to plus and minus a limit; `name` names the clamp."""
 
     @abstractmethod
-    def dead_zone(self, error: Signal) -> Signal:
-        """Return the error reduced by the deadband; it is 0 within the deadband."""
+    def within(self, window: str, error: Signal, resting: Signal) -> Signal:
+        """Return a signal that is 1 while a window against friction acts, and 0 elsewhere.
 
+        `window` is its key. It acts while the error is small, and has been so for its time if it has one, until the
+        error is larger than its exit. It does not act where `resting` is 0 instead of 1.
+        """
+
+    @property
     @abstractmethod
-    def at_standstill(self, total: Signal, error: Signal) -> Signal:
+    def _holding(self) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
+        """Return the symbols of integrals in values and in settled values."""
+
+    def exit_of(self, window: str) -> sp.Symbol:
+        """Return the error [m] at which a window ceases to act: its exit, or itself without one."""
+        return self.key(f"{window}_exit" if f"{window}_exit" in self.settings else window)
+
+    def _inside(self, window: str, error: Signal, direction: Signal) -> Signal:
+        """Return 1 while a window acts, else 0; `direction` is that of the reference: 1, -1 or 0."""
+        at_rest = window == "freeze_window" or "windows_at_rest" in self.settings
+        return self.within(window, error, resting(direction) if at_rest else self.whole)
+
+    def dead_zone(self, error: Signal, direction: Signal) -> Signal:
+        """Return the error behind the dead zone.
+
+        The error is reduced by the deadband, or is 0 within it if the dead zone remembers the past. `direction` is that
+        of the reference: 1, -1 or 0.
+        """
+        band, lost = self.key("error_deadband"), sp.S.One
+        if "error_deadband_gain" in self.settings:
+            lost -= self.key("error_deadband_gain")
+        if self.settings.remembers("error_deadband"):
+            return error.shared(self.whole - self._inside("error_deadband", error, direction) * lost)
+        limited = Piecewise((band, error.settled > band), (-band, error.settled < -band), (error.settled, True))
+        clipped = replace(self.limiter(error, band, "error_deadband"), settled=limited)
+        acts = resting(direction) if "windows_at_rest" in self.settings else self.whole
+        return error - (clipped * lost).shared(acts)
+
+    def at_standstill(self, total: Signal, error: Signal, direction: Signal) -> Signal:
         """Return the force, with the gains for standstill while the error is within their window.
 
-        `total` is the force with the usual gains. The integrals keep the force that they had.
+        `total` is the force with the usual gains. The integrals keep the force that they had. `direction` is that of
+        the reference: 1, -1 or 0.
         """
+        inside, factor = self._inside("standstill_window", error, direction), self.key("standstill_factor")
+        own = "standstill_integral_factor"
+        self.winding *= 1 + ((self.key(own) if own in self.settings else factor) - 1) * inside.value
+        held, settled = (
+            sum((sp.diff(part, x) * x for x in integrals), start=sp.S.Zero)
+            for part, integrals in zip((total.value, total.settled), self._holding, strict=True)
+        )
+        kept = Signal(held, total.scale, settled, sp.S.Zero)
+        return kept + (total - kept).shared(self.whole + inside * (factor - 1))
+
+    def frozen(self, force: Signal, error: Signal, direction: Signal) -> Signal:
+        """Return the force, switched off while the reference rests and the error is within the window.
+
+        Integrals are emptied as the window begins to act. `direction` is that of the reference: 1, -1 or 0.
+        """
+        engaged = 1 - self._inside("freeze_window", error, direction).value
+        self.winding *= engaged
+        return replace(force, value=engaged * force.value, rate=None, before=None)
+
+    def pause_integrals(self, error: Signal, direction: Signal) -> None:
+        """Let integrals pause as settings against friction say; `direction` is that of the reference: 1, -1 or 0."""
+        if "integral_deadband" in self.settings:
+            self.paused = self._inside("integral_deadband", error, direction).value
+        if "integral_rests_in_moves" in self.settings:
+            self.winding *= resting(direction).value
+
+    @property
+    def _losses(self) -> sp.Expr:
+        """Return the rate [1/s] at which settings against friction let integrals decay."""
+        leak = 2 * sp.pi * self.key("integral_leak") if "integral_leak" in self.settings else sp.S.Zero
+        decays = "integral_deadband_decay"
+        return leak + (self.paused / self.key(decays) if decays in self.settings else sp.S.Zero)
 
     @abstractmethod
     def push(self, error: Signal, direction: Signal) -> Signal:
@@ -325,18 +403,27 @@ def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
         position = blocks.fed_back(seen.position)
         rated = position if seen.rated is seen.position else seen.rated
         seen = replace(seen, position=position, rated=rated, error=seen.error + seen.position - position)
-    if settings.dead_zone:
-        seen = replace(seen, error=blocks.dead_zone(seen.error))
+    if "error_deadband" in settings:
+        seen = replace(seen, error=blocks.dead_zone(seen.error, seen.reference_direction))
     shares = form.section.declare(seen, blocks, form.variant)
     total = sum(shares.values(), start=Blocks.nothing)
     added = total
-    if settings.gains:
-        added = blocks.at_standstill(total, error)
-    if settings.push:
+    if form.integral:
+        blocks.pause_integrals(error, seen.reference_direction)
+    if "standstill_window" in settings:
+        added = blocks.at_standstill(total, error, seen.reference_direction)
+    if "stiction_push" in settings:
         added += blocks.push(error, seen.reference_direction)
-    if settings.dither:
+    if "dither_amplitude" in settings:
         added += blocks.dither()
+    if "freeze_window" in settings:
+        added = blocks.frozen(added, error, seen.reference_direction)
     return Demand(shares, total, blocks.fed_forward(added), error)
+
+
+def resting(direction: Signal) -> Signal:
+    """Return 1 while the reference rests and 0 while it moves, from its `direction`: 1, -1 or 0."""
+    return replace(Blocks.whole, value=1 - direction.value**2, settled=1 - direction.settled**2)
 
 
 def force_limit() -> sp.Symbol:

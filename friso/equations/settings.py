@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from math import pi, sqrt
 from typing import Any
 
+import numpy as np
+
 from friso.equations.breakaway import breakaway, sliding
 from friso.equations.continuous import slow_gains
 from friso.errors import InputError
@@ -83,7 +85,12 @@ def gain_states(flat: FlatMachine) -> list[FlatMachine]:
     factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
     if factor is None:
         return [flat]
-    return [flat, {**flat, **{key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}}]
+    own = flat.get(ControllerSection.key("standstill_integral_factor"), factor) / factor
+    inner = {key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}
+    for name, power in controller.integral_gain.items():
+        if (key := controller.key(name)) in flat:
+            inner[key] = inner.get(key, flat[key]) * np.power(own, float(power))
+    return [flat, {**flat, **inner}]
 
 
 def _scaled(scale: float, ends: tuple[float, float]) -> tuple[float, float]:

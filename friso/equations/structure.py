@@ -60,12 +60,11 @@ class ControllerForm:
     @property
     def title(self) -> str:
         """Describe the controller in a few words."""
-        settings = [name for name, present in self.settings._asdict().items() if present]
         words = [
             *(["no integral"] if not self.integral else []),
             *([f"force limit, {self.anti_windup}"] if self.anti_windup else []),
             *(filter.kind for filter in self.filters),
-            *settings,
+            *self.settings.names,
         ]
         return f"{self.kind} ({', '.join(words)})" if words else self.kind
 

@@ -24,6 +24,7 @@ from friso.stage.controllers import (
     FORCE_LIMIT,
     KIND,
     OF_ANY_FORM,
+    WINDOWS,
     ControllerSection,
     controller_of,
 )
@@ -128,11 +129,14 @@ class Stage(Section):
             "an anti-windup time of at least one sample: in a shorter one the integrator overshoots at every sample",
             '[controller] anti_windup_time = "50 ms" with [drive] sample_time = "50 us"',
         ),
-        Rule(
-            ("controller.integral_deadband", "controller.integral_deadband_exit"),
-            lambda f: f.get("controller.integral_deadband_exit", np.inf) >= f.get("controller.integral_deadband", 0.0),
-            "a deadband that is left at a larger error than that at which it is entered",
-            'integral_deadband = "1 um", integral_deadband_exit = "3 um"',
+        *(
+            Rule(
+                (f"controller.{window}", f"controller.{window}_exit"),
+                lambda f, key=f"controller.{window}": f.get(f"{key}_exit", np.inf) >= f.get(key, 0.0),
+                f"a {window.replace('_', ' ')} that is left at a larger error than that at which it is entered",
+                f'{window} = "1 um", {window}_exit = "3 um"',
+            )
+            for window in WINDOWS
         ),
     )
 

@@ -164,7 +164,7 @@ def why_not(form: Structure) -> str:
         return "there is no friction to stick to"
     if form.controller is None or not form.controller.integral:
         return "the controller has no integral action that could wind up"
-    return DITHERS if form.controller.settings.dither else ""
+    return DITHERS if "dither_amplitude" in form.controller.settings else ""
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
