@@ -1,0 +1,157 @@
+"""Compare verdicts on stages with windows against friction with brute force: `python -m benchmarks.windows`.
+
+Stages are drawn: a PID on a rigid mass with LuGre friction, and a window of each kind in turn. Equations written by hand
+(`benchmarks.windows_by_hand`) follow each from many starts for a minute of the stage's time, in fixed steps. A sure
+verdict is wrong if a start swings on although nothing is said to attract, or if all come to rest although hunting is
+sure.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.report import print_table
+from benchmarks.windows_by_hand import trace
+from friso.hunting import hunting
+from friso.stage import Stage, loads
+
+MASS, STEP, LONG = 1.7, 2e-5, 60.0
+"""Moving mass [kg], step [s] and duration [s] of the runs by hand."""
+
+LATE, SWINGS = 20.0, 0.02
+"""Last seconds that are judged, and the swing there, peak to peak over the deflection at break-away, that lasts."""
+
+STARTS = np.geomspace(0.03, 4.0, 8)
+"""Displacements of the starts, in deflections at break-away."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A stage that was drawn, and the kind of its window."""
+
+    kind: str
+    stage: Stage
+
+
+def drawn(number: int, seed: int = 87) -> Drawn:
+    """Return the stage with this number."""
+    rng = np.random.default_rng((seed, number))
+
+    def log(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    static, omega = log(1.0, 6.0), log(15.0, 60.0)
+    kp = MASS * omega**2
+    length = static / kp
+    near = length * log(0.02, 0.8)
+    far, stay = near * log(1.2, 4.0), log(1e-3, 0.1)
+    windows: dict[str, dict[str, Any]] = {
+        "deadband with exit": {"error_deadband": near, "error_deadband_exit": far},
+        "deadband with time": {"error_deadband": near, "error_deadband_exit": far, "error_deadband_time": stay},
+        "deadband with gain": {"error_deadband": near, "error_deadband_gain": log(0.05, 0.8)},
+        "pause and decay": {
+            **{"integral_deadband": near, "integral_deadband_exit": far},
+            **{"integral_deadband_time": stay, "integral_deadband_decay": log(0.05, 1.0)},
+        },
+        "inner gains": {
+            **{"standstill_window": near, "standstill_window_exit": far, "standstill_window_time": stay},
+            **{"standstill_factor": log(0.2, 1.5), "standstill_integral_factor": log(0.1, 3.0)},
+        },
+        "freeze": {"freeze_window": near, "freeze_window_exit": far},
+        "freeze with time": {"freeze_window": near, "freeze_window_exit": far, "freeze_window_time": stay},
+    }
+    kind = [*windows][number % len(windows)]
+    lines = [f"{name} = {_written(name, value)}" for name, value in windows[kind].items()]
+    table = f"""
+[masses]
+stage = "{MASS} kg"
+[friction]
+model = "lugre"
+static = "{static!r} N"
+coulomb = "{static * rng.uniform(0.3, 1.0)!r} N"
+stribeck_velocity = "{log(5e-4, 1e-2)!r} m/s"
+stribeck_exponent = 2
+bristle_stiffness = "1e5 N/m"
+bristle_damping = "300 N*s/m"
+viscous = "{log(0.1, 3.0)!r} N*s/m"
+[controller]
+kind = "pid"
+kp = "{kp!r} N/m"
+ki = "{kp / log(0.1, 0.5)!r} N/(m*s)"
+kd = "{2 * log(0.3, 1.0) * MASS * omega!r} N*s/m"
+derivative_on = "measurement"
+{chr(10).join(lines)}
+[motion]
+kind = "release"
+displacement = "{2 * length!r} m"
+duration = "{LONG} s"
+"""
+    return Drawn(kind, loads(table))
+
+
+def _written(name: str, value: float) -> str:
+    unit = "s" if name.endswith(("time", "decay")) else "m"
+    return repr(value) if name.endswith(("gain", "factor")) else f'"{value!r} {unit}"'
+
+
+def swings(flat: Mapping[str, Any]) -> list[float]:
+    """Return the late swings, peak to peak over the deflection at break-away, of starts that swing on."""
+    length = flat["friction.static"] / flat["controller.kp"]
+    times = np.concatenate([[0.0], np.arange(LONG - LATE, LONG, 2e-3)])
+    lasting = []
+    for displacement in STARTS * length:
+        for relaxed in (0.0, flat["controller.kp"] / flat["controller.ki"]):
+            late = trace(flat, np.array([displacement, 0.0, 0.0, relaxed * displacement]), times, STEP)[1:]
+            swing = float(np.ptp(late)) / length
+            if swing > SWINGS and np.ptp(late[len(late) // 2 :]) > SWINGS * length:
+                lasting.append(swing)
+    return lasting
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What friso says of a drawn stage, and what brute force shows."""
+
+    number: int
+    kind: str
+    sure: bool
+    attracts: bool
+    lasting: int
+
+    @property
+    def wrong(self) -> bool:
+        """Tell whether a sure verdict is refuted."""
+        return self.sure and self.attracts != (self.lasting > 0)
+
+
+def compared(number: int, seed: int = 87) -> Compared:
+    """Compare the verdict on a drawn stage with brute force."""
+    one = drawn(number, seed)
+    said = hunting(one.stage)
+    return Compared(
+        number, one.kind, said.certain, bool(said.attracting or said.observed), len(swings(one.stage.flat()))
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--stages", type=int, default=21)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=87)
+    parser.add_argument("--table", type=Path, help="file that the table is added to")
+    arguments = parser.parse_args()
+    every = []
+    for number in range(arguments.first, arguments.first + arguments.stages):
+        every.append(compared(number, arguments.seed))
+        print(every[-1], "WRONG" if every[-1].wrong else "", flush=True)
+
+
+if __name__ == "__main__":
+    main()
