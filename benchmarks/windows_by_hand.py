@@ -167,7 +167,9 @@ def follow(n, windows, pieces, start, times, step, sample):  # type: ignore[no-u
     return out
 
 
-def trace(flat: Mapping[str, Any], start: np.ndarray, times: np.ndarray, step: float, sample: float = 0.0) -> np.ndarray:
+def trace(
+    flat: Mapping[str, Any], start: np.ndarray, times: np.ndarray, step: float, sample: float = 0.0
+) -> np.ndarray:
     """Return positions [m] of a stage at times [s], from position, velocity, bristle and integral at the first.
 
     `flat` has its keys in SI, with the motion that its reference makes. `sample` [s] is the time of a drive that

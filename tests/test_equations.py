@@ -3,8 +3,8 @@
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
-from inspect import get_annotations
 from functools import cache
+from inspect import get_annotations
 from types import ModuleType
 from typing import Any
 

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from variants import gains, lugre, release, stage, there_and_back
+from variants import gains, lugre, release, stage, there_and_back, van_dijk
 
 import friso
 from benchmarks.windows_by_hand import trace
 from friso.equations import motion
 from friso.hunting import hunting as hunting_of
+from friso.hunting.doubt import HuntingDoubt
 from friso.stage import Stage
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import MoveTask
@@ -39,7 +40,9 @@ MOVE = there_and_back("0.5 s", "0.25 s", "2 m/s^2")
 
 
 def machine(settings: dict[str, Any], how: str = MOVE) -> Stage:
-    plain = stage(how, friction=lugre(2), controller=gains(2000.0, 20000.0, 50.0, extra='derivative_on = "measurement"'))
+    plain = stage(
+        how, friction=lugre(2), controller=gains(2000.0, 20000.0, 50.0, extra='derivative_on = "measurement"')
+    )
     return plain.replace({f"controller.{key}": value for key, value in settings.items()})
 
 
@@ -55,7 +58,9 @@ def test_a_trace_against_equations_by_hand(name: str, how: str) -> None:
 
 @pytest.mark.parametrize("name", WINDOWS)
 def test_each_window_makes_a_difference(name: str) -> None:
-    settled, plain = (friso.simulate(machine(settings), 1e-6, 1e-3)["position"].values for settings in (WINDOWS[name], {}))
+    settled, plain = (
+        friso.simulate(machine(settings), 1e-6, 1e-3)["position"].values for settings in (WINDOWS[name], {})
+    )
     assert np.abs(settled - plain).max() > 2e-5
 
 
@@ -68,3 +73,45 @@ def test_a_drive_against_difference_equations_by_hand(name: str) -> None:
     ours = recorded.true["position"][0]
     theirs = trace(flat, np.zeros(4), np.arange(len(ours)) * 1e-3, 5e-6, sample)
     assert np.abs(ours - theirs).max() < 2e-6
+
+
+@pytest.mark.parametrize(
+    ("settings", "parts"),
+    [
+        ({"freeze_window_exit": "5 um"}, ["freeze_window", "belongs to freeze_window_exit"]),
+        ({"error_deadband_time": "5 ms"}, ["error_deadband", "belongs to error_deadband_time"]),
+        ({"integral_deadband_decay": "5 ms"}, ["integral_deadband", "belongs to integral_deadband_decay"]),
+        ({"freeze_window": "9 um", "freeze_window_exit": "5 um"}, ["left at a larger error"]),
+    ],
+)
+def test_what_is_wrong_is_told(settings: dict[str, Any], parts: list[str]) -> None:
+    with pytest.raises(friso.StageError) as refused:
+        machine(settings)
+    assert all(part in str(refused.value) for part in parts), str(refused.value)
+
+
+def test_an_integral_factor_needs_keys_for_the_integral() -> None:
+    settings = {"standstill_window": "9 um", "standstill_factor": 0.5, "standstill_integral_factor": 0.2}
+    by_rules = stage(MOVE, friction=lugre(2), controller=van_dijk())
+    with pytest.raises(friso.StageError, match="standstill_integral_factor"):
+        by_rules.replace({f"controller.{key}": value for key, value in settings.items()})
+
+
+def test_without_an_integral_a_switched_force_leaves_the_answer_open() -> None:
+    """A dead zone that is left later than it is entered takes force away where it would brake."""
+    plain = machine({"error_deadband": "100 um"}).replace({"controller.ki": "0 N/(m*s)"})
+    switched = plain.replace({"controller.error_deadband_exit": "300 um"})
+    assert hunting_of(plain).certain
+    assert (hunting_of(switched).certain, hunting_of(switched).reason) == (False, HuntingDoubt.SWITCHES)
+
+
+@pytest.mark.parametrize("name", ["deadband with exit", "freeze", "inner gains", "decay"])
+def test_what_is_said_of_hunting_is_what_a_long_run_by_hand_does(name: str) -> None:
+    chosen = machine(WINDOWS[name], release("2 mm", "40 s"))
+    said = hunting_of(chosen)
+    times = np.append(0.0, np.arange(30.0, 40.0, 2e-3))
+    late = trace(chosen.flat(), np.array([2e-3, 0.0, 0.0, 0.0]), times, 2e-5)[1:]
+    swing = np.ptp(late) / 2
+    sizes = [one.amplitude for one in (*said.attracting, *said.observed)]
+    assert said.certain
+    assert min(abs(size / swing - 1) for size in sizes) < 5e-3 if sizes else swing < 1e-7
