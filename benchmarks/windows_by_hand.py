@@ -14,22 +14,23 @@ import numpy as np
 from numba import njit
 
 from friso.equations import motion
+from friso.stage.lists import element_keys
 
 WINDOWS = ("error_deadband", "integral_deadband", "standstill_window", "freeze_window")
 ERROR, INTEGRAL, GAINS, FREEZE = range(len(WINDOWS))
 
 NAMES = (
     *("kp", "ki", "kd", "mass", "static", "coulomb", "v_stribeck", "sigma0", "sigma1", "viscous"),
-    *("reduces", "left", "decay", "in_moves", "factor", "integral_factor", "at_rest"),
+    *("reduces", "left", "decay", "in_moves", "factor", "integral_factor", "at_rest", "moving", "over_speed"),
 )
 """Names of the numbers in the equations, in the order of `_force`."""
 
 
-def by_hand(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of a stage, in the order of `NAMES`, and its windows (4, 3).
+def by_hand(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the numbers of a stage, in the order of `NAMES`, its windows (4, 3), and its schedule of gains (2, n).
 
     `flat` has the stage's keys in SI. A window has the error at which it is entered and left [m], and its time [s]. A
-    window of 0 never acts.
+    window of 0 never acts. The schedule has places and factors.
     """
     key = {name.removeprefix("controller."): value for name, value in flat.items() if name.startswith("controller.")}
     windows = np.zeros((len(WINDOWS), 3))
@@ -50,8 +51,13 @@ def by_hand(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
         "factor": factor,
         "integral_factor": key.get("standstill_integral_factor", factor),
         "at_rest": key.get("windows_at_rest", False),
+        "moving": key.get("moving_factor", 1.0),
+        "over_speed": "schedule_speed.1" in key,
     }
-    return np.array([float(values[name]) for name in NAMES]), windows
+    over = "schedule_speed" if values["over_speed"] else "schedule_error"
+    rows = [[flat[at] for at in element_keys(flat, f"controller.{name}")] for name in (over, "schedule_factor")]
+    schedule = np.array(rows if rows[0] else [[0.0], [1.0]])
+    return np.array([float(values[name]) for name in NAMES]), windows, schedule
 
 
 @njit(cache=True)
@@ -69,7 +75,7 @@ def _pass_on(windows, at_rest, rests, error, dt, inside, clock):  # type: ignore
 
 
 @njit(cache=True)
-def _shares(n, inside, rests, error):  # type: ignore[no-untyped-def]
+def _shares(n, schedule, inside, rests, error, speed):  # type: ignore[no-untyped-def]
     """Return the error that acts, the factor on the gains, and that on what the integral takes in."""
     band = inside[4]
     if n[10] > 0.0:
@@ -78,19 +84,21 @@ def _shares(n, inside, rests, error):  # type: ignore[no-untyped-def]
         acting = error - lost * min(max(error, -band), band)
     else:
         acting = error * (n[11] if inside[0] > 0.0 else 1.0)
-    gains = n[14] if inside[2] > 0.0 else 1.0
-    winds = n[15] if inside[2] > 0.0 else 1.0
+    size = abs(speed) if n[18] > 0.0 else abs(error)
+    gains = np.interp(size, schedule[0], schedule[1]) * (1.0 if rests else n[17])
+    winds = gains * (n[15] if inside[2] > 0.0 else 1.0)
+    gains *= n[14] if inside[2] > 0.0 else 1.0
     if inside[1] > 0.0 or inside[3] > 0.0 or (n[13] == 0.0 and not rests):
         winds = 0.0
     return acting, gains, winds
 
 
 @njit(cache=True)
-def _rates(n, inside, rests, ref, y, held, sampled):  # type: ignore[no-untyped-def]
+def _rates(n, schedule, inside, rests, ref, y, held, sampled):  # type: ignore[no-untyped-def]
     """Return the rates of position, velocity, bristle and integral."""
     x, v, z, i = y
     error = ref - x
-    acting, gains, winds = _shares(n, inside, rests, error)
+    acting, gains, winds = _shares(n, schedule, inside, rests, error, v)
     force = gains * (n[0] * acting - n[2] * v) + n[1] * i
     if inside[3] > 0.0:
         force = 0.0
@@ -104,7 +112,7 @@ def _rates(n, inside, rests, ref, y, held, sampled):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def follow(n, windows, pieces, start, times, step, sample):  # type: ignore[no-untyped-def]
+def follow(n, windows, schedule, pieces, start, times, step, sample):  # type: ignore[no-untyped-def]
     """Return positions [m] at times [s], by steps of about `step` [s].
 
     `pieces`, (n, 4), are start, position, velocity and acceleration of the reference; `start` is position, velocity,
@@ -134,14 +142,15 @@ def follow(n, windows, pieces, start, times, step, sample):  # type: ignore[no-u
                     t = now - p[0]
                     error = p[1] + p[2] * t + 0.5 * p[3] * t * t - y[0]
                     _pass_on(windows, n[16], rests, error, sample, inside, clock)
-                    acting, gains, winds = _shares(n, inside, rests, error)
+                    speed = (y[0] - before) / sample
+                    acting, gains, winds = _shares(n, schedule, inside, rests, error, speed)
                     i = y[3] + sample * winds * acting
                     if inside[1] > 0.0:
                         i /= 1.0 + n[12] * sample
                     if inside[3] > 0.0:
                         i = 0.0
                     y[3] = i
-                    held = gains * (n[0] * acting - n[2] * (y[0] - before) / sample) + n[1] * i
+                    held = gains * (n[0] * acting - n[2] * speed) + n[1] * i
                     if inside[3] > 0.0:
                         held = 0.0
                     before = y[0]
@@ -152,10 +161,10 @@ def follow(n, windows, pieces, start, times, step, sample):  # type: ignore[no-u
             r0 = p[1] + p[2] * t + 0.5 * p[3] * t * t
             r1 = p[1] + p[2] * (t + h / 2) + 0.5 * p[3] * (t + h / 2) ** 2
             r2 = p[1] + p[2] * (t + h) + 0.5 * p[3] * (t + h) ** 2
-            k1 = _rates(n, inside, rests, r0, y, held, sample > 0.0)
-            k2 = _rates(n, inside, rests, r1, y + h / 2 * k1, held, sample > 0.0)
-            k3 = _rates(n, inside, rests, r1, y + h / 2 * k2, held, sample > 0.0)
-            k4 = _rates(n, inside, rests, r2, y + h * k3, held, sample > 0.0)
+            k1 = _rates(n, schedule, inside, rests, r0, y, held, sample > 0.0)
+            k2 = _rates(n, schedule, inside, rests, r1, y + h / 2 * k1, held, sample > 0.0)
+            k3 = _rates(n, schedule, inside, rests, r1, y + h / 2 * k2, held, sample > 0.0)
+            k4 = _rates(n, schedule, inside, rests, r2, y + h * k3, held, sample > 0.0)
             y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             now += h
             if sample == 0.0:
@@ -175,6 +184,6 @@ def trace(
     `flat` has its keys in SI, with the motion that its reference makes. `sample` [s] is the time of a drive that
     computes at samples; 0 stands for continuous time.
     """
-    numbers, windows = by_hand(flat)
+    numbers, windows, schedule = by_hand(flat)
     pieces = np.ascontiguousarray(motion.pieces(flat, 1)[0][:, :4])
-    return follow(numbers, windows, pieces, np.asarray(start, dtype=float), times, step, sample)
+    return follow(numbers, windows, schedule, pieces, np.asarray(start, dtype=float), times, step, sample)

@@ -14,6 +14,7 @@ from variants import gains, lugre, release, stage, there_and_back, van_dijk
 import friso
 from benchmarks.windows_by_hand import trace
 from friso.equations import motion
+from friso.equations.settings import gain_states
 from friso.hunting import hunting as hunting_of
 from friso.hunting.doubt import HuntingDoubt
 from friso.stage import Stage
@@ -33,6 +34,9 @@ WINDOWS: dict[str, dict[str, Any]] = {
     "freeze": {"freeze_window": "300 um"},
     "freeze with all": {"freeze_window": "400 um", "freeze_window_exit": "900 um", "freeze_window_time": "2 ms"},
     "no integral in moves": {"integral_rests_in_moves": True},
+    "schedule over the error": {"schedule_error": ["0 um", "200 um", "600 um"], "schedule_factor": [0.3, 0.5, 1.2]},
+    "schedule over the speed": {"schedule_speed": ["2 mm/s", "10 mm/s"], "schedule_factor": [1, 0.5]},
+    "gains in moves": {"moving_factor": 0.6},
     "at rest": {"standstill_window": "800 um", "standstill_factor": 0.4, "windows_at_rest": True},
 }
 
@@ -81,6 +85,10 @@ def test_a_drive_against_difference_equations_by_hand(name: str) -> None:
         ({"freeze_window_exit": "5 um"}, ["freeze_window", "belongs to freeze_window_exit"]),
         ({"error_deadband_time": "5 ms"}, ["error_deadband", "belongs to error_deadband_time"]),
         ({"integral_deadband_decay": "5 ms"}, ["integral_deadband", "belongs to integral_deadband_decay"]),
+        ({"schedule_error": ["1 um", "2 um"]}, ["schedule_factor"]),
+        ({"schedule_factor": [1, 2]}, ["schedule_error"]),
+        ({"schedule_error": ["2 um", "1 um"], "schedule_factor": [1, 2]}, ["rising"]),
+        ({"schedule_error": ["1 um", "2 um"], "schedule_factor": [1, 2, 3]}, ["as many values"]),
         ({"freeze_window": "9 um", "freeze_window_exit": "5 um"}, ["left at a larger error"]),
     ],
 )
@@ -95,6 +103,23 @@ def test_an_integral_factor_needs_keys_for_the_integral() -> None:
     by_rules = stage(MOVE, friction=lugre(2), controller=van_dijk())
     with pytest.raises(friso.StageError, match="standstill_integral_factor"):
         by_rules.replace({f"controller.{key}": value for key, value in settings.items()})
+
+
+def test_margins_are_of_every_set_of_gains() -> None:
+    settings = {**WINDOWS["inner gains"], **WINDOWS["schedule over the error"], "moving_factor": 0.5}
+    states = gain_states(machine(settings).flat())
+    assert [state["controller.kp"] / 2000.0 for state in states] == pytest.approx(
+        [1.2, 0.6, 0.25, 0.15, 0.5, 0.3, 0.15]
+    )
+    assert states[-1]["controller.ki"] == pytest.approx(20000.0 * 0.3 * 2.0)
+    assert not any("schedule" in key for state in states for key in state)
+
+
+def test_cycles_are_as_stable_as_runs_beside_them_show() -> None:
+    """Deviations are carried through the switches: multipliers of orbits against the growth in runs."""
+    for name in ("deadband with time", "inner gains", "schedule over the error"):
+        cycle = hunting_of(machine(WINDOWS[name], release("2 mm", "40 s"))).cycles[0]
+        assert cycle.multiplier == pytest.approx(cycle.growth, abs=2e-3)
 
 
 def test_without_an_integral_a_switched_force_leaves_the_answer_open() -> None:

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
@@ -17,7 +18,14 @@ import sympy as sp
 from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TIME, Component, Held, key
 from friso.equations.structure import ControllerForm
-from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection, FrictionSettings
+from friso.stage.controllers import (
+    ANTI_WINDUP_TIME,
+    FILTERS_KEY,
+    FORCE_LIMIT,
+    SCHEDULES,
+    ControllerSection,
+    FrictionSettings,
+)
 from friso.stage.filters import FEEDBACK, FORWARD, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
 
@@ -158,6 +166,22 @@ def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
     )
 
 
+@dataclass(frozen=True)
+class Schedule:
+    """A schedule of gains: `factors` at rising `places`, linear between them and constant beyond."""
+
+    places: tuple[sp.Expr, ...]
+    factors: tuple[sp.Expr, ...]
+
+    def at(self, size: sp.Expr) -> sp.Expr:
+        """Return the factor for the size of a signal."""
+        cases: list[Any] = [(self.factors[0], size <= self.places[0])]
+        points = zip(self.places, self.factors, strict=True)
+        for (low, first), (high, last) in pairwise(points):
+            cases.append((first + (last - first) * (size - low) / (high - low), size <= high))
+        return Piecewise(*cases, (self.factors[-1], True))
+
+
 class Blocks(ABC):
     """Building blocks of a controller, such as filters and integrals.
 
@@ -283,21 +307,54 @@ class Blocks(ABC):
         acts = resting(direction) if "windows_at_rest" in self.settings else self.whole
         return error - (clipped * lost).shared(acts)
 
-    def at_standstill(self, total: Signal, error: Signal, direction: Signal) -> Signal:
-        """Return the force, with the gains for standstill while the error is within their window.
+    @abstractmethod
+    def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
+        """Return the factor of a schedule of gains for the size of a signal; `name` names it."""
 
-        `total` is the force with the usual gains. The integrals keep the force that they had. `direction` is that of
-        the reference: 1, -1 or 0.
+    def factors(self, seen: Measured, error: Signal) -> list[tuple[Signal, sp.Expr]]:
+        """Return the factors that settings put on the gains, each with that on what integrals take in.
+
+        The settings are a window for standstill, a factor in moves, and a schedule over the size of the measured error
+        or of the velocity.
         """
-        inside, factor = self._inside("standstill_window", error, direction), self.key("standstill_factor")
-        own = "standstill_integral_factor"
-        self.winding *= 1 + ((self.key(own) if own in self.settings else factor) - 1) * inside.value
+        settings, direction = self.settings, seen.reference_direction
+        factors: list[tuple[Signal, sp.Expr]] = []
+        if "standstill_window" in settings:
+            inside, factor = self._inside("standstill_window", error, direction), self.key("standstill_factor")
+            own = "standstill_integral_factor"
+            integral = self.key(own) if own in settings else factor
+            factors.append((self.whole + inside * (factor - 1), 1 + (integral - 1) * inside.value))
+        if "moving_factor" in settings:
+            factor = self.whole + (self.whole - resting(direction)) * (self.key("moving_factor") - 1)
+            factors.append((factor, factor.value))
+        for name in SCHEDULES:
+            if name in settings:
+                signal = error if name == "schedule_error" else self.derivative(seen.rated, name)
+                factor = self.scheduled(signal, self._schedule(name), name)
+                factors.append((factor, factor.value))
+        return factors
+
+    def _schedule(self, name: str) -> Schedule:
+        """Return the schedule of gains whose places have the key `name`."""
+        numbers = range(1, self.settings.points + 1)
+        return Schedule(
+            *(tuple(self.key(f"{array}.{number}") for number in numbers) for array in (name, "schedule_factor"))
+        )
+
+    def with_gains(self, total: Signal, factors: list[tuple[Signal, sp.Expr]]) -> Signal:
+        """Return the force with factors on the gains; `total` is that without them.
+
+        The integrals keep the force that they had.
+        """
+        gains = self.whole
+        for factor, winding in factors:
+            gains, self.winding = gains.shared(factor), self.winding * winding
         held, settled = (
             sum((sp.diff(part, x) * x for x in integrals), start=sp.S.Zero)
             for part, integrals in zip((total.value, total.settled), self._holding, strict=True)
         )
         kept = Signal(held, total.scale, settled, sp.S.Zero)
-        return kept + (total - kept).shared(self.whole + inside * (factor - 1))
+        return kept + (total - kept).shared(gains)
 
     def frozen(self, force: Signal, error: Signal, direction: Signal) -> Signal:
         """Return the force, switched off while the reference rests and the error is within the window.
@@ -410,8 +467,8 @@ def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
     added = total
     if form.integral:
         blocks.pause_integrals(error, seen.reference_direction)
-    if "standstill_window" in settings:
-        added = blocks.at_standstill(total, error, seen.reference_direction)
+    if factors := blocks.factors(seen, error):
+        added = blocks.with_gains(total, factors)
     if "stiction_push" in settings:
         added += blocks.push(error, seen.reference_direction)
     if "dither_amplitude" in settings:

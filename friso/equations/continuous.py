@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
@@ -13,6 +14,7 @@ from friso.equations.blocks import (
     Controller,
     Demand,
     Loop,
+    Schedule,
     Signal,
     demanded,
     force_limit,
@@ -245,6 +247,21 @@ class Continuous(Blocks):
             self.kinks.append(stays)
         self.kinks.append(inside)
         return replace(self.whole, value=inside.beyond, settled=acting)
+
+    def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
+        """Return the factor of a schedule of gains for the size of a signal.
+
+        At its places, and where the signal changes its sign, are kinks: derivatives jump.
+        """
+        positive = Kink(f"{name}_positive", signal.value)
+        ends = [Kink(f"{name}_{k}", signal.value**2 - place**2) for k, place in enumerate(schedule.places)]
+        self.kinks += [positive, *ends]
+        value, size = schedule.factors[0], positive.sign * signal.value
+        points = zip(ends, schedule.places, schedule.factors, strict=True)
+        for (begin, low, first), (end, high, last) in pairwise(points):
+            reached = begin.beyond * (size + end.beyond * (high - size) - low)
+            value += (last - first) / (high - low) * reached
+        return replace(self.whole, value=value, settled=schedule.at(sp.Abs(signal.settled)))
 
     @property
     def _holding(self) -> tuple[list[sp.Symbol], list[sp.Symbol]]:

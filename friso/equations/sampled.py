@@ -19,6 +19,7 @@ from friso.equations.blocks import (
     Blocks,
     Demand,
     Loop,
+    Schedule,
     Signal,
     demanded,
     force_limit,
@@ -298,6 +299,11 @@ class Sampled(Blocks):
         if window == "freeze_window":
             self.restarts = acts > 0
         return replace(self.whole, value=acts, settled=acting)
+
+    def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
+        """Return the factor of a schedule of gains for the size of a signal at a sample."""
+        value, settled = (schedule.at(sp.Abs(part)) for part in (signal.value, signal.settled))
+        return replace(self.whole, value=value, settled=settled)
 
     @property
     def _holding(self) -> tuple[list[sp.Symbol], list[sp.Symbol]]:

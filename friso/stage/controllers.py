@@ -17,7 +17,7 @@ from pydantic import model_validator
 from friso.errors import StageError
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage.filters import FILTER_ARRAY
-from friso.stage.lists import Rows
+from friso.stage.lists import Rows, Several, Values, element_keys
 from friso.stage.plug_ins import load_own
 from friso.stage.section import Section, SectionClass, UncertainSection, Variants, numeric_fields
 
@@ -69,12 +69,41 @@ class AgainstFriction(UncertainSection):
     """Time that the error has to stay within the window before the force is switched off."""
     windows_at_rest: bool | None = None
     """Whether deadbands and windows act only while the reference rests."""
+    moving_factor: Annotated[float | None, Number(positive, "1.5")] = None
+    """Factor on the gains while the reference moves; integrals keep their force."""
+    schedule_error: Annotated[Values | None, Several(Quantity("m", non_negative, "0 um"), ("2 um", "20 um"), 2, 12)] = (
+        None
+    )
+    """Sizes of the error, in rising order, at which `schedule_factor` multiplies the gains; between them linearly."""
+    schedule_speed: Annotated[
+        Values | None, Several(Quantity("m/s", non_negative, "0 mm/s"), ("1 mm/s", "20 mm/s"), 2, 12)
+    ] = None
+    """Speeds, in rising order, at which `schedule_factor` multiplies the gains, instead of errors."""
+    schedule_factor: Annotated[Values | None, Several(Number(positive, "0.5"), ("0.2", "1"), 2, 12)] = None
     stiction_push: Annotated[Value | None, Quantity("N", positive, "1 N")] = None
     """Force towards the reference while the reference rests and the error exceeds `stiction_push_window`."""
     stiction_push_window: Annotated[Value | None, Quantity("m", non_negative, "2 um")] = None
     dither_amplitude: Annotated[Value | None, Quantity("N", positive, "0.5 N")] = None
     """Amplitude of a sinusoidal force, whose phase is 0 at every corner of the reference."""
     dither_frequency: Annotated[Value | None, Quantity("Hz", positive, "200 Hz")] = None
+
+    @model_validator(mode="after")
+    def _schedule_is_whole(self) -> Self:
+        places = [name for name in SCHEDULES if getattr(self, name) is not None]
+        if len(places) > 1:
+            raise StageError(places[1], "a schedule over the error as well", "one of them", EXAMPLES[places[0]])
+        factors = self.schedule_factor
+        if (factors is None) != (not places):
+            lacking = "schedule_factor" if places else "schedule_error"
+            raise StageError(lacking, "nothing", "as many values as the rest of the schedule", EXAMPLES[lacking])
+        if places and factors is not None:
+            at = [float(value) for value in getattr(self, places[0])]
+            if len(at) != len(factors):
+                expected = f"as many values as {places[0]} has, {len(at)}"
+                raise StageError("schedule_factor", f"{len(factors)} values", expected, EXAMPLES["schedule_factor"])
+            if at != sorted({*at}):
+                raise StageError(places[0], "values in another order", "rising values", EXAMPLES[places[0]])
+        return self
 
     @model_validator(mode="after")
     def _settings_are_whole(self) -> Self:
@@ -106,7 +135,13 @@ WINDOW_OF: Mapping[str, str] = {
 }
 """The key of the window to which another key belongs."""
 
+SCHEDULES = ("schedule_error", "schedule_speed")
+"""Keys of what a schedule of the gains may depend on."""
+
 EXAMPLES = {
+    "schedule_error": 'schedule_error = ["2 um", "20 um"]',
+    "schedule_speed": 'schedule_speed = ["1 mm/s", "20 mm/s"]',
+    "schedule_factor": "schedule_factor = [0.2, 1]",
     "error_deadband": 'error_deadband = "1 um"',
     "integral_deadband": 'integral_deadband = "1 um"',
     "freeze_window": 'freeze_window = "1 um"',
@@ -121,9 +156,10 @@ EXAMPLES = {
 
 @dataclass(frozen=True)
 class FrictionSettings:
-    """Which settings against friction a controller has: the names of their keys."""
+    """Which settings against friction a controller has: the names of their keys, and the points of its schedule."""
 
     names: tuple[str, ...] = ()
+    points: int = 0
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
@@ -139,7 +175,7 @@ class FrictionSettings:
     @property
     def bends(self) -> bool:
         """Tell whether the controller acts otherwise near the reference than far from it."""
-        return "stiction_push" in self or any(window in self for window in WINDOWS)
+        return any(name in self for name in ("stiction_push", *SCHEDULES, *WINDOWS))
 
     @property
     def swings_alone(self) -> bool:
@@ -162,8 +198,10 @@ NO_SETTINGS = FrictionSettings()
 def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
     """Return which settings against friction a stage's controller has; `flat` has its keys."""
     names = (name for name in get_annotations(AgainstFriction) if name != "kind")
-    values = ((name, flat.get(f"{CONTROLLER}.{name}")) for name in names)
-    return FrictionSettings(tuple(name for name, value in values if value is not None and value is not False))
+    points = {name: len(element_keys(flat, f"{CONTROLLER}.{name}")) for name in SCHEDULES}
+    values = ((name, flat.get(f"{CONTROLLER}.{name}", points.get(name, 0) > 0)) for name in names)
+    present = tuple(name for name, value in values if value is not None and value is not False)
+    return FrictionSettings(present, sum(points.values()))
 
 
 def dead_band(flat: Mapping[str, Any]) -> Any:
