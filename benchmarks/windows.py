@@ -3,7 +3,7 @@
 Stages are drawn: a PID on a rigid mass with LuGre friction, and a window of each kind in turn. Equations by hand
 (`benchmarks.windows_by_hand`) follow each from many starts for 40 s of the stage's time, in fixed steps. A sure
 verdict is wrong if a start swings on although nothing is said to attract, or if all come to rest although hunting is
-sure.
+sure. A sure edge in bandwidth is wrong if no start swings on a tenth below it, or one does a tenth above.
 """
 
 from __future__ import annotations
@@ -11,13 +11,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.windows_by_hand import trace
+from friso.equations.bandwidth import faster
 from friso.hunting import hunting
+from friso.hunting.margin import search_bandwidths
 from friso.stage import Stage, loads
 
 MASS, STEP, LONG = 1.7, 2e-5, 40.0
@@ -62,6 +65,7 @@ def drawn(number: int, seed: int = 87) -> Drawn:
             **{"standstill_window": near, "standstill_window_exit": far, "standstill_window_time": stay},
             **{"standstill_factor": log(0.2, 1.5), "standstill_integral_factor": log(0.1, 3.0)},
         },
+        "schedule": {"schedule_error": [near, far], "schedule_factor": [log(0.1, 0.9), log(0.8, 1.3)]},
         "freeze": {"freeze_window": near, "freeze_window_exit": far},
         "freeze with time": {"freeze_window": near, "freeze_window_exit": far, "freeze_window_time": stay},
     }
@@ -94,7 +98,9 @@ duration = "{LONG} s"
     return Drawn(kind, loads(table))
 
 
-def _written(name: str, value: float) -> str:
+def _written(name: str, value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(_written(name, one) for one in value)}]"
     unit = "s" if name.endswith(("time", "decay")) else "m"
     return repr(value) if name.endswith(("gain", "factor")) else f'"{value!r} {unit}"'
 
@@ -115,13 +121,17 @@ def swings(flat: Mapping[str, Any]) -> list[float]:
 
 @dataclass(frozen=True)
 class Compared:
-    """What friso says of a drawn stage, and what brute force shows."""
+    """What friso says of a drawn stage, and what brute force shows.
+
+    `lasting` starts swing on. `edge` tells whether a sure edge is right (None: there is none).
+    """
 
     number: int
     kind: str
     sure: bool
     attracts: bool
     lasting: int
+    edge: bool | None = None
 
     @property
     def wrong(self) -> bool:
@@ -130,25 +140,50 @@ class Compared:
 
 
 def compared(number: int, seed: int = 87) -> Compared:
-    """Compare the verdict on a drawn stage with brute force."""
-    one = drawn(number, seed)
+    """Compare the verdict on a drawn stage, and its edge in bandwidth if it hunts, with brute force."""
+    one, edge = drawn(number, seed), None
     said = hunting(one.stage)
-    return Compared(
-        number, one.kind, said.certain, bool(said.attracting or said.observed), len(swings(one.stage.flat()))
-    )
+    attracts, lasting = bool(said.attracting or said.observed), len(swings(one.stage.flat()))
+    margin = search_bandwidths(one.stage, True).margin if attracts else None
+    if margin and margin.certain:
+        below, above = (faster(one.stage.flat(), factor) for factor in (0.9 * margin.factor, 1.1 * margin.quiet))
+        edge = bool(swings(below)) and not swings(above)
+    return Compared(number, one.kind, said.certain, attracts, lasting, edge)
+
+
+def table(every: list[Compared], seed: int) -> str:
+    """Return a page with the comparison, by kind of window."""
+    rows = []
+    for kind in [*dict.fromkeys(one.kind for one in every), "all"]:
+        of = [one for one in every if kind in (one.kind, "all")]
+        edges = [one.edge for one in of if one.edge is not None]
+        numbers = (len(of), sum(one.sure for one in of), sum(one.lasting > 0 for one in of), sum(o.wrong for o in of))
+        rows.append(f"| {kind} | {' | '.join(map(str, (*numbers, len(edges), edges.count(False))))} |")
+    return f"""# Windows against friction, by brute force
+
+Written by `python -m benchmarks.windows --table docs/evidence/windows.md` on {date.today():%d %B %Y}; seed {seed}. Each
+drawn stage is followed from {2 * len(STARTS)} starts for {LONG:g} s in steps of {STEP * 1e6:g} us by equations written
+by hand; a stage that hunts also {0.1:.0%} below and above its edge in bandwidth.
+
+| window | stages | sure | hunt | sure and wrong | sure edges | of these wrong |
+|---|---|---|---|---|---|---|
+{chr(10).join(rows)}
+"""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--stages", type=int, default=21)
+    parser.add_argument("--stages", type=int, default=24)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=87)
-    parser.add_argument("--table", type=Path, help="file that the table is added to")
+    parser.add_argument("--table", type=Path, help="file that the table is written to")
     arguments = parser.parse_args()
     every = []
     for number in range(arguments.first, arguments.first + arguments.stages):
         every.append(compared(number, arguments.seed))
-        print(every[-1], "WRONG" if every[-1].wrong else "", flush=True)
+        print(every[-1], "WRONG" if every[-1].wrong or every[-1].edge is False else "", flush=True)
+    if arguments.table:
+        arguments.table.write_text(table(every, arguments.seed))
 
 
 if __name__ == "__main__":
