@@ -108,7 +108,13 @@ def _rates(n, schedule, inside, rests, ref, y, held, sampled):  # type: ignore[n
     z_rate = v - n[7] * abs(v) / level * z
     drag = n[7] * z + n[8] * z_rate + n[9] * v
     decay = n[12] * i if inside[1] > 0.0 and not sampled else 0.0
-    return np.array([v, (force - drag) / n[3], z_rate, winds * acting - decay])
+    return v, (force - drag) / n[3], z_rate, winds * acting - decay
+
+
+@njit(cache=True)
+def _moved(y, h, k):  # type: ignore[no-untyped-def]
+    """Return the state after a time `h` [s] at the rates `k`."""
+    return y[0] + h * k[0], y[1] + h * k[1], y[2] + h * k[2], y[3] + h * k[3]
 
 
 @njit(cache=True)
@@ -118,7 +124,8 @@ def follow(n, windows, schedule, pieces, start, times, step, sample):  # type: i
     `pieces`, (n, 4), are start, position, velocity and acceleration of the reference; `start` is position, velocity,
     bristle and integral. With a `sample` time [s] above 0, a drive computes the force at samples and holds it.
     """
-    out, y, now = np.empty(len(times)), start.copy(), times[0]
+    out, now = np.empty(len(times)), times[0]
+    y = (start[0], start[1], start[2], start[3])
     inside, clock = np.zeros(5), np.zeros(4)
     inside[4] = windows[0, 0]
     piece, ticks, held, before, begun = 0, 0, 0.0, start[0], False
@@ -149,7 +156,7 @@ def follow(n, windows, schedule, pieces, start, times, step, sample):  # type: i
                         i /= 1.0 + n[12] * sample
                     if inside[3] > 0.0:
                         i = 0.0
-                    y[3] = i
+                    y = (y[0], y[1], y[2], i)
                     held = gains * (n[0] * acting - n[2] * speed) + n[1] * i
                     if inside[3] > 0.0:
                         held = 0.0
@@ -162,16 +169,16 @@ def follow(n, windows, schedule, pieces, start, times, step, sample):  # type: i
             r1 = p[1] + p[2] * (t + h / 2) + 0.5 * p[3] * (t + h / 2) ** 2
             r2 = p[1] + p[2] * (t + h) + 0.5 * p[3] * (t + h) ** 2
             k1 = _rates(n, schedule, inside, rests, r0, y, held, sample > 0.0)
-            k2 = _rates(n, schedule, inside, rests, r1, y + h / 2 * k1, held, sample > 0.0)
-            k3 = _rates(n, schedule, inside, rests, r1, y + h / 2 * k2, held, sample > 0.0)
-            k4 = _rates(n, schedule, inside, rests, r2, y + h * k3, held, sample > 0.0)
-            y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            k2 = _rates(n, schedule, inside, rests, r1, _moved(y, h / 2, k1), held, sample > 0.0)
+            k3 = _rates(n, schedule, inside, rests, r1, _moved(y, h / 2, k2), held, sample > 0.0)
+            k4 = _rates(n, schedule, inside, rests, r2, _moved(y, h, k3), held, sample > 0.0)
+            y = _moved(_moved(_moved(_moved(y, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4)
             now += h
             if sample == 0.0:
                 froze = inside[3]
                 _pass_on(windows, n[16], rests, r2 - y[0], h, inside, clock)
                 if inside[3] != froze:
-                    y[3] = 0.0
+                    y = (y[0], y[1], y[2], 0.0)
         out[number] = y[0]
     return out
 

@@ -56,6 +56,7 @@ from friso.stage.tables import (
     Joint,
     Masses,
     Parasitic,
+    PositionTolerance,
     StatedMoves,
     Transmission,
     friction_law,
@@ -111,6 +112,7 @@ class Stage(Section):
     cable: Annotated[Cable | None, Table('[cable] stiffness = "50 N/m"')] = None
     floor: Annotated[Floor | None, Table('[floor] frequency = ["1 Hz", "100 Hz"] ...')] = None
     motion: Annotated[Motion, Table('[motion] kind = "step", size = "1 mm", duration = "20 s"', MOTION)]
+    tolerance: Annotated[PositionTolerance | None, Table('[tolerance] within = "5 um"')] = None
     moves: Annotated[StatedMoves | None, Table('[moves] smallest = "10 um", largest = "32 mm"')] = None
 
     rules: ClassVar[tuple[Rule, ...]] = (

@@ -244,6 +244,12 @@ TIME_ROUNDING = 1e-12
 """Relative tolerance for limits on times, which are sums of decimal numbers."""
 
 
+class PositionTolerance(UncertainSection):
+    """The deviation from its reference within which the stage counts as in position."""
+
+    within: Annotated[Value, Quantity("m", positive, "5 um")]
+
+
 class StatedMoves(Section):
     """The machine's moves, uniform in the logarithm: friso tune draws one per machine.
 
