@@ -9,7 +9,7 @@ sure. A sure edge in bandwidth is wrong if no start swings on a tenth below it, 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.windows_by_hand import trace
+from benchmarks.windows_by_hand import relaxed, trace
 from friso.equations.bandwidth import faster
-from friso.hunting import hunting
+from friso.hunting import Hunting, hunting
 from friso.hunting.margin import search_bandwidths
 from friso.stage import Stage, loads
 
@@ -105,18 +105,27 @@ def _written(name: str, value: Any) -> str:
     return repr(value) if name.endswith(("gain", "factor")) else f'"{value!r} {unit}"'
 
 
-def swings(flat: Mapping[str, Any]) -> list[float]:
-    """Return the late swings, peak to peak over the deflection at break-away, of starts that swing on."""
+def swings(flat: Mapping[str, Any], claimed: Sequence[float] = ()) -> list[float]:
+    """Return the late swings, peak to peak over the deflection at break-away, of starts that swing on.
+
+    Stages start displaced, also by the `claimed` distances [m] at which a cycle is said to stick, with an empty
+    integral and with one that takes all force away.
+    """
     length = flat["friction.static"] / flat["controller.kp"]
     times = np.concatenate([[0.0], np.arange(LONG - LATE, LONG, 2e-3)])
     lasting = []
-    for displacement in STARTS * length:
-        for relaxed in (0.0, flat["controller.kp"] / flat["controller.ki"]):
-            late = trace(flat, np.array([displacement, 0.0, 0.0, relaxed * displacement]), times, STEP)[1:]
+    for displacement in (*(STARTS * length), *claimed):
+        for integral in (0.0, relaxed(flat, displacement)):
+            late = trace(flat, np.array([displacement, 0.0, 0.0, integral]), times, STEP)[1:]
             swing = float(np.ptp(late)) / length
             if swing > SWINGS and np.ptp(late[len(late) // 2 :]) > SWINGS * length:
                 lasting.append(swing)
     return lasting
+
+
+def sticking(said: Hunting) -> list[float]:
+    """Return the distances [m] at which the cycles that are said to attract stick."""
+    return [abs(float(cycle.signals["error"][1][0])) for cycle in said.attracting]
 
 
 @dataclass(frozen=True)
@@ -143,11 +152,14 @@ def compared(number: int, seed: int = 87) -> Compared:
     """Compare the verdict on a drawn stage, and its edge in bandwidth if it hunts, with brute force."""
     one, edge = drawn(number, seed), None
     said = hunting(one.stage)
-    attracts, lasting = bool(said.attracting or said.observed), len(swings(one.stage.flat()))
+    attracts, lasting = bool(said.attracting or said.observed), len(swings(one.stage.flat(), sticking(said)))
     margin = search_bandwidths(one.stage, True).margin if attracts else None
     if margin and margin.certain:
         below, above = (faster(one.stage.flat(), factor) for factor in (0.9 * margin.factor, 1.1 * margin.quiet))
-        edge = bool(swings(below)) and not swings(above)
+        slower = one.stage.with_numbers(
+            {key: below[key] for key in ("controller.kp", "controller.ki", "controller.kd")}
+        )
+        edge = bool(swings(below, sticking(hunting(slower)))) and not swings(above)
     return Compared(number, one.kind, said.certain, attracts, lasting, edge)
 
 
@@ -162,8 +174,9 @@ def table(every: list[Compared], seed: int) -> str:
     return f"""# Windows against friction, by brute force
 
 Written by `python -m benchmarks.windows --table docs/evidence/windows.md` on {date.today():%d %B %Y}; seed {seed}. Each
-drawn stage is followed from {2 * len(STARTS)} starts for {LONG:g} s in steps of {STEP * 1e6:g} us by equations written
-by hand; a stage that hunts also {0.1:.0%} below and above its edge in bandwidth.
+drawn stage is followed from {2 * len(STARTS)} starts, and from where cycles are said to stick, for {LONG:g} s in steps
+of {STEP * 1e6:g} us by equations written by hand; a stage that hunts also {0.1:.0%} below and above its edge in
+bandwidth.
 
 | window | stages | sure | hunt | sure and wrong | sure edges | of these wrong |
 |---|---|---|---|---|---|---|
@@ -182,8 +195,8 @@ def main() -> None:
     for number in range(arguments.first, arguments.first + arguments.stages):
         every.append(compared(number, arguments.seed))
         print(every[-1], "WRONG" if every[-1].wrong or every[-1].edge is False else "", flush=True)
-    if arguments.table:
-        arguments.table.write_text(table(every, arguments.seed))
+        if arguments.table:
+            arguments.table.write_text(table(every, arguments.seed))
 
 
 if __name__ == "__main__":

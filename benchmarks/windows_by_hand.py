@@ -183,6 +183,14 @@ def follow(n, windows, schedule, pieces, start, times, step, sample):  # type: i
     return out
 
 
+def relaxed(flat: Mapping[str, Any], displacement: float) -> float:
+    """Return the integral [m s] with which the drive of a displaced stage at rest exerts no force."""
+    numbers, windows, schedule = by_hand(flat)
+    inside = np.append((displacement < windows[:, 0]).astype(float), windows[0, 0])
+    acting, gains, _ = _shares(numbers, schedule, inside, True, -displacement, 0.0)
+    return float(-gains * numbers[0] * acting / numbers[1])
+
+
 def trace(
     flat: Mapping[str, Any], start: np.ndarray, times: np.ndarray, step: float, sample: float = 0.0
 ) -> np.ndarray:
