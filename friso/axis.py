@@ -24,8 +24,9 @@ LENGTH, FORCE, MASS = "m", "N", "kg"
 class AxisKind:
     """A kind of axis: its name, and its units in place of metre, newton and kilogram.
 
-    `effort` is what its actuator exerts, in words. `per_ampere` is the force or torque of the motor per ampere [N, or
-    N m], if it is known. Forces may then be written in amperes.
+    `effort` is what its actuator exerts, in words. `exerts` has force or torque of the motor [N, or N m] per unit of
+    a drive's command, such as ("A", 50.0), as far as they are known. Forces may then be written in these units.
+    `counted` has the length [m or rad] of a "count" of the encoder and the time [s] of a "sample", if they are known.
     """
 
     name: str
@@ -33,7 +34,13 @@ class AxisKind:
     force: str = FORCE
     mass: str = MASS
     effort: str = "force"
-    per_ampere: float | None = field(default=None, compare=False)
+    exerts: tuple[tuple[str, float], ...] = field(default=(), compare=False)
+    counted: tuple[tuple[str, float], ...] = field(default=(), compare=False)
+
+    @property
+    def per_ampere(self) -> float | None:
+        """Return the force or torque of the motor per ampere [N, or N m]; None if it is not known."""
+        return dict(self.exerts).get("A")
 
     @property
     def described(self) -> str:

@@ -140,10 +140,19 @@ class Value(float):
 
 
 class Motor(NamedTuple):
-    """The force or torque per ampere of a motor, and its unit: N or N*m."""
+    """What a drive's units stand for.
 
-    per_ampere: float
+    `exerts` has the force or torque [N or N m] per unit of command, `counted` the length of a count and the time of a
+    sample; `force` is the unit N or N*m.
+    """
+
+    exerts: tuple[tuple[str, float], ...]
+    counted: tuple[tuple[str, float], ...]
     force: str
+
+
+_OF_A_MOTOR = re.compile("/A$|ohm|V")
+"""Units in which a motor itself is described."""
 
 
 @dataclass(frozen=True)
@@ -163,8 +172,8 @@ class Quantity:
 
     def on(self, kind: AxisKind) -> Self:
         """Return the declaration of the key for an axis of this kind, with its units."""
-        motor = None if kind.per_ampere is None else Motor(kind.per_ampere, kind.force)
-        motor = None if self.unit.endswith("/A") else motor
+        motor = Motor(kind.exerts, kind.counted, kind.force) if kind.exerts or kind.counted else None
+        motor = None if _OF_A_MOTOR.search(self.unit) else motor
         if (unit := kind.unit(self.unit)) == self.unit:
             return self if motor == self.motor else replace(self, motor=motor)
         number, _, written = self.example.partition(" ")
@@ -176,7 +185,7 @@ class Quantity:
         """Return the values that the key accepts, in words."""
         units = "Hz, rad/s or rpm" if self.unit == "Hz" else self.unit
         if self.motor and re.match(re.escape(self.motor.force) + r"\b", self.unit):
-            units += f" or {self.unit.replace(self.motor.force, 'A', 1)}"
+            units += "".join(f" or {self.unit.replace(self.motor.force, name, 1)}" for name, _ in self.motor.exerts)
         axis = f" with {self.axis}" if self.axis else ""
         return f"number and unit in quotes, convertible to {units}{axis}, {self.bound.text}"
 
@@ -263,7 +272,7 @@ class _Refused(Exception):
 
 # A strict grammar before pint sees anything: its parser would compute "m^(9^9^9)" and take "N;N" for N^2.
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_FACTOR = r"[^\W\d_]\w*(?: ?(?:\^|\*\*) ?-?[0-9]|⁻?[¹²³⁴])?"
+_FACTOR = r"(?:%|[^\W\d_]\w*)(?: ?(?:\^|\*\*) ?-?[0-9]|⁻?[¹²³⁴])?"
 _GROUP = rf"(?:{_FACTOR}|\({_FACTOR}(?: ?[*/·. ] ?{_FACTOR})*\))"
 _UNIT = re.compile(rf"(?:1 ?/ ?)?{_GROUP}(?: ?[*/·. ] ?{_GROUP})*")
 LONGEST_QUANTITY = 100
@@ -382,6 +391,9 @@ def si_value(text: str) -> float:
 TORQUES = ("newton_meter = newton * meter = Nm", "newton_centimeter = newton * centimeter = Ncm")
 """Definitions of torque units as they are printed on motors."""
 
+OF_DRIVES = ("drive_percent = [drive_percent]", "PWM = [pwm]", "sample = [sample]")
+"""Definitions of units that drives count in. A per cent of a drive's command is no pure number."""
+
 
 @cache
 def common_units() -> dict[str, tuple[float, dict[str, float], list[str]]]:
@@ -395,7 +407,10 @@ def _registry() -> Any:
     import pint
 
     registry = pint.UnitRegistry(on_redefinition="ignore")
-    for definition in TORQUES:  # of which pint takes Nm for a measure of yarn, or does not know it, by its version
+    for definition in (
+        *TORQUES,
+        *OF_DRIVES,
+    ):  # of which pint takes Nm for a measure of yarn, or does not know it, by its version
         registry.define(definition)
     return registry
 
@@ -415,7 +430,7 @@ def by_pint(unit: str) -> tuple[float, dict[str, float], list[str]]:
     Raises _Refused for an unknown unit.
     """
     try:
-        units = _registry().parse_units(unit)
+        units = _registry().parse_units(unit.replace("%", "drive_percent"))
         factor, root = _registry().get_root_units(units)
     except Exception as error:  # pint lets through whatever Python's tokenizer and its own arithmetic raise
         raise _Refused(f"{quoted(unit)} is not a known unit{_meant(unit)}") from error
@@ -445,11 +460,14 @@ def _factor(unit: str, si_unit: str, motor: Motor | None = None) -> float:
     if si_unit == "1/s" and any(name.endswith("hertz") for name in names):
         raise _Refused("a frequency, which could mean 2 pi as much")
     si_factor, si_root, _ = _root(si_unit)
-    if forces := [force for force in ("N", "N*m") if _in_amperes(root, si_root, force)]:
-        if motor is None:
-            raise _Refused(f'in amperes: the stage file needs [actuator] motor_constant = "50 {forces[0]}/A"')
-        if motor.force in forces:
-            return float(f"{factor * motor.per_ampere * _root(f'{motor.force}/A')[0] / si_factor:.15g}")
+    factor, root = _counted(factor, root, si_root, motor)
+    for command, needs in COMMANDS.items():
+        if forces := [force for force in ("N", "N*m") if _in_command(root, si_root, force, command)]:
+            per_unit = dict(motor.exerts).get(command) if motor else None
+            if per_unit is None:
+                raise _Refused(f"in {needs.format(force=forces[0])}")
+            if motor and motor.force in forces:
+                return float(f"{factor * per_unit * _root(motor.force)[0] / _root(command)[0] / si_factor:.15g}")
     if root != si_root and not _per_radian(root, si_root):
         of_motor = "; amperes are per length of the load, not per angle of the motor" if _per_angle(root, motor) else ""
         raise _Refused(f"{unit} is not convertible to {si_unit}{of_motor or _of_rotary_axis(root, si_unit)}")
@@ -464,16 +482,55 @@ def _per_radian(root: dict[str, float], si_root: dict[str, float]) -> bool:
     return si_root.get("radian", 0) < 0 and root == {name: p for name, p in si_root.items() if name != "radian"}
 
 
-def _in_amperes(root: dict[str, float], si_root: dict[str, float], force: str) -> bool:
-    """Tell whether a unit has amperes in place of a force, such as A/m for N/m.
+COMMANDS = {
+    "A": 'amperes: the stage file needs [actuator] motor_constant = "50 {force}/A", and no resistance',
+    "V": 'volts: the stage file needs [actuator] motor_constant = "50 {force}/A", resistance = "2 ohm"',
+    "%": 'per cent: the stage file needs [actuator] with motor_constant, resistance, and supply = "24 V"',
+    "PWM": "PWM counts: the stage file needs [actuator] with motor_constant, resistance, supply, and full_pwm = 255",
+}
+"""Units of what drives command, each with what the stage file needs for it."""
+
+COUNTED = {
+    "count": ("meter", "radian", "counts", '[drive] encoder_resolution = "1 um"'),
+    "sample": ("second", "second", "samples", '[drive] sample_time = "90 us"'),
+}
+"""Units that a drive counts in: what each is on a linear and on a rotary axis, and what the stage file needs for it."""
+
+
+def _counted(
+    factor: float, root: dict[str, float], si_root: dict[str, float], motor: Motor | None
+) -> tuple[float, dict[str, float]]:
+    """Return the factor and powers of a unit with lengths and times in place of counts and samples.
+
+    Raises _Refused if they are not known.
+    """
+    for name, (linear, rotary, words, needs) in COUNTED.items():
+        power = root.get(name, 0)
+        if not power or name in si_root:
+            continue
+        size = dict(motor.counted).get(name) if motor else None
+        if motor is None or size is None:
+            raise _Refused(f"in {words}: the stage file needs {needs}")
+        base = linear if motor.force == "N" else rotary
+        factor, root = factor * size**power, {**root, base: root.get(base, 0) + power}
+        root = {key: value for key, value in root.items() if value and key != name}
+    return factor, root
+
+
+def _in_command(root: dict[str, float], si_root: dict[str, float], force: str, command: str) -> bool:
+    """Tell whether a unit has a drive's command in place of a force, such as A/m for N/m.
 
     Another example is A*s^2/rad for an inertia. `root` and `si_root` are the powers of pint's root units in the unit
     and in the right one; `force` is "N" or "N*m".
     """
-    if root.get("ampere") != 1 or "ampere" in si_root:
+    _, of_command, _ = _root(command)
+    if any(root.get(name) != power and name not in ("gram", "meter", "second") for name, power in of_command.items()):
         return False
-    _, per_ampere, _ = _root(f"{force}/A")
-    powers = {name: root.get(name, 0) + per_ampere.get(name, 0) for name in (*root, *per_ampere)}
+    _, of_force, _ = _root(force)
+    powers = {
+        name: root.get(name, 0) + of_force.get(name, 0) - of_command.get(name, 0)
+        for name in (*root, *of_force, *of_command)
+    }
     powers = {name: power for name, power in powers.items() if power}
     return powers == si_root or ("second" not in si_root and powers == {**si_root, "radian": -1})
 

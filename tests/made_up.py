@@ -104,6 +104,7 @@ class FakeCase:
     peak_to_peak: float = 2e-10
     offset: float = 0.0
     period: float | None = None
+    bands: tuple[float, float] = (1e-6, 1e-5)
     settling_time: dict[float, float | None] = field(default_factory=lambda: {1e-6: 0.8234, 1e-5: 0.5123})
     in_the_end: dict[float, float | None] = field(default_factory=lambda: {1e-6: 0.8234, 1e-5: 0.5123})
     largest_force: float = 179.4

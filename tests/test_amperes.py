@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from refusals import refused
 
@@ -13,6 +15,7 @@ from friso.axis import KINDS
 from friso.drives.conversions import conversions
 from friso.drives.gains import gains_of
 from friso.drives.questions import UserAnswers
+from friso.hunting import hunting as hunting_of
 from friso.stage import Stage
 from friso.studies.axes import SweptAxis, read_axis
 
@@ -47,6 +50,22 @@ ROTARY = {
     "actuator": {"motor_constant": "5 N*m/A"},
     "motion": {"kind": "hold", "duration": "1 s"},
 }
+IN_VOLTS = {
+    "masses": {"stage": "1.7 kg"},
+    "friction": {
+        **{"model": "lugre", "static": "3 N", "coulomb": "1 N", "stribeck_velocity": "1.6 mm/s"},
+        **{"stribeck_exponent": 2, "bristle_stiffness": "1e5 N/m", "bristle_damping": "316 N*s/m"},
+        "viscous": "0.5 N*s/m",
+    },
+    "controller": {
+        **{"kind": "pid", "kp": "0.4 V/mm", "ki": "4 V/(mm*s)", "kd": "10 mV*s/mm", "derivative_on": "measurement"},
+        "force_limit": "100 %",
+    },
+    "actuator": {"motor_constant": "10 N/A", "resistance": "2 ohm", "supply": "24 V", "full_pwm": 1000},
+    "drive": {"sample_time": "90 us", "encoder_resolution": "1 um"},
+    "motion": {"kind": "release", "displacement": "2 mm", "duration": "2 s"},
+}
+WITHOUT_DRIVE = {name: table for name, table in IN_VOLTS.items() if name != "drive"}
 IN_NEWTONS = {
     "kp": 5e6,
     "ki": 2e4,
@@ -89,7 +108,7 @@ def test_what_export_prints_in_amperes_may_stand_in_the_file(tables: dict[str, A
 
 def test_no_unit_of_a_rotary_axis_stands_for_load_and_motor_at_once() -> None:
     stage = Stage(**ROTARY)
-    for row in conversions(stage.flat(), UserAnswers({"travel_per_turn": "36 deg"}), stage.axis_kind.per_ampere):
+    for row in conversions(stage.flat(), UserAnswers({"travel_per_turn": "36 deg"}), stage.axis_kind.exerts):
         units = [unit for _, unit in row.values]
         assert len(units) == len({*units}), row.name
 
@@ -143,3 +162,95 @@ def test_gains_to_type_in_name_the_log_to_record_next(tmp_path: Path) -> None:
     assert gains.next_steps([]) == [f"friso identify NEW_LOG.csv --against {file}"]
     assert friso.export("gains", file, set={"controller.crossover": "9 Hz"}).next_steps([]) == []
     assert friso.export("gains", Stage(**LINEAR)).next_steps([]) == []
+
+
+def test_volts_exert_what_the_motor_draws_at_standstill() -> None:
+    """A volt on 2 ohm drives 0.5 A, which exert 5 N; 24 V are 100 % and 1000 counts of PWM."""
+    stage = Stage(**IN_VOLTS)
+    assert stage.flat()["controller.kp"] == pytest.approx(0.4 / 1e-3 * 5)
+    assert stage.flat()["controller.force_limit"] == pytest.approx(24 * 5)
+    assert friso.loads(stage.to_toml()) == stage
+    for text, newtons in {
+        "3 PWM/count": 3 * 0.024 * 5 / 1e-6,
+        "2 %/mm": 2 * 0.24 * 5 / 1e-3,
+        "0.1 V/count": 0.1 * 5 / 1e-6,
+        "300 N/m": 300.0,
+    }.items():
+        assert stage.replace({"controller.kp": text}).flat()["controller.kp"] == pytest.approx(newtons)
+
+
+def test_gains_per_sample_are_the_sums_and_differences_of_a_drive() -> None:
+    """P 3, I 1e-5, D 15 in a drive that runs each 90 us: I sums errors, D takes their difference."""
+    gains = {"kp": "3 PWM/count", "ki": "1e-5 PWM/(count*sample)", "kd": "15 PWM*sample/count"}
+    flat = Stage(**IN_VOLTS).replace({f"controller.{key}": text for key, text in gains.items()}).flat()
+    per_count = 0.024 * 5 / 1e-6
+    assert flat["controller.ki"] == pytest.approx(1e-5 * per_count / 90e-6)
+    assert flat["controller.kd"] == pytest.approx(15 * per_count * 90e-6)
+
+
+def test_counts_of_a_rotary_axis_are_angles() -> None:
+    stage = Stage(**{**ROTARY, "drive": {"encoder_resolution": "1 mrad"}})
+    assert stage.replace({"controller.kp": "2e-3 A*s/count"}).flat()["controller.kp"] == pytest.approx(10.0)
+
+
+def test_what_export_prints_in_volts_may_stand_in_the_file() -> None:
+    stage, tried = Stage(**IN_VOLTS), 0
+    for row in gains_of(stage, {}).conversions:
+        (value, unit), *others = row.values
+        keys = [key for key, field in stage.numeric_keys().items() if stage.flat().get(key) == value]
+        for number, other in others if unit.startswith("N") else ():
+            if re.match("V|%|PWM", other):
+                tried += 1
+                assert stage.replace({keys[0]: f"{number!r} {other}"}).flat()[keys[0]] == pytest.approx(value)
+    assert tried == 3 * 4
+
+
+@pytest.mark.parametrize(
+    ("changed", "part"),
+    [
+        ({"controller.kp": "3 A/mm"}, "and no resistance"),
+        ({"actuator.resistance": None, "actuator.supply": None, "actuator.full_pwm": None}, "resistance ="),
+        ({"actuator.supply": None, "actuator.full_pwm": None}, "supply ="),
+        ({"actuator.supply": None}, "what belongs to full_pwm"),
+        ({"controller.kp": "3 PWM/count", "actuator.full_pwm": None}, "full_pwm ="),
+        ({"controller.kp": "3 V/count", "drive.encoder_resolution": None}, "encoder_resolution ="),
+        ({"controller.ki": "3 V/(m*sample)", "drive.sample_time": None}, "sample_time ="),
+    ],
+)
+def test_a_command_that_cannot_be_converted_says_what_it_needs(changed: dict[str, Any], part: str) -> None:
+    with pytest.raises(friso.StageError) as refusal:
+        Stage(**IN_VOLTS).replace(changed)
+    assert part in str(refusal.value)
+
+
+IN_PLAIN_UNITS = {"kp": "2000 N/m", "ki": "8 N/(mm*s)", "kd": "20 N*s/m", "force_limit": "120 N"}
+
+
+def test_back_emf_brakes_as_viscous_friction_does() -> None:
+    """It is 10 N/A times 10 V s/m over 0.1 ohm, 1000 N s/m, and takes the energy of which the stage hunts."""
+    tables = {**WITHOUT_DRIVE, "controller": {**IN_VOLTS["controller"], **IN_PLAIN_UNITS}}
+    braked = Stage(**{**tables, "actuator": {"back_emf": "10 V*s/m", "resistance": "0.1 ohm"}})
+    free = Stage(**{**tables, "actuator": {"motor_constant": "10 N/A"}})
+    viscous = free.replace({"friction.viscous": "1000.5 N*s/m"})
+    ours, theirs, without = (friso.simulate(stage, 1e-9, 1e-3)["position"].values for stage in (braked, viscous, free))
+    assert np.abs(ours - theirs).max() < 1e-9
+    assert np.abs(ours - without).max() > 1e-4
+    assert hunting_of(free).attracting
+    assert (hunting_of(braked).attracting, hunting_of(braked).certain) == ((), True)
+
+
+def test_a_motor_behind_a_transmission_brakes_itself() -> None:
+    """Back-EMF acts where the motor turns, as viscous friction there does."""
+    tables: dict[str, Any] = {
+        **WITHOUT_DRIVE,
+        "controller": {**IN_VOLTS["controller"], **IN_PLAIN_UNITS},
+        "transmission": {"mass": "1 kg", "stiffness": "1 N/um", "damping": "200 N*s/m", "backlash": "20 um"},
+        "encoder": {"position": "load", "velocity": "motor"},
+    }
+    law = {"model": "stribeck", "static": "1 N", "coulomb": "1 N", "regularisation_velocity": "1 mm/s"}
+    law |= {"stribeck_velocity": "1 mm/s", "stribeck_exponent": 2}
+    braked = Stage(**{**tables, "motor_friction": {**law, "viscous": "0.5 N*s/m"}})
+    free = {**tables, "actuator": {"motor_constant": "1 N/A"}}
+    viscous = Stage(**{**free, "motor_friction": {**law, "viscous": "50.5 N*s/m"}})
+    ours, theirs = (friso.simulate(stage, 1e-9, 1e-3)["position"].values for stage in (braked, viscous))
+    assert np.abs(ours - theirs).max() < 1e-8

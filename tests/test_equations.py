@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from inspect import get_annotations
 from types import ModuleType
 from typing import Any
 
@@ -19,7 +20,7 @@ from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.structure import TransmissionForm, structure
 from friso.frequency.system import sine
 from friso.stage import Stage
-from friso.stage.controllers import NO_SETTINGS
+from friso.stage.controllers import AgainstFriction, FrictionSettings
 from friso.stage.filters import FilterForm
 
 Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]
@@ -151,8 +152,9 @@ def test_what_is_compiled_is_named_by_all_that_differs(rig: Stage) -> None:
         replace(plain, controller=replace(control, integral=not control.integral)),
         *(replace(plain, controller=replace(control, filters=filters[:count])) for count in (1, 2)),
         *(
-            replace(plain, controller=replace(control, settings=NO_SETTINGS._replace(**{name: True})))
-            for name in NO_SETTINGS._fields
+            replace(plain, controller=replace(control, settings=FrictionSettings((name,))))
+            for name in get_annotations(AgainstFriction)
+            if name != "kind"
         ),
     ]
     assert len({form.title for form in forms}) == len(forms)

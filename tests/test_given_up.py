@@ -209,7 +209,7 @@ def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, wo
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "search_bandwidths": lambda *_: NOT_SOUGHT,
-        "measuring_options": lambda *_: replace(measuring_options(1e-6), budget=budget),
+        "measuring_options": lambda *_, **__: replace(measuring_options(1e-6), budget=budget),
     }
     with patched({verdict: made_up}), allowance() as spent:
         judgement = judge(STAGE, run_to(np.nan, swing=1e-3), 1e-6, work=work)

@@ -132,7 +132,6 @@ def _interruptible() -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        (),
         ("--x", "controller.crosover=1 Hz..2 Hz:3"),
         ("--x", "controller.crossover=2 Hz..1 Hz:3"),
         ("--x", "joint.stroke=0 m..1 mm:3", "--log"),

@@ -57,25 +57,34 @@ def travel_of(flat: Mapping[str, Any]) -> float | None:
     return flat.get("transmission.lead")
 
 
+Commands = tuple[tuple[str, float], ...]
+"""Force or torque [N or N m] per unit of each command that a drive may have."""
+
+
 @dataclass(frozen=True)
 class Turn:
-    """Travel of a turn and force of an ampere, which convert units between motor and load.
+    """Travel of a turn and force per command, which convert units between motor and load.
 
-    `travel` is how far one turn moves the load [m or rad]. `per_ampere` is the force or torque at the load per ampere
-    [N/A or N m/A]. Either is None if unknown.
+    `travel` is how far one turn moves the load [m or rad], None if unknown. `exerts` has the force or torque at the
+    load [N or N m] per unit of command, such as ("A", 50.0).
     """
 
     travel: float | None
-    per_ampere: float | None
+    exerts: Commands
+
+    @property
+    def per_ampere(self) -> float | None:
+        """Return the force or torque at the load per ampere [N/A or N m/A]; None if unknown."""
+        return dict(self.exerts).get("A")
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any], answers: UserAnswers, per_ampere: float | None = None) -> Turn:
-        """Collect travel and force per ampere from the stage file and the user's answers.
+    def of(cls, flat: Mapping[str, Any], answers: UserAnswers, exerts: Commands = ()) -> Turn:
+        """Collect travel and force per command from the stage file and the user's answers.
 
-        The transmission gives the travel, the actuator gives `per_ampere` [N/A or N m/A]; the user may add what is
-        missing. Raises InputError for an answer in a wrong unit, or one that contradicts the stage.
+        The transmission gives the travel, the actuator gives `exerts`; the user may add what is missing. Raises
+        InputError for an answer in a wrong unit, or one that contradicts the stage.
         """
-        kind, travel = axis_of(flat), travel_of(flat)
+        kind, travel, per_ampere = axis_of(flat), travel_of(flat), dict(exerts).get("A")
         if TRAVEL in answers:
             answer = answers.value(TRAVEL, TRAVELS[kind])
             if travel is not None and not isclose(answer, travel, rel_tol=1e-6):
@@ -84,7 +93,7 @@ class Turn:
                 raise InputError(TRAVEL, f"{answer:.6g} {unit}", expected)
             travel = answer
         if MOTOR_CONSTANT not in answers:
-            return cls(travel, per_ampere)
+            return cls(travel, exerts)
         if travel is not None:
             exerted = answers.value(MOTOR_CONSTANT, TORQUE_PER_AMPERE) * 2 * pi / travel
         else:
@@ -93,22 +102,21 @@ class Turn:
             unit = kind.unit("N/A")
             expected = f"that of [actuator], {per_ampere:.6g} {unit} at the load, which is enough"
             raise InputError(MOTOR_CONSTANT, f"{exerted:.6g} {unit} at the load", expected)
-        return cls(travel, exerted)
+        return cls(travel, (("A", exerted), *(one for one in exerts if one[0] != "A")))
 
 
 Convert = Callable[[float, Turn, AxisKind], list[Other]]
 """Function that converts a value in SI to other units."""
 
 
-def conversions(
-    flat: Mapping[str, Any], answers: UserAnswers, per_ampere: float | None = None
-) -> tuple[Conversion, ...]:
+def conversions(flat: Mapping[str, Any], answers: UserAnswers, exerts: Commands = ()) -> tuple[Conversion, ...]:
     """Return every gain of a stage in SI and in the units that drives use.
 
     `flat` holds the stage as flat keys such as controller.kp. Units that need an unknown travel or motor constant are
-    left out. Raises InputError for gains too large or too small to convert, and for answers that contradict the stage.
+    left out; `exerts` has the force or torque [N or N m] per unit of command. Raises InputError for gains too large or
+    too small to convert, and for answers that contradict the stage.
     """
-    turn = Turn.of(flat, answers, per_ampere)
+    turn = Turn.of(flat, answers, exerts)
     try:
         return tuple(row for row in _rows(flat, turn) if row.finite)
     except (ArithmeticError, ValueError):
@@ -126,19 +134,19 @@ def _rows(flat: Mapping[str, Any], turn: Turn) -> Iterator[Conversion]:
 
 
 def _mass(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert an inertia [kg or kg m^2] to current per acceleration, and to the motor's side.
+    """Convert an inertia [kg or kg m^2] to command per acceleration, and to the motor's side.
 
     Units that need an unknown travel or motor constant are left out.
     """
-    current = [(value / turn.per_ampere, f"A*s^2/{kind.length}")] if turn.per_ampere else []
+    commanded = [(value / exerted, f"{name}*s^2/{kind.length}") for name, exerted in turn.exerts]
     at_motor = [(value * (turn.travel / (2 * pi)) ** 2, "kg*m^2 at the motor")] if turn.travel else []
-    return [*current, *at_motor]
+    return [*commanded, *at_motor]
 
 
 def _force(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert a force [N or N m] to current and motor torque, if the turn is known."""
+    """Convert a force [N or N m] to commands and motor torque, as far as they are known."""
     at_motor = [(value * turn.travel / (2 * pi), "N*m at the motor")] if turn.travel else []
-    return [*at_motor, *([(value / turn.per_ampere, "A")] if turn.per_ampere else [])]
+    return [*at_motor, *((value / exerted, name) for name, exerted in turn.exerts)]
 
 
 def _per(unit: str, *per: tuple[str, float]) -> Convert:
@@ -148,14 +156,14 @@ def _per(unit: str, *per: tuple[str, float]) -> Convert:
     """
 
     def others(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-        """Return the gain with current for force, and per turn of the motor, as far as known.
+        """Return the gain with commands for force, and per turn of the motor, as far as known.
 
         On a linear axis the gain per millimetre is added.
         """
         values = []
-        if turn.per_ampere:
-            shown = kind.unit(unit).replace("N*m", "A", 1) if kind != LINEAR else unit.replace("N", "A", 1)
-            values.append((value / turn.per_ampere, shown))
+        for name, exerted in turn.exerts:
+            shown = kind.unit(unit).replace("N*m", name, 1) if kind != LINEAR else unit.replace("N", name, 1)
+            values.append((value / exerted, shown))
         if turn.travel:
             at_motor = value * (turn.travel / (2 * pi)) ** 2
             place = "" if kind == LINEAR else " at the motor"  # gains of the load are per angle too

@@ -52,7 +52,7 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     for key in user_values:
         if key not in askable:
             raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(askable))}")
-    rows = conversions(flat, answers, stage.axis_kind.per_ampere)
+    rows = conversions(flat, answers, stage.axis_kind.exerts)
     if kind is None:
         return Gains(stage, loop_diagram(flat), rows)
     refuse_open(kind.questions_back(flat, answers), f"--to {to}")

@@ -132,7 +132,7 @@ class Constants:
         """Replace every largest subexpression in parameters alone by the symbol of a constant."""
         if expr.is_number or not expr.free_symbols & self._parameters:
             return expr
-        if expr.free_symbols <= self._parameters:
+        if expr.free_symbols <= self._parameters and not isinstance(expr, sp.Tuple):  # a case is no number
             return self._symbols.setdefault(expr, sp.Symbol(f"c{len(self._symbols)}", real=True))
         if isinstance(expr, sp.Add | sp.Mul):
             shared = [a for a in expr.args if a.free_symbols <= self._parameters]

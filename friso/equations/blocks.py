@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
@@ -17,7 +18,14 @@ import sympy as sp
 from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TIME, Component, Held, key
 from friso.equations.structure import ControllerForm
-from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection, FrictionSettings
+from friso.stage.controllers import (
+    ANTI_WINDUP_TIME,
+    FILTERS_KEY,
+    FORCE_LIMIT,
+    SCHEDULES,
+    ControllerSection,
+    FrictionSettings,
+)
 from friso.stage.filters import FEEDBACK, FORWARD, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
 
@@ -104,6 +112,12 @@ class Signal:
     def __truediv__(self, divisor: Any) -> Signal:
         return self * (1 / sp.sympify(divisor))
 
+    def shared(self, share: Signal) -> Signal:
+        """Multiply a signal by a share, which is constant but for jumps."""
+        rate = None if self.rate is None else share.value * self.rate
+        value, settled = share.value * self.value, share.settled * self.settled
+        return Signal(value, self.scale, settled, share.settled * self.settled_rate, rate)
+
     def __neg__(self) -> Signal:
         return self * -1
 
@@ -152,6 +166,22 @@ def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
     )
 
 
+@dataclass(frozen=True)
+class Schedule:
+    """A schedule of gains: `factors` at rising `places`, linear between them and constant beyond."""
+
+    places: tuple[sp.Expr, ...]
+    factors: tuple[sp.Expr, ...]
+
+    def at(self, size: sp.Expr) -> sp.Expr:
+        """Return the factor for the size of a signal."""
+        cases: list[Any] = [(self.factors[0], size <= self.places[0])]
+        points = zip(self.places, self.factors, strict=True)
+        for (low, first), (high, last) in pairwise(points):
+            cases.append((first + (last - first) * (size - low) / (high - low), size <= high))
+        return Piecewise(*cases, (self.factors[-1], True))
+
+
 class Blocks(ABC):
     """Building blocks of a controller, such as filters and integrals.
 
@@ -160,9 +190,15 @@ class Blocks(ABC):
 
     def __init__(self, form: ControllerForm | None = None) -> None:
         self.form = form
+        self.winding: Any = sp.S.One
+        """Factor that settings against friction put on what integrals take in."""
+        self.paused: Any = sp.S.Zero
+        """Number that is 1 while a deadband pauses integrals."""
 
     nothing = Signal(sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero)
     """A signal that is always 0."""
+    whole = Signal(sp.S.One, sp.S.One, sp.S.One, sp.S.Zero, sp.S.Zero, sp.S.One)
+    """A signal that is always 1."""
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
@@ -234,15 +270,114 @@ class Blocks(ABC):
         """Return the signal clamped to plus and minus a limit; `name` names the clamp."""
 
     @abstractmethod
-    def dead_zone(self, error: Signal) -> Signal:
-        """Return the error reduced by the deadband; it is 0 within the deadband."""
+    def within(self, window: str, error: Signal, resting: Signal) -> Signal:
+        """Return a signal that is 1 while a window against friction acts, and 0 elsewhere.
+
+        `window` is its key. It acts while the error is small, and has been so for its time if it has one, until the
+        error is larger than its exit. It does not act where `resting` is 0 instead of 1.
+        """
+
+    @property
+    @abstractmethod
+    def _holding(self) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
+        """Return the symbols of integrals in values and in settled values."""
+
+    def exit_of(self, window: str) -> sp.Symbol:
+        """Return the error [m] at which a window ceases to act: its exit, or itself without one."""
+        return self.key(f"{window}_exit" if f"{window}_exit" in self.settings else window)
+
+    def _inside(self, window: str, error: Signal, direction: Signal) -> Signal:
+        """Return 1 while a window acts, else 0; `direction` is that of the reference: 1, -1 or 0."""
+        at_rest = window == "freeze_window" or "windows_at_rest" in self.settings
+        return self.within(window, error, resting(direction) if at_rest else self.whole)
+
+    def dead_zone(self, error: Signal, direction: Signal) -> Signal:
+        """Return the error behind the dead zone.
+
+        The error is reduced by the deadband, or is 0 within it if the dead zone remembers the past. `direction` is that
+        of the reference: 1, -1 or 0.
+        """
+        band, lost = self.key("error_deadband"), sp.S.One
+        if "error_deadband_gain" in self.settings:
+            lost -= self.key("error_deadband_gain")
+        if self.settings.remembers("error_deadband"):
+            return error.shared(self.whole - self._inside("error_deadband", error, direction) * lost)
+        limited = Piecewise((band, error.settled > band), (-band, error.settled < -band), (error.settled, True))
+        clipped = replace(self.limiter(error, band, "error_deadband"), settled=limited)
+        acts = resting(direction) if "windows_at_rest" in self.settings else self.whole
+        return error - (clipped * lost).shared(acts)
 
     @abstractmethod
-    def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force, with the gains for standstill while the error is within their window.
+    def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
+        """Return the factor of a schedule of gains for the size of a signal; `name` names it."""
 
-        `total` is the force with the usual gains. The integrals keep the force that they had.
+    def factors(self, seen: Measured, error: Signal) -> list[tuple[Signal, sp.Expr]]:
+        """Return the factors that settings put on the gains, each with that on what integrals take in.
+
+        The settings are a window for standstill, a factor in moves, and a schedule over the size of the measured error
+        or of the velocity.
         """
+        settings, direction = self.settings, seen.reference_direction
+        factors: list[tuple[Signal, sp.Expr]] = []
+        if "standstill_window" in settings:
+            inside, factor = self._inside("standstill_window", error, direction), self.key("standstill_factor")
+            own = "standstill_integral_factor"
+            integral = self.key(own) if own in settings else factor
+            factors.append((self.whole + inside * (factor - 1), 1 + (integral - 1) * inside.value))
+        if "moving_factor" in settings:
+            factor = self.whole + (self.whole - resting(direction)) * (self.key("moving_factor") - 1)
+            factors.append((factor, factor.value))
+        for name in SCHEDULES:
+            if name in settings:
+                signal = error if name == "schedule_error" else self.derivative(seen.rated, name)
+                factor = self.scheduled(signal, self._schedule(name), name)
+                factors.append((factor, factor.value))
+        return factors
+
+    def _schedule(self, name: str) -> Schedule:
+        """Return the schedule of gains whose places have the key `name`."""
+        numbers = range(1, self.settings.points + 1)
+        return Schedule(
+            *(tuple(self.key(f"{array}.{number}") for number in numbers) for array in (name, "schedule_factor"))
+        )
+
+    def with_gains(self, total: Signal, factors: list[tuple[Signal, sp.Expr]]) -> Signal:
+        """Return the force with factors on the gains; `total` is that without them.
+
+        The integrals keep the force that they had.
+        """
+        gains = self.whole
+        for factor, winding in factors:
+            gains, self.winding = gains.shared(factor), self.winding * winding
+        held, settled = (
+            sum((sp.diff(part, x) * x for x in integrals), start=sp.S.Zero)
+            for part, integrals in zip((total.value, total.settled), self._holding, strict=True)
+        )
+        kept = Signal(held, total.scale, settled, sp.S.Zero)
+        return kept + (total - kept).shared(gains)
+
+    def frozen(self, force: Signal, error: Signal, direction: Signal) -> Signal:
+        """Return the force, switched off while the reference rests and the error is within the window.
+
+        Integrals are emptied as the window begins to act. `direction` is that of the reference: 1, -1 or 0.
+        """
+        engaged = 1 - self._inside("freeze_window", error, direction).value
+        self.winding *= engaged
+        return replace(force, value=engaged * force.value, rate=None, before=None)
+
+    def pause_integrals(self, error: Signal, direction: Signal) -> None:
+        """Let integrals pause as settings against friction say; `direction` is that of the reference: 1, -1 or 0."""
+        if "integral_deadband" in self.settings:
+            self.paused = self._inside("integral_deadband", error, direction).value
+        if "integral_rests_in_moves" in self.settings:
+            self.winding *= resting(direction).value
+
+    @property
+    def _losses(self) -> sp.Expr:
+        """Return the rate [1/s] at which settings against friction let integrals decay."""
+        leak = 2 * sp.pi * self.key("integral_leak") if "integral_leak" in self.settings else sp.S.Zero
+        decays = "integral_deadband_decay"
+        return leak + (self.paused / self.key(decays) if decays in self.settings else sp.S.Zero)
 
     @abstractmethod
     def push(self, error: Signal, direction: Signal) -> Signal:
@@ -325,18 +460,27 @@ def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
         position = blocks.fed_back(seen.position)
         rated = position if seen.rated is seen.position else seen.rated
         seen = replace(seen, position=position, rated=rated, error=seen.error + seen.position - position)
-    if settings.dead_zone:
-        seen = replace(seen, error=blocks.dead_zone(seen.error))
+    if "error_deadband" in settings:
+        seen = replace(seen, error=blocks.dead_zone(seen.error, seen.reference_direction))
     shares = form.section.declare(seen, blocks, form.variant)
     total = sum(shares.values(), start=Blocks.nothing)
     added = total
-    if settings.gains:
-        added = blocks.at_standstill(total, error)
-    if settings.push:
+    if form.integral:
+        blocks.pause_integrals(error, seen.reference_direction)
+    if factors := blocks.factors(seen, error):
+        added = blocks.with_gains(total, factors)
+    if "stiction_push" in settings:
         added += blocks.push(error, seen.reference_direction)
-    if settings.dither:
+    if "dither_amplitude" in settings:
         added += blocks.dither()
+    if "freeze_window" in settings:
+        added = blocks.frozen(added, error, seen.reference_direction)
     return Demand(shares, total, blocks.fed_forward(added), error)
+
+
+def resting(direction: Signal) -> Signal:
+    """Return 1 while the reference rests and 0 while it moves, from its `direction`: 1, -1 or 0."""
+    return replace(Blocks.whole, value=1 - direction.value**2, settled=1 - direction.settled**2)
 
 
 def force_limit() -> sp.Symbol:

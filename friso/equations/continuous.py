@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
@@ -13,6 +14,7 @@ from friso.equations.blocks import (
     Controller,
     Demand,
     Loop,
+    Schedule,
     Signal,
     demanded,
     force_limit,
@@ -49,9 +51,12 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
         if term in demand.shares
     }
     states, resting = blocks.finished(demand, bound)
-    sides = {kink.beyond: Piecewise((1, kink.surface > 0), (0, True)) for kink in blocks.kinks}
-    others = (kink.beginning(sides) if kink.surface.free_symbols & {*sides} else kink for kink in (*kinks, *resting))
-    return Controller(force, Component(states, (*blocks.kinks, *others), outputs))
+    sides: dict[Any, Any] = {}
+    begun: list[Kink] = []
+    for kink in (*blocks.kinks, *kinks, *resting):
+        begun.append(kink.beginning(sides) if kink.at_start.free_symbols & {*sides} else kink)
+        sides[kink.beyond] = Piecewise((1, begun[-1].at_start > 0), (0, True))
+    return Controller(force, Component(states, tuple(begun), outputs))
 
 
 FAR_ERROR = 1e9
@@ -135,7 +140,6 @@ class Continuous(Blocks):
     def __init__(self, rate: sp.Expr, form: ControllerForm | None = None) -> None:
         super().__init__(form)
         self.rate = rate
-        self.gains: sp.Expr = sp.S.One  # factor on the gains at standstill
         self.states: list[State] = []
         self.kinks: list[Kink] = []
         self._integrals: list[_Integral] = []
@@ -210,45 +214,60 @@ class Continuous(Blocks):
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """Clip a signal to plus or minus `limit`.
 
-        Each limit becomes a kink, named after `name`, at which derivatives jump. The result has no known rate.
+        Each limit becomes a kink, named after `name`, at which derivatives jump.
         """
         value, kinks = _clamped(signal.value, limit, name)
         self.kinks += kinks
-        return replace(signal, value=value, rate=None)
+        between = 1 - kinks[0].beyond - kinks[1].beyond
+        return replace(signal, value=value, rate=None if signal.rate is None else between * signal.rate)
 
-    def dead_zone(self, error: Signal) -> Signal:
-        """Reduce an error by the deadband, to 0 within it.
+    def within(self, window: str, error: Signal, resting: Signal) -> Signal:
+        """Return 1 while a window against friction acts, and 0 elsewhere.
 
-        Each end of the deadband is a kink, where derivatives jump.
+        Each of its ends is a kink, where derivatives jump, or a mode if the window remembers the past. A state counts
+        the time to stay. Where `resting` is 0 the error counts as beyond the exit.
         """
-        band = self.key("error_deadband")
-        inside = Kink("error_deadband", band**2 - error.value**2)
+        band, acts, square = self.key(window), 2 * resting.value - 1, error.value**2
+        acting = resting.settled * Piecewise((1, error.settled**2 < band**2), (0, True))
+        near = acts * band**2 - square
+        if not self.settings.remembers(window):
+            end = Kink(window, near)
+            self.kinks.append(end)
+            return replace(self.whole, value=end.beyond, settled=acting)
+        leave = square - acts * self.exit_of(window) ** 2
+        emptied = [integral.symbol for integral in self._integrals if window == "freeze_window"]
+        empty: dict[sp.Symbol, sp.Expr] = dict.fromkeys(emptied, sp.S.Zero)
+        inside = Switch(window, near, leave, near, empty, empty)
+        if f"{window}_time" in self.settings:
+            clock, time = state(f"{window}_clock"), self.key(f"{window}_time")
+            stays = Switch(f"{window}_stays", near, -near, near, {clock: sp.S.Zero}, {clock: sp.S.Zero})
+            inside = Switch(window, clock - time, leave, near, {**empty, clock: time}, {**empty, clock: sp.S.Zero})
+            counts = stays.beyond * (1 - inside.beyond)
+            self.states.append(State(clock, counts, "s", time, Role.FILTER, acting * time))
+            self.kinks.append(stays)
         self.kinks.append(inside)
-        outside = 1 - inside.beyond
-        value = outside * (error.value - band * Piecewise((1, error.value > 0), (-1, True)))
-        settled = Piecewise(
-            (error.settled - band, error.settled > band), (error.settled + band, error.settled < -band), (0, True)
-        )
-        rate = None if error.rate is None else outside * error.rate
-        return replace(error, value=value, settled=settled, rate=rate)
+        return replace(self.whole, value=inside.beyond, settled=acting)
 
-    def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the gains for standstill while the error is within the window.
+    def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
+        """Return the factor of a schedule of gains for the size of a signal.
 
-        `total` is the force with the usual gains. Each end of the window is a kink, where derivatives jump.
+        At its places, and where the signal changes its sign, are kinks: derivatives jump.
         """
-        window, factor = map(self.key, ("standstill_window", "standstill_factor"))
-        inside = Kink("standstill", window**2 - error.value**2)
-        self.kinks.append(inside)
-        self.gains = 1 + (factor - 1) * inside.beyond
-        settled = Piecewise((factor, error.settled**2 < window**2), (1, True))
-        integrals = [integral.symbol for integral in self._integrals]
-        value, resting = (
-            held + gains * (part - held)
-            for gains, part in ((self.gains, total.value), (settled, total.settled))
-            for held in [sum((sp.diff(part, x) * x for x in integrals), start=sp.S.Zero)]
-        )
-        return replace(total, value=value, settled=resting, rate=None)
+        positive = Kink(f"{name}_positive", signal.value)
+        ends = [Kink(f"{name}_{k}", signal.value**2 - place**2) for k, place in enumerate(schedule.places)]
+        self.kinks += [positive, *ends]
+        value, size = schedule.factors[0], positive.sign * signal.value
+        points = zip(ends, schedule.places, schedule.factors, strict=True)
+        for (begin, low, first), (end, high, last) in pairwise(points):
+            reached = begin.beyond * (size + end.beyond * (high - size) - low)
+            value += (last - first) / (high - low) * reached
+        return replace(self.whole, value=value, settled=schedule.at(sp.Abs(signal.settled)))
+
+    @property
+    def _holding(self) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
+        """Return the symbols of integrals in values and in settled values, which are the same."""
+        symbols = [integral.symbol for integral in self._integrals]
+        return symbols, symbols
 
     def push(self, error: Signal, direction: Signal) -> Signal:
         """Return the force that pushes towards the reference while the error exceeds the window.
@@ -268,25 +287,12 @@ class Continuous(Blocks):
         amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
         return Signal(amplitude * sine(frequency * TIME), amplitude, sp.S.Zero, sp.S.Zero)
 
-    def _pausing(self, error: sp.Expr) -> tuple[sp.Expr, tuple[Kink, ...]]:
-        """Return a factor that is 0 where integrals pause and 1 elsewhere, and its kinks.
-
-        Kinks are where derivatives jump: at both ends of the deadband.
-        """
-        if not self.settings.deadband:
-            return sp.S.One, ()
-        within = self.key("integral_deadband") ** 2 - error**2
-        pauses = Kink("deadband", within)
-        if self.settings.hysteresis:
-            pauses = Switch("deadband", within, error**2 - self.key("integral_deadband_exit") ** 2, within)
-        return 1 - pauses.beyond, (pauses,)
-
     def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
         """Return a mode with memory for the sign of the error, at whose change integrals restart.
 
         They restart at 0. The result is empty if no integral restarts.
         """
-        empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
+        empty = {integral.symbol: sp.S.Zero for integral in self._integrals if "integral_reset" in self.settings}
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
 
     def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
@@ -301,7 +307,6 @@ class Continuous(Blocks):
         far: list[Kink] = list(_far(clamp.kinks, clamp.limit, "rest")) if self._integrals and clamp else []
         winding: list[Kink] = []
         error = demand.error.value
-        going, pauses = self._pausing(error) if self._integrals else (sp.S.One, ())
         for integral in self._integrals:
             share = sp.S.One
             suffix = "" if str(integral.symbol) == "integral" else f"_{integral.symbol}"
@@ -315,9 +320,7 @@ class Continuous(Blocks):
                 far += [*ends, *beyond]
             if share != 1:
                 winding.append(up)
-            derivative = integral.integrand * self.gains * share * going
-            if self.settings.leak:
-                derivative -= 2 * sp.pi * self.key("integral_leak") * integral.symbol
+            derivative = integral.integrand * self.winding * share * (1 - self.paused) - self._losses * integral.symbol
             if integral.leak is not None:
                 derivative -= integral.leak * integral.symbol
             if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
@@ -326,7 +329,7 @@ class Continuous(Blocks):
             states.append(
                 State(integral.symbol, derivative, "m*s", integral.scale, Role.INTEGRAL, steady[integral.symbol])
             )
-        return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
+        return tuple(states), (*far, *winding, *self._begun_anew(error))
 
     def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
         """Return the limits of an integral, each as expression, limit and name; empty without any.
@@ -334,7 +337,7 @@ class Continuous(Blocks):
         An integral may have a limit of its output, and one of its part of the demanded force.
         """
         limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
-        if self.settings.limit:
+        if "integral_limit" in self.settings:
             force = sp.diff(demand.total.value, integral.symbol) * integral.symbol
             limits.append((force, self.key("integral_limit"), f"{integral.symbol}_force"))
         return limits

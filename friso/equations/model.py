@@ -24,7 +24,7 @@ from friso.equations.reference import declared
 from friso.equations.structure import ControllerForm, Structure
 from friso.equations.transmission import BACKLASH, at_motor, transmission, transmission_deflection
 from friso.stage.motion import QUADRATIC, ReferenceForm
-from friso.stage.tables import MOTOR_MASS, friction_law
+from friso.stage.tables import BRAKING, MOTOR_MASS, friction_law
 
 REFERENCE = declared().inputs
 """Position, velocity and acceleration of a reference at its last corner."""
@@ -166,7 +166,10 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     if control is None and form is not None:
         control = partial(continuous_controller, form)
     acting = control(loop, length, rate) if control else None
-    forces = Pushes(acting.force if acting else sp.S.Zero, external(chain.stage) if external else sp.S.Zero)
+    driven = chain.motor or chain.stage
+    braking = key(BRAKING) * driven.velocity if structure.braked else sp.S.Zero
+    pushed = acting.force if acting else sp.S.Zero
+    forces = Pushes(pushed - braking, external(chain.stage) if external else sp.S.Zero)
     bodies, parts = _mechanics(structure, chain, (friction, motor_friction), forces, (length, rate))
     if acting:
         parts.append(acting.component)
@@ -189,7 +192,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         rate=rate,
         breakaway=breakaway,
         stiffness=loop_stiffness(structure.controller),
-        steady=_steady(chain, unaccelerated, motor_friction),
+        steady=_steady(chain, unaccelerated, motor_friction, structure.braked),
         jumps=resets(kinks),
         inputs=course.inputs,
         reference=structure.reference,
@@ -292,12 +295,14 @@ def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
     return force + (loop_stiffness(structure.controller) * BACKLASH / 2 if structure.plays else 0)
 
 
-def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None) -> sp.Expr | None:
-    """Return friction [N] at guide and motor while all masses move with the cart.
+def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None, braked: bool) -> sp.Expr | None:
+    """Return friction [N] at guide and motor while all masses move with the cart, and the motor's braking.
 
     Returns None if a law does not determine it.
     """
     total: sp.Expr | None = friction.steady(chain.cart.velocity) if friction else sp.S.Zero
+    if total is not None and braked:
+        total += key(BRAKING) * chain.cart.velocity
     if motor_friction and chain.motor and total is not None:
         part = motor_friction.steady(chain.motor.velocity)
         total = None if part is None else total + part.subs(chain.motor.velocity, chain.cart.velocity)

@@ -19,6 +19,7 @@ from friso.equations.blocks import (
     Blocks,
     Demand,
     Loop,
+    Schedule,
     Signal,
     demanded,
     force_limit,
@@ -139,7 +140,7 @@ class Sampled(Blocks):
         super().__init__(form)
         self.velocity_samples = velocity_samples
         self.held: list[Held] = []
-        self.gains: Any = sp.S.One  # factor on the gains at standstill
+        self.restarts: Any = sp.false  # condition under which settings against friction empty integrals
         self.period: sp.Expr = SAMPLE_TIME
         self.due: Any = None  # condition under which the present loop runs at a sample; None: always
         self._integrals: list[_Integral] = []
@@ -272,29 +273,42 @@ class Sampled(Blocks):
         """Clip a signal to plus or minus `limit` at every sample."""
         return replace(signal, value=clipped(signal.value, limit), rate=None, before=None)
 
-    def dead_zone(self, error: Signal) -> Signal:
-        """Reduce an error by the deadband at every sample; it is 0 within the deadband."""
-        band = self.key("error_deadband")
-        value, settled = (part - clipped(part, band) for part in (error.value, error.settled))
-        return replace(error, value=value, settled=settled, rate=None, before=None)
+    def within(self, window: str, error: Signal, resting: Signal) -> Signal:
+        """Return 1 at samples at which a window against friction acts, and 0 at others.
 
-    def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the gains for standstill, at samples with a small error.
-
-        `total` is the force with the usual gains.
+        Held numbers remember whether it acted at the last sample, and for how long the error has been small. At samples
+        where `resting` is 0 the window does not act.
         """
-        window, factor = map(self.key, ("standstill_window", "standstill_factor"))
-        self.gains = Piecewise((factor, sp.Abs(error.value) < window), (1, True))
-        settled = Piecewise((factor, error.settled**2 < window**2), (1, True))
-        value, resting = (
-            held + gains * (part - held)
-            for gains, part, numbers in (
-                (self.gains, total.value, [integral.next for integral in self._integrals]),
-                (settled, total.settled, [integral.symbol for integral in self._integrals]),
-            )
-            for held in [sum((sp.diff(part, x) * x for x in numbers), start=sp.S.Zero)]
-        )
-        return replace(total, value=value, settled=resting, rate=None, before=None)
+        band, size = self.key(window), sp.Abs(error.value)
+        near: Any = size < band
+        far: Any = size > self.exit_of(window)
+        if resting is not self.whole:
+            moves = resting.value < sp.Rational(1, 2)
+            near, far = sp.And(near, sp.Not(moves)), sp.Or(far, moves)
+        acting = resting.settled * Piecewise((1, error.settled**2 < band**2), (0, True))
+        acts: Any = Piecewise((1, near), (0, True))
+        if self.settings.remembers(window):
+            inside, enters = state(f"{window}_acts"), near
+            if f"{window}_time" in self.settings:
+                clock, time = state(f"{window}_clock"), self.key(f"{window}_time")
+                counted = Piecewise((0, sp.Not(near)), (clock + SAMPLE_TIME, clock < time), (clock, True))
+                self.held.append(Held(clock, counted, acting * time))
+                enters = sp.And(near, clock > time - SAMPLE_TIME / 2)
+            acts = Piecewise((1, enters), (0, far), (inside, True))
+            self.held.append(Held(inside, acts, acting))
+        if window == "freeze_window":
+            self.restarts = acts > 0
+        return replace(self.whole, value=acts, settled=acting)
+
+    def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
+        """Return the factor of a schedule of gains for the size of a signal at a sample."""
+        value, settled = (schedule.at(sp.Abs(part)) for part in (signal.value, signal.settled))
+        return replace(self.whole, value=value, settled=settled)
+
+    @property
+    def _holding(self) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
+        """Return the symbols of integrals in values, which are the next, and in settled values."""
+        return [integral.next for integral in self._integrals], [integral.symbol for integral in self._integrals]
 
     def push(self, error: Signal, direction: Signal) -> Signal:
         """Return the force that pushes towards the reference, by the error at a sample.
@@ -320,22 +334,12 @@ class Sampled(Blocks):
 
     def _standstill(self, error: sp.Expr) -> Rest:
         """Return the conditions by which settings against friction pause or restart integrals."""
-        rests: Any = sp.false
-        restarts: Any = sp.false
-        if self.settings.deadband:
-            within = sp.Abs(error) < self.key("integral_deadband")
-            rests = within
-            if self.settings.hysteresis:
-                paused = state("paused")
-                beyond = sp.Abs(error) > self.key("integral_deadband_exit")
-                pauses = Piecewise((1, within), (0, beyond), (paused, True))
-                self.held.append(Held(paused, pauses))
-                rests = pauses > 0
-        if self.settings.reset:
+        restarts = self.restarts
+        if "integral_reset" in self.settings:
             before = state("error_at_change")
             self.held.append(Held(before, Piecewise((error, error**2 > 0), (before, True)), STEADY.error))
-            restarts = error * before < 0
-        return Rest(rests, restarts)
+            restarts = sp.Or(restarts, error * before < 0)
+        return Rest(self.paused > 0, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
         """Return the force before its limit, and all held numbers.
@@ -348,15 +352,15 @@ class Sampled(Blocks):
         rest = Rest(sp.Or(rest.rests, settings.rests), sp.Or(rest.restarts, settings.restarts))
         new: dict[Any, Any] = {}
         for integral in self._integrals:
-            new[integral.next] = integral.symbol + self.gains * integral.share.xreplace(new)
+            new[integral.next] = integral.symbol + self.winding * integral.share.xreplace(new)
         unlimited = demand.force.value.xreplace(new)
         updates: dict[Any, Any] = {}
         for integral in self._integrals:
-            share: Any = self.gains * integral.share.xreplace(updates)
+            share: Any = self.winding * integral.share.xreplace(updates)
             rests = rest.rests
             clamp = force_limit() if anti_windup == "clamp" else None
             limits = [(unlimited, clamp), (integral.gain * new[integral.next], integral.limit)]
-            if self.settings.limit:
+            if "integral_limit" in self.settings:
                 held_force = sp.diff(demand.total.value, integral.next) * new[integral.next]
                 limits.append((held_force, self.key("integral_limit")))
             for value, end in limits:
@@ -370,7 +374,7 @@ class Sampled(Blocks):
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
                 following += integral.when_due(integral.period * cut / (gain * unwinding_time()))
             kept = Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
-            leak = (2 * sp.pi * self.key("integral_leak") if self.settings.leak else 0) + (integral.leak or 0)
+            leak = self._losses + (integral.leak or 0)
             left = 1 + integral.when_due(leak * integral.period) if leak else 1  # leak by backward Euler
             updates[integral.next] = kept / left
         steady: dict[Any, Any] = {**wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])}

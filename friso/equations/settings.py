@@ -12,11 +12,14 @@ from dataclasses import dataclass
 from math import pi, sqrt
 from typing import Any
 
+import numpy as np
+
 from friso.equations.breakaway import breakaway, sliding
 from friso.equations.continuous import slow_gains
 from friso.errors import InputError
 from friso.quantities import quoted
-from friso.stage.controllers import ControllerSection, controller_of
+from friso.stage.controllers import SCHEDULES, ControllerSection, controller_of
+from friso.stage.lists import element_keys
 from friso.stage.tables import moving_mass
 
 FlatMachine = Mapping[str, Any]
@@ -78,12 +81,26 @@ class Setting:
 def gain_states(flat: FlatMachine) -> list[FlatMachine]:
     """Return a stage's keys once for each set of gains that its loop may have.
 
-    With a standstill factor there are two sets: one outside the standstill window, and one within it.
+    The first set is that far from the reference at rest, the last that at the reference. A standstill window, a factor
+    in moves and the points of a schedule add sets.
     """
-    factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
-    if factor is None:
-        return [flat]
-    return [flat, {**flat, **{key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}}]
+    controller, schedules = controller_of(flat), tuple(map(ControllerSection.key, (*SCHEDULES, "schedule_factor")))
+    plain = {key: value for key, value in flat.items() if not key.startswith(schedules)}
+    far, *nearer = [flat[key] for key in element_keys(flat, schedules[-1])][::-1] or [1.0]
+    moving = flat.get(ControllerSection.key("moving_factor"), 1.0)
+    in_moves = [moving * factor for factor in (far, *nearer) if moving != 1]
+    inner = flat.get(ControllerSection.key("standstill_factor"))
+    near = [] if inner is None else [inner * (far, *nearer)[-1]]
+    states = [
+        {**plain, **{key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}}
+        for factor in (far, *in_moves, *nearer, *near)
+    ]
+    if inner is not None:
+        own = flat.get(ControllerSection.key("standstill_integral_factor"), inner) / inner
+        for name, power in controller.integral_gain.items():
+            if (key := controller.key(name)) in flat:
+                states[-1][key] = states[-1][key] * np.power(own, float(power))
+    return [*states]
 
 
 def _scaled(scale: float, ends: tuple[float, float]) -> tuple[float, float]:

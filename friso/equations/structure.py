@@ -27,7 +27,7 @@ from friso.stage.filters import FILTER_RULE, FilterForm, FilterRule, filter_form
 from friso.stage.motion import KIND as MOTION_KIND
 from friso.stage.motion import QUADRATIC, ReferenceForm, motion_of
 from friso.stage.rig import LOOPS, IntegralRule
-from friso.stage.tables import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction, friction_law
+from friso.stage.tables import BACKLASH, BRAKING, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction, friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
 
@@ -60,12 +60,11 @@ class ControllerForm:
     @property
     def title(self) -> str:
         """Describe the controller in a few words."""
-        settings = [name for name, present in self.settings._asdict().items() if present]
         words = [
             *(["no integral"] if not self.integral else []),
             *([f"force limit, {self.anti_windup}"] if self.anti_windup else []),
             *(filter.kind for filter in self.filters),
-            *settings,
+            *self.settings.names,
         ]
         return f"{self.kind} ({', '.join(words)})" if words else self.kind
 
@@ -97,6 +96,7 @@ class Structure:
     - `load_follows`: friction changes with the acceleration of the reference.
     - `reference` describes the pieces of the reference.
     - `limiter_pulls`: a touched limiter may pull by its damping.
+    - `braked`: the motor brakes by its back-EMF.
     """
 
     masses: tuple[str, ...]
@@ -110,6 +110,7 @@ class Structure:
     transmission: TransmissionForm | None = None
     reference: ReferenceForm = QUADRATIC
     limiter_pulls: bool = True
+    braked: bool = False
 
     @property
     def standing(self) -> Structure:
@@ -134,6 +135,7 @@ class Structure:
             f"constant force on {' and '.join(self.biased)}": self.biased,
             "no friction" if self.friction == "none" else f"{self.friction} friction": True,
             "load that follows": self.load_follows,
+            "back-EMF": self.braked,
             self.controller.title if self.controller else "": self.controller,
             f"reference of degree {self.reference.degree}": self.reference.degree != QUADRATIC.degree,
             f"{self.reference.tones} tones": self.reference.tones,
@@ -156,6 +158,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         transmission=_transmission_form(flat) if MOTOR_MASS in flat else None,
         reference=motion_of(flat).form(flat) if MOTION_KIND in flat else QUADRATIC,
         limiter_pulls=_joint_form(flat) != "free" or flat.get("joint.limiter_pulls", True),
+        braked=BRAKING in flat,
     )
 
 

@@ -49,7 +49,6 @@ from friso.frequency.system import (
     waited,
     zero_order_hold,
 )
-from friso.stage.controllers import FrictionSettings
 from friso.stage.rig import LOOPS
 
 
@@ -143,7 +142,7 @@ def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_
 
     They are for small motions. With `both`, the two measured positions are distinguished.
     """
-    bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
+    bare = replace(form, anti_windup=None, settings=form.settings.only("integral_leak"))
     y, rated = sp.symbols("measured_position measured_rated", real=True)
     seen = Loop(-y, y, sp.S.Zero, sp.S.Zero, rated=rated if both else None)
     force, held = sampled_controller(bare, seen, velocity_samples)

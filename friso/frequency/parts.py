@@ -137,7 +137,8 @@ def compensator(flat: Mapping[str, Any], members: int) -> System:
     """
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
-    system = _compensator(replace(form, anti_windup=None)).at(flat, members)
+    bare = replace(form, anti_windup=None, settings=form.settings.only("integral_leak"))
+    system = _compensator(bare).at(flat, members)
     if not (system.c.any() or system.d.any()):
         raise InputError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
     return system

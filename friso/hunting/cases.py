@@ -26,7 +26,7 @@ from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.many_stages import kernels_to_judge
 from friso.hunting.margin import unstable_bandwidths
-from friso.hunting.measures import BANDS, measure_runs, measuring_options
+from friso.hunting.measures import bands_of, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.path import BandwidthWindow
 from friso.hunting.settings import ToleranceSettings, check_settings
@@ -66,7 +66,8 @@ class Case:
     - `peaks`: the thesis's peak count, with peaks at `peak_times` [s] and of `peak_heights` [m] above the reference.
     - `peak_to_peak` [m], `offset` [m] of the middle from the reference, `period` [s] (None: no cycle): of the last
       quarter.
-    - `settling_time`: for each band [m], the time [s] to settle wherever the reference stands (None: it does not
+    - `bands` [m]: about the reference, into which it settles (see `friso.hunting.measures.bands_of`).
+    - `settling_time`: for each of them, the time [s] to settle wherever the reference stands (None: it does not
       settle; see `friso.hunting.criteria.settling`); `in_the_end`: at the last of these places.
     - `largest_force` [N]: of the actuator; `breakaway` [N]: the smallest actuator force, beside constant forces, that
       may move the stage. A motion with less force leaves a stage without a free joint `unmoved`.
@@ -91,6 +92,7 @@ class Case:
     peak_to_peak: float
     offset: float
     period: float | None
+    bands: tuple[float, float]
     settling_time: dict[float, float | None]
     in_the_end: dict[float, float | None]
     largest_force: float
@@ -237,11 +239,10 @@ def _case(
         ended += (step := int(part != CheckPart.ATTRACTION))
         done.add(step, part.progress_word)
 
+    options = measuring_options(rtol, bands=bands_of(flat))
     with allowance() as spent:
-        (runs,) = run_chunks(
-            kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=settings.run_turning_points)
-        )
-        measures = measure_runs(flat, runs)
+        (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(options, room=settings.run_turning_points))
+        measures = measure_runs(flat, runs, bands_of(flat))
         judgement = judge(stage, measures, max(rtol, LONG_RUN_RTOL), begin, work - spent.used, tell)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
@@ -272,8 +273,9 @@ def _case(
         peak_to_peak=float(measures.peak_to_peak[0]),
         offset=float(runs.statistic("deviation_max")[0] + runs.statistic("deviation_min")[0]) / 2,
         period=_finite(measures.period[0]),
-        settling_time={band: _finite(time[0]) for band, time in zip(BANDS, measures.settling_time, strict=True)},
-        in_the_end={band: _finite(time[0]) for band, time in zip(BANDS, measures.in_the_end, strict=True)},
+        bands=measures.bands,
+        settling_time={b: _finite(time[0]) for b, time in zip(measures.bands, measures.settling_time, strict=True)},
+        in_the_end={b: _finite(time[0]) for b, time in zip(measures.bands, measures.in_the_end, strict=True)},
         largest_force=float(measures.largest_force[0]),
         solver=Solver(status.text, int(measures.steps[0]), int(measures.rejected[0]), rtol),
         breakaway=breakaway,

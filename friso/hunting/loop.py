@@ -69,7 +69,7 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     at_once = check_settings.loops_at_once
     controller, form = controller_of(stages.flat), stages.structure.controller
     settings = form.settings if form else NO_SETTINGS
-    if not controller.loop_gain or settings.deadband or settings.dead_zone or settings.gains or settings.push:
+    if not controller.loop_gain or settings.bends:
         return np.full(stages.count, "unknown", dtype=object)
     parts = np.split(np.arange(stages.count), range(at_once, stages.count, at_once))
     return np.concatenate([_at_lower_gains(stages.take(part)) for part in parts])
@@ -131,17 +131,17 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     """Return which stages that cannot hunt have no other lasting swing either, shape (count,).
 
     Their loops are stable, also with the limiter of a free joint touched, and beyond a force limit without anti-windup.
-    They have no backlash and no dither. Without friction, the controller must also act alike near the reference and far
-    from it.
+    They have no backlash, no dither, and no window with a memory that switches the force. Without friction, the
+    controller must also act alike near the reference and far from it.
     """
     least_rate = check_settings.least_growth_rate
     form = stages.structure
     drive, controller = form.transmission, form.controller
     settings = controller.settings if controller else NO_SETTINGS
     rubs = form.friction != "none" or (drive is not None and drive.friction != "none")
-    winds = controller is not None and controller.integral and (settings.reset or settings.deadband)
-    bent = not rubs and (settings.gains or settings.push or settings.dead_zone or winds)
-    if form.plays or settings.dither or bent:
+    winds = controller is not None and controller.integral and "integral_reset" in settings
+    bent = settings.swings_alone or (not rubs and (settings.bends or winds))
+    if form.plays or "dither_amplitude" in settings or bent:
         return np.zeros(stages.count, bool)
     limit = least_rate * stages.number("rate")
     growths = [_growths(stages, touched).values() for touched in {False, form.joint == "free"}]

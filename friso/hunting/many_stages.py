@@ -23,7 +23,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.cycle.hunting import surely_surveyed, why_not
 from friso.hunting.loop import unstable_among, winds_up_at_a_limit
-from friso.hunting.measures import measuring_options
+from friso.hunting.measures import bands_of, measuring_options
 from friso.hunting.motions import (
     FollowedMotions,
     Motions,
@@ -158,7 +158,7 @@ def judge_many(
     keys in SI, and `attracted` their attractors if they are known.
     """
     attracted = attracted or find_attractors(flat, count)
-    return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), attracted, rtol)
+    return judge_runs(flat, run_motions(flat, count, measuring_options(rtol, bands=bands_of(flat))), attracted, rtol)
 
 
 @np.errstate(all="ignore")
@@ -181,7 +181,7 @@ def judge_runs(
     decided = motions.completed & attracted.certain
     attracts = attracted.attracts.copy()
     in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
-    run_options = measuring_options(rtol, threads, cancel)
+    run_options = measuring_options(rtol, threads, cancel, bands_of(flat))
     chosen = np.flatnonzero(decided & attracts)
     if target is not None and chosen.size:
         targets = target.take(chosen)

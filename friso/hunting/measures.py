@@ -21,6 +21,7 @@ from friso.hunting.criteria.settling import settling_in_the_end, settling_of_run
 from friso.hunting.turning import COUNTED_AFTER, LAST_HALF, LAST_QUARTER, LEAST_VALLEY_DEPTH, zigzag
 from friso.hunting.turns import Turns, scan_turning_points
 from friso.stage import Stage
+from friso.stage.controllers import dead_band
 
 __all__ = [
     "BANDS",
@@ -30,6 +31,7 @@ __all__ = [
     "Measures",
     "SampledSolver",
     "Turns",
+    "bands_of",
     "measure_runs",
     "measure_traces",
     "measured_run",
@@ -42,7 +44,20 @@ __all__ = [
 ]
 
 BANDS = (1e-6, REST_BAND)
-"""Bands about the reference into which a stage settles [m]."""
+"""Bands about the reference into which a stage settles [m], unless stage or machine ask for wider ones."""
+
+
+def bands_of(flat: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the two bands [m] into which stages settle, the wider one last.
+
+    They are `BANDS`, with the stage's own tolerance as the first; but neither is finer than that, than a step of the
+    encoder, or than an error at which the controller exerts no force. `flat` has the stages' keys in SI; of arrays the
+    largest value counts.
+    """
+    fine, step = flat.get("tolerance.within", BANDS[0]), flat.get("drive.encoder_resolution", 0.0)
+    fine = max(float(np.max(size)) for size in (fine, step, dead_band(flat)))
+    return fine, max(BANDS[1], fine)
+
 
 RESOLVED = LEAST_VALLEY_DEPTH / 4
 """Size [m] below which swings are skipped when turning points are stored; peaks, periods and outcomes need larger
@@ -56,12 +71,13 @@ class Measures:
     - `peaks`: the thesis's peak count; `distinct_peaks`: count of distinct peaks (see
       `friso.hunting.criteria.peak_count`).
     - `peak_to_peak` [m] and `period` [s] of the last quarter (NaN: no swing, or one that dies out).
-    - `settling_time` [s]: until the deviation stays within each of `BANDS`, wherever the reference stands;
+    - `settling_time` [s]: until the deviation stays within each of `bands`, wherever the reference stands;
       `in_the_end`: at the last of these places (NaN: not within the run; see `friso.hunting.criteria.settling`).
     - `outcome`: words of `friso.hunting.criteria.run_outcome`.
     - `largest_force` [N]: of the actuator.
     - `status`, `steps` attempted and `rejected`: of the solver.
     - `turns`: which turning points are counted peaks, shape (runs, room).
+    - `bands` [m]: about the reference, into which the runs settle; within the wider one they rest.
 
     A run that was not completed has no peaks, and NaN for the other numbers on its motion.
     """
@@ -78,17 +94,23 @@ class Measures:
     steps: np.ndarray
     rejected: np.ndarray
     turns: np.ndarray
+    bands: tuple[float, float] = BANDS
 
 
-def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
+def measuring_options(
+    rtol: float,
+    threads: int | None = None,
+    cancel: np.ndarray | None = None,
+    bands: tuple[float, float] = BANDS,
+) -> RunOptions:
     """Return the options for runs that are to be measured, with the relative tolerance `rtol`.
 
     `threads` bounds the threads of runs, and setting `cancel` stops them. Turning points are kept from a little before
-    the first that may count.
+    the first that may count. The runs settle into `bands` [m].
     """
     return RunOptions(
         rtol=rtol,
-        bands=BANDS,
+        bands=bands,
         window=LAST_QUARTER,
         record_from=0.8 * COUNTED_AFTER,
         least_swing=RESOLVED,
@@ -138,10 +160,11 @@ def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
     )
 
 
-def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
+def measure_runs(flat: Mapping[str, Any], runs: Runs, bands: tuple[float, float] = BANDS) -> Measures:
     """Measure a chunk of runs.
 
-    `flat` has the keys of their stages in SI, with arrays of one entry per run.
+    `flat` has the keys of their stages in SI, with arrays of one entry per run. `bands` [m] are those of the runs'
+    options.
     """
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs, corner_of(flat))
@@ -165,31 +188,37 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
         period=finished(np.where(swings_on(end, 0.0), turns.period, np.nan)),
         settling_time=(finished(settling[0]), finished(settling[1])),
         in_the_end=(finished(in_the_end[0]), finished(in_the_end[1])),
-        outcome=outcomes(end, REST_BAND, passing),
+        outcome=outcomes(end, bands[1], passing),
         largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,
         steps=runs.statistic("attempted").astype(np.int64),
         rejected=runs.statistic("rejected").astype(np.int64),
         turns=turns.peaks,
+        bands=bands,
     )
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
 def measure_traces(
-    flat: Mapping[str, Any], time: np.ndarray, deviation: np.ndarray, force: np.ndarray, solver: SampledSolver
+    flat: Mapping[str, Any],
+    time: np.ndarray,
+    deviation: np.ndarray,
+    force: np.ndarray,
+    solver: SampledSolver,
+    bands: tuple[float, float] = BANDS,
 ) -> Measures:
     """Measure sampled runs, such as those of a drive as built.
 
     `flat` has the stages' keys in SI. Deviations [m] and forces [N] have the shape (runs, n), the times [s] (n,).
-    `solver` says which runs were completed.
+    `solver` says which runs were completed, and `bands` [m] are those into which they settle.
     """
     done, places = solver.status == Status.DONE, [*stands(flat)]
-    end = end_of_traces(time, deviation, REST_BAND, done, corner_of(flat))
+    end = end_of_traces(time, deviation, bands[1], done, corner_of(flat))
     samples, swings = np.full(len(deviation), len(time)), np.nan_to_num(end.swing)
     values = np.ascontiguousarray(deviation)
     turns = scan_turning_points(np.tile(time, (len(deviation), 1)), values, samples, swings, end.ended)
     passing = np.nan_to_num(turns.period) / 2
-    stays = [last_outside(time, deviation, band) + passing < time[-1] for band in BANDS]
+    stays = [last_outside(time, deviation, band) + passing < time[-1] for band in bands]
 
     def settled(where: list[Stand], number: int) -> np.ndarray:
         """Return the longest settling time [s] at some places of the reference, (runs,).
@@ -199,7 +228,7 @@ def measure_traces(
         times = np.zeros(len(deviation))
         for run, row in enumerate(deviation[:, None]):
             own = [Stand(*(np.ravel(part)[min(run, np.size(part) - 1)] for part in place)) for place in where]
-            times[run] = settling_of_traces(own, time, row, BANDS[number])[0]
+            times[run] = settling_of_traces(own, time, row, bands[number])[0]
         return np.where(done & stays[number] & np.isfinite(times), times, np.nan)
 
     return Measures(
@@ -209,12 +238,13 @@ def measure_traces(
         period=np.where(done & swings_on(end, 0.0), turns.period, np.nan),
         settling_time=(settled(places, 0), settled(places, 1)),
         in_the_end=(settled(places[-1:], 0), settled(places[-1:], 1)),
-        outcome=outcomes(end, REST_BAND, passing),
+        outcome=outcomes(end, bands[1], passing),
         largest_force=np.where(done, np.abs(force).max(axis=1), np.nan),
         status=solver.status,
         steps=solver.steps,
         rejected=solver.rejected,
         turns=turns.peaks,
+        bands=bands,
     )
 
 
@@ -233,6 +263,6 @@ def measured_run(stage: Stage, rtol: float = 1e-6) -> Measures:
     The turning points of the solver's run count, not those of a sampled response. Raises ValueError for a tolerance
     that is not usable.
     """
-    flat = stage.flat()
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(rtol))
-    return measure_runs(flat, runs)
+    flat, bands = stage.flat(), bands_of(stage.flat())
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(rtol, bands=bands))
+    return measure_runs(flat, runs, bands)

@@ -16,7 +16,7 @@ from friso.equations.motion import last_corner, rests
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors.rounds import loose_from
 from friso.hunting.attractors.settings import settings
-from friso.hunting.criteria import COUNTED_ABOVE, REST_BAND, lasts
+from friso.hunting.criteria import COUNTED_ABOVE, lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
 from friso.hunting.measures import Measures, measure_runs
@@ -31,7 +31,7 @@ class Motions(ArrayRows):
 
     Runs were `completed`, or diverged (`away`). `peaks` is the thesis's peak count and `swing` [m] the peak-to-peak
     deviation of the last quarter. `settling` [s] is the time from the last corner of the reference until the deviation
-    stays within 10 um (NaN: not within the run).
+    stays within the wider band (NaN: not within the run).
     """
 
     completed: np.ndarray
@@ -65,8 +65,8 @@ def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) ->
 class FollowedMotions:
     """Motions of stages without a stable cycle, arrays of shape (count,).
 
-    - `rests`: at rest at the end, within 10 um of the reference.
-    - `moving`: not at rest, or still swinging within 10 um.
+    - `rests`: at rest at the end, within the wider band about the reference.
+    - `moving`: not at rest, or still swinging within the band.
     - `after` [s]: time after which the stage rests if the motion is continued (NaN: it does not rest, or this is
       unknown).
     - `steady`: it keeps swinging, neither settling nor decaying.
@@ -127,7 +127,7 @@ def followed_motions(
     rest.moving[:] = ~(rests & (motions.swing <= resting(flat, count)))
     if (moving := np.flatnonzero(rest.moving)).size:
         # turning points that may leave the band at the end
-        late = replace(run_options, record_from=np.inf, least_swing=REST_BAND / 2)
+        late = replace(run_options, record_from=np.inf, least_swing=run_options.bands[1] / 2)
         try:
             rest.follow(moving, some_of(flat, moving), moving.size, late)
         except Exhausted:

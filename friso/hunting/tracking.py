@@ -13,8 +13,8 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations import motion
 from friso.equations.structure import structure
-from friso.hunting.criteria import REST_BAND, settling_of_traces
-from friso.hunting.measures import BANDS, LAST_QUARTER, measuring_options
+from friso.hunting.criteria import settling_of_traces
+from friso.hunting.measures import LAST_QUARTER, bands_of, measuring_options
 from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
 from friso.stage.motion import DURATION, motion_of
@@ -35,9 +35,14 @@ class Dwell:
     settling: Mapping[float, float | None]
 
     @property
+    def bands(self) -> tuple[float, float]:
+        """Return the two bands [m] into which the stage settles, the wider one last."""
+        return min(self.settling), max(self.settling)
+
+    @property
     def slowness(self) -> float:
-        """Return the time of settling within 10 um [s], infinite if the stage does not settle."""
-        time = self.settling[REST_BAND]
+        """Return the time of settling into the wider band [s], infinite if the stage does not settle."""
+        time = self.settling[self.bands[1]]
         return np.inf if time is None else time
 
 
@@ -85,12 +90,13 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
 
     Runs of the motion up to the end of each stand are computed side by side.
     """
-    flat = stage.flat()
+    flat, bands = stage.flat(), bands_of(stage.flat())
     places = motion.stands(flat)
     until = np.array([float(place.until) for place in places])
     since = np.array([float(place.corner) for place in places])
-    entered = np.full((len(places), len(BANDS)), np.inf)
-    for runs in run_chunks(kernel(structure(flat)), {**flat, DURATION: until}, len(places), measuring_options(rtol)):
+    entered = np.full((len(places), len(bands)), np.inf)
+    options = measuring_options(rtol, bands=bands)
+    for runs in run_chunks(kernel(structure(flat)), {**flat, DURATION: until}, len(places), options):
         done = runs.results.statuses == Status.DONE
         for column, band in enumerate(("inner", "outer")):
             times = runs.statistic(f"{band}_exit")
@@ -102,7 +108,7 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
             number + 1,
             float(positions[number]),
             float(since[number]),
-            {band: float(t) if np.isfinite(t) else None for band, t in zip(BANDS, settled[number], strict=True)},
+            {band: float(t) if np.isfinite(t) else None for band, t in zip(bands, settled[number], strict=True)},
         )
         for number in range(len(places))
     ]
@@ -118,8 +124,8 @@ def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tu
     positions = motion.reference(flat, np.array([float(place.corner) for place in places]))
     listed = []
     for number, (place, position) in enumerate(zip(places, positions, strict=True), start=1):
-        within = time <= place.until
-        times = {band: settling_of_traces([place], time[within], deviation[None, within], band)[0] for band in BANDS}
+        within, bands = time <= place.until, bands_of(flat)
+        times = {band: settling_of_traces([place], time[within], deviation[None, within], band)[0] for band in bands}
         settling = {band: float(t) if np.isfinite(t) else None for band, t in times.items()}
         listed.append(Dwell(number, float(position), float(place.corner), settling))
     return tuple(sorted(listed, key=lambda dwell: dwell.slowness, reverse=True))

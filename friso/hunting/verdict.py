@@ -35,7 +35,7 @@ from friso.hunting.cycle.hunting import (
 from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.loop import leaves_for_good, may_run_away
 from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_bandwidths
-from friso.hunting.measures import Measures, measuring_options
+from friso.hunting.measures import Measures, bands_of, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
 from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.search_limits import SEARCH_LIMITS
@@ -189,7 +189,7 @@ def _without_a_target(
             stage.flat(),
             motions,
             1,
-            replace(measuring_options(rtol), room=settings.run_turning_points),
+            replace(measuring_options(rtol, bands=bands_of(stage.flat())), room=settings.run_turning_points),
             possible=attraction.possible,
         )
     if rest.away[0] and leaves_for_good(stage):

@@ -250,10 +250,13 @@ def has_a_map(stages: Ensemble) -> bool:
     - A force limit without anti-windup lets swings grow.
     - Integrals of several loops wind up separately.
     - The stage may stand anywhere within a dead band or a backlash.
+    - A window of the controller remembers the past.
 
     The result is also false where the setting `maps_decide` is.
     """
     if not settings.maps_decide:
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))
+    form = stages.structure.controller
+    stands_anywhere |= form is not None and form.settings.past_decides
     return not (stages.chatters or stands_anywhere or winds_up_at_a_limit(stages) or stages.outer_integrals)

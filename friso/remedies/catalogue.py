@@ -154,7 +154,7 @@ class Remedy:
     @property
     def verifiable(self) -> bool:
         """Tell whether limit cycles can verify the remedy: not if dither keeps the stage moving."""
-        return not settings_of(self.stage.flat()).dither
+        return "dither_amplitude" not in settings_of(self.stage.flat())
 
     @property
     def of_setting(self) -> bool:

@@ -16,7 +16,7 @@ LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
 
 def band_text(band: float) -> str:
     """Write a settling band [m] in words, such as 10 µm."""
-    return f"{1e6 * band:g} {unit_shown('µm')}"
+    return f"{1e6 * band:.4g} {unit_shown('µm')}"
 
 
 @dataclass(frozen=True)

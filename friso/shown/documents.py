@@ -10,7 +10,6 @@ import numpy as np
 
 from friso.axis import axis_shown, unit_of_key
 from friso.hunting import Dwell, Tracking
-from friso.hunting.measures import BANDS
 
 
 def plain_json(value: Any) -> Any:
@@ -62,8 +61,8 @@ def dwells_document(dwells: Sequence[Dwell]) -> list[dict[str, Any]]:
         {
             "move": dwell.number,
             **entries(dwell, "position_m", "since_s"),
-            "settling_time_s": dwell.settling[BANDS[0]],
-            "settling_time_10um_s": dwell.settling[BANDS[1]],
+            "settling_time_s": dwell.settling[dwell.bands[0]],
+            "settling_time_10um_s": dwell.settling[dwell.bands[1]],
         }
         for dwell in dwells
     ]

@@ -9,8 +9,6 @@ import numpy as np
 from friso.axis import axis_shown
 from friso.equations.motion import initial_displacement, reference, rests
 from friso.hunting import MORE_WORK, Dwell, StickSlipSpeeds, Tracking
-from friso.hunting.criteria import REST_BAND
-from friso.hunting.measures import BANDS
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage import Stage
 from friso.stage.motion import motion_of
@@ -68,7 +66,7 @@ def dwell_sentences(dwells: Sequence[Dwell]) -> list[str]:
     if not dwells:
         return []
     texts = [f"{_place(dwell)} {_settling(dwell)}" for dwell in dwells]
-    band = with_unit(REST_BAND, "m")
+    band = with_unit(dwells[0].bands[1], "m")
     return [f"Where its reference stands it is within {band}, the slowest first, {listed(texts, 'and')}."]
 
 
@@ -79,10 +77,10 @@ def _place(dwell: Dwell) -> str:
 
 def _settling(dwell: Dwell) -> str:
     """Say how long a stage takes to settle at a place."""
-    coarse, fine = dwell.settling[REST_BAND], dwell.settling[BANDS[0]]
+    fine, coarse = (dwell.settling[band] for band in dwell.bands)
     if coarse is None:
         return "not before it leaves"
-    finer = f" ({with_unit(BANDS[0], 'm')}: {with_unit(fine, 's')})" if fine is not None else ""
+    finer = f" ({with_unit(dwell.bands[0], 'm')}: {with_unit(fine, 's')})" if fine is not None else ""
     return f"after {with_unit(coarse, 's')}{finer}"
 
 

@@ -6,6 +6,7 @@ Any controller may have the keys against friction.
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from inspect import get_annotations
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, cast
@@ -16,7 +17,7 @@ from pydantic import model_validator
 from friso.errors import StageError
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage.filters import FILTER_ARRAY
-from friso.stage.lists import Rows
+from friso.stage.lists import Rows, Several, Values, element_keys
 from friso.stage.plug_ins import load_own
 from friso.stage.section import Section, SectionClass, UncertainSection, Variants, numeric_fields
 
@@ -30,16 +31,55 @@ class AgainstFriction(UncertainSection):
     integral_leak: Annotated[Value | None, Quantity("Hz", positive, "0.1 Hz")] = None
     """Corner frequency below which an integral acts as a low-pass."""
     error_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
-    """Amount by which the error is reduced, at most to 0, before anything acts on it."""
+    """Amount by which the error is reduced, at most to 0, before anything acts on it.
+
+    With an exit or a time the error is 0 within the deadband, and whole outside."""
+    error_deadband_exit: Annotated[Value | None, Quantity("m", positive, "3 um")] = None
+    """Larger error at which the deadband is left; default: the deadband itself."""
+    error_deadband_time: Annotated[Value | None, Quantity("s", positive, "10 ms")] = None
+    """Time that the error has to stay below the deadband before it is entered."""
+    error_deadband_gain: Annotated[float | None, Number(non_negative, "0.2")] = None
+    """Factor on the error within the deadband; default: 0."""
     integral_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
     """Error below which integrals pause."""
     integral_deadband_exit: Annotated[Value | None, Quantity("m", positive, "3 um")] = None
     """Larger error at which paused integrals continue; default: the deadband itself."""
+    integral_deadband_time: Annotated[Value | None, Quantity("s", positive, "10 ms")] = None
+    """Time that the error has to stay below the deadband before integrals pause."""
+    integral_deadband_decay: Annotated[Value | None, Quantity("s", positive, "50 ms")] = None
+    """Time constant with which paused integrals decay; default: they hold."""
+    integral_rests_in_moves: bool | None = None
+    """Whether integrals pause while the reference moves."""
     integral_reset: bool | None = None
     """Whether integrals restart when the error changes sign."""
     standstill_window: Annotated[Value | None, Quantity("m", positive, "5 um")] = None
     """Error below which the gains are multiplied by `standstill_factor`; integrals keep their force."""
+    standstill_window_exit: Annotated[Value | None, Quantity("m", positive, "15 um")] = None
+    """Larger error at which the usual gains return; default: the window itself."""
+    standstill_window_time: Annotated[Value | None, Quantity("s", positive, "10 ms")] = None
+    """Time that the error has to stay within the window before the gains change."""
     standstill_factor: Annotated[float | None, Number(positive, "0.5")] = None
+    standstill_integral_factor: Annotated[float | None, Number(non_negative, "0.2")] = None
+    """Factor on the integral gain within the window, for controllers by gains; default: `standstill_factor`."""
+    freeze_window: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
+    """Error below which the force is switched off and integrals are emptied, while the reference rests."""
+    freeze_window_exit: Annotated[Value | None, Quantity("m", positive, "3 um")] = None
+    """Larger error at which the controller is engaged again; default: the window itself."""
+    freeze_window_time: Annotated[Value | None, Quantity("s", positive, "10 ms")] = None
+    """Time that the error has to stay within the window before the force is switched off."""
+    windows_at_rest: bool | None = None
+    """Whether deadbands and windows act only while the reference rests."""
+    moving_factor: Annotated[float | None, Number(positive, "1.5")] = None
+    """Factor on the gains while the reference moves; integrals keep their force."""
+    schedule_error: Annotated[Values | None, Several(Quantity("m", non_negative, "0 um"), ("2 um", "20 um"), 2, 12)] = (
+        None
+    )
+    """Sizes of the error, in rising order, at which `schedule_factor` multiplies the gains; between them linearly."""
+    schedule_speed: Annotated[
+        Values | None, Several(Quantity("m/s", non_negative, "0 mm/s"), ("1 mm/s", "20 mm/s"), 2, 12)
+    ] = None
+    """Speeds, in rising order, at which `schedule_factor` multiplies the gains, instead of errors."""
+    schedule_factor: Annotated[Values | None, Several(Number(positive, "0.5"), ("0.2", "1"), 2, 12)] = None
     stiction_push: Annotated[Value | None, Quantity("N", positive, "1 N")] = None
     """Force towards the reference while the reference rests and the error exceeds `stiction_push_window`."""
     stiction_push_window: Annotated[Value | None, Quantity("m", non_negative, "2 um")] = None
@@ -48,14 +88,32 @@ class AgainstFriction(UncertainSection):
     dither_frequency: Annotated[Value | None, Quantity("Hz", positive, "200 Hz")] = None
 
     @model_validator(mode="after")
+    def _schedule_is_whole(self) -> Self:
+        places = [name for name in SCHEDULES if getattr(self, name) is not None]
+        if len(places) > 1:
+            raise StageError(places[1], "a schedule over the error as well", "one of them", EXAMPLES[places[0]])
+        factors = self.schedule_factor
+        if (factors is None) != (not places):
+            lacking = "schedule_factor" if places else "schedule_error"
+            raise StageError(lacking, "nothing", "as many values as the rest of the schedule", EXAMPLES[lacking])
+        if places and factors is not None:
+            at = [float(value) for value in getattr(self, places[0])]
+            if len(at) != len(factors):
+                expected = f"as many values as {places[0]} has, {len(at)}"
+                raise StageError("schedule_factor", f"{len(factors)} values", expected, EXAMPLES["schedule_factor"])
+            if at != sorted({*at}):
+                raise StageError(places[0], "values in another order", "rising values", EXAMPLES[places[0]])
+        return self
+
+    @model_validator(mode="after")
     def _settings_are_whole(self) -> Self:
         for first, second in PAIRS:
             for key, other in ((first, second), (second, first)):
                 if getattr(self, key) is not None and getattr(self, other) is None:
                     raise StageError(other, "nothing", f"what belongs to {key}", EXAMPLES[other])
-        if self.integral_deadband_exit is not None and self.integral_deadband is None:
-            key = "integral_deadband"
-            raise StageError(key, "nothing", "what belongs to integral_deadband_exit", EXAMPLES[key])
+        for key in WINDOW_OF:
+            if getattr(self, key) is not None and getattr(self, WINDOW_OF[key]) is None:
+                raise StageError(WINDOW_OF[key], "nothing", f"what belongs to {key}", EXAMPLES[WINDOW_OF[key]])
         return self
 
 
@@ -66,8 +124,27 @@ PAIRS = (
 )
 """Keys that must be given together."""
 
+WINDOWS = ("error_deadband", "integral_deadband", "standstill_window", "freeze_window")
+"""Keys of errors below which a setting acts. Each may have an exit, a larger error, and a time to stay."""
+
+WINDOW_OF: Mapping[str, str] = {
+    **{f"{window}_{part}": window for window in WINDOWS for part in ("exit", "time")},
+    "error_deadband_gain": "error_deadband",
+    "integral_deadband_decay": "integral_deadband",
+    "standstill_integral_factor": "standstill_window",
+}
+"""The key of the window to which another key belongs."""
+
+SCHEDULES = ("schedule_error", "schedule_speed")
+"""Keys of what a schedule of the gains may depend on."""
+
 EXAMPLES = {
+    "schedule_error": 'schedule_error = ["2 um", "20 um"]',
+    "schedule_speed": 'schedule_speed = ["1 mm/s", "20 mm/s"]',
+    "schedule_factor": "schedule_factor = [0.2, 1]",
+    "error_deadband": 'error_deadband = "1 um"',
     "integral_deadband": 'integral_deadband = "1 um"',
+    "freeze_window": 'freeze_window = "1 um"',
     "standstill_window": 'standstill_window = "5 um"',
     "standstill_factor": "standstill_factor = 0.5",
     "stiction_push": 'stiction_push = "1 N"',
@@ -77,18 +154,42 @@ EXAMPLES = {
 }
 
 
-class FrictionSettings(NamedTuple):
-    """Which settings against friction a controller has."""
+@dataclass(frozen=True)
+class FrictionSettings:
+    """Which settings against friction a controller has: the names of their keys, and the points of its schedule."""
 
-    limit: bool = False
-    leak: bool = False
-    deadband: bool = False
-    hysteresis: bool = False
-    reset: bool = False
-    gains: bool = False
-    push: bool = False
-    dither: bool = False
-    dead_zone: bool = False
+    names: tuple[str, ...] = ()
+    points: int = 0
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names
+
+    def only(self, name: str) -> FrictionSettings:
+        """Return this one of the settings alone, if the controller has it."""
+        return FrictionSettings((name,) if name in self else ())
+
+    def remembers(self, window: str) -> bool:
+        """Tell whether the past decides if a window acts: it has an exit or a time, or empties integrals."""
+        return window == "freeze_window" or f"{window}_exit" in self or f"{window}_time" in self
+
+    @property
+    def bends(self) -> bool:
+        """Tell whether the controller acts otherwise near the reference than far from it."""
+        return any(name in self for name in ("stiction_push", *SCHEDULES, *WINDOWS))
+
+    @property
+    def swings_alone(self) -> bool:
+        """Tell whether a loop without integral may swing for ever.
+
+        A force that is switched where the error grows, and back where it shrinks, feeds a swing.
+        """
+        forces = (window for window in WINDOWS if window != "integral_deadband" and window in self)
+        return any(map(self.remembers, forces))
+
+    @property
+    def past_decides(self) -> bool:
+        """Tell whether more than the distance decides how a stage goes on that sticks off its reference."""
+        return self.swings_alone or "integral_deadband_time" in self
 
 
 NO_SETTINGS = FrictionSettings()
@@ -96,17 +197,21 @@ NO_SETTINGS = FrictionSettings()
 
 def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
     """Return which settings against friction a stage's controller has; `flat` has its keys."""
-    names = ("integral_limit", "integral_leak", "integral_deadband", "integral_deadband_exit")
-    limit, leak, deadband, hysteresis = (f"controller.{name}" in flat for name in names)
-    gains, push, dither = (f"controller.{first}" in flat for first, _ in PAIRS)
-    reset = bool(flat.get("controller.integral_reset", False))
-    dead_zone = "controller.error_deadband" in flat
-    return FrictionSettings(limit, leak, deadband, hysteresis, reset, gains, push, dither, dead_zone)
+    names = (name for name in get_annotations(AgainstFriction) if name != "kind")
+    points = {name: len(element_keys(flat, f"{CONTROLLER}.{name}")) for name in SCHEDULES}
+    values = ((name, flat.get(f"{CONTROLLER}.{name}", points.get(name, 0) > 0)) for name in names)
+    present = tuple(name for name, value in values if value is not None and value is not False)
+    return FrictionSettings(present, sum(points.values()))
 
 
 def dead_band(flat: Mapping[str, Any]) -> Any:
-    """Return the error [m] up to which the controller exerts no force; 0 without a dead zone."""
-    return flat.get("controller.error_deadband", 0.0)
+    """Return the error [m] up to which the controller may exert no force; 0 without a dead zone."""
+    sizes = [flat.get(f"{CONTROLLER}.{window}{end}", 0.0) for window in FORCELESS for end in ("", "_exit")]
+    return np.maximum.reduce(np.broadcast_arrays(*sizes))
+
+
+FORCELESS = ("error_deadband", "freeze_window")
+"""Windows in which the controller exerts no force."""
 
 
 def integral_leak(flat: Mapping[str, Any]) -> Any:
@@ -172,6 +277,8 @@ class ControllerSection(AgainstFriction):
     """Tuning ranges of the keys that shape a controller without making it faster."""
     loop_gain: ClassVar[tuple[str, ...]] = ()
     """Names of the keys to whose product the loop gain is proportional."""
+    integral_gain: ClassVar[Mapping[str, int]] = MappingProxyType({})
+    """Exponents by key, for a controller whose integral gains alone grow by a factor; none if no keys set them."""
     decisive: ClassVar[tuple[str, ...]] = ()
     """Names of the numeric keys on which `variant` and `integrates` depend, for example by being zero."""
     recognised_by: ClassVar[tuple[str, ...]] = ()
@@ -199,6 +306,13 @@ class ControllerSection(AgainstFriction):
             actual = f'anti_windup = "{self.anti_windup}"' if self.anti_windup else "no anti_windup"
             expected = "the anti-windup to which this time belongs"
             raise StageError("anti_windup_time", actual, expected, f'anti_windup = "{BACK_CALCULATION}"')
+        return self
+
+    @model_validator(mode="after")
+    def _has_integral_gains(self) -> Self:
+        if self.standstill_integral_factor is not None and not self.integral_gain:
+            key, expected = "standstill_integral_factor", "a controller with keys for its integral gains, or nothing"
+            raise StageError(key, f'kind = "{self.kind}" as it is written here', expected, "standstill_factor = 0.5")
         return self
 
     @classmethod

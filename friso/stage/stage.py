@@ -15,7 +15,7 @@ from pydantic import field_validator, model_validator
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
-from friso.quantities import Number, Quantity, as_toml, exactly, in_unit_of, quoted, unit_of
+from friso.quantities import COMMANDS, Number, Quantity, as_toml, exactly, in_unit_of, positive, quoted, unit_of
 from friso.stage.contacts import with_guess
 from friso.stage.controllers import (
     ANTI_WINDUP,
@@ -24,6 +24,7 @@ from friso.stage.controllers import (
     FORCE_LIMIT,
     KIND,
     OF_ANY_FORM,
+    WINDOWS,
     ControllerSection,
     controller_of,
 )
@@ -42,8 +43,8 @@ from friso.stage.section import (
     unknown_key,
 )
 from friso.stage.tables import (
+    BRAKING,
     FRICTION,
-    MOTOR_CONSTANT,
     MOTOR_FRICTION,
     MOTOR_MASS,
     Actuator,
@@ -55,6 +56,7 @@ from friso.stage.tables import (
     Joint,
     Masses,
     Parasitic,
+    PositionTolerance,
     StatedMoves,
     Transmission,
     friction_law,
@@ -110,6 +112,7 @@ class Stage(Section):
     cable: Annotated[Cable | None, Table('[cable] stiffness = "50 N/m"')] = None
     floor: Annotated[Floor | None, Table('[floor] frequency = ["1 Hz", "100 Hz"] ...')] = None
     motion: Annotated[Motion, Table('[motion] kind = "step", size = "1 mm", duration = "20 s"', MOTION)]
+    tolerance: Annotated[PositionTolerance | None, Table('[tolerance] within = "5 um"')] = None
     moves: Annotated[StatedMoves | None, Table('[moves] smallest = "10 um", largest = "32 mm"')] = None
 
     rules: ClassVar[tuple[Rule, ...]] = (
@@ -128,11 +131,14 @@ class Stage(Section):
             "an anti-windup time of at least one sample: in a shorter one the integrator overshoots at every sample",
             '[controller] anti_windup_time = "50 ms" with [drive] sample_time = "50 us"',
         ),
-        Rule(
-            ("controller.integral_deadband", "controller.integral_deadband_exit"),
-            lambda f: f.get("controller.integral_deadband_exit", np.inf) >= f.get("controller.integral_deadband", 0.0),
-            "a deadband that is left at a larger error than that at which it is entered",
-            'integral_deadband = "1 um", integral_deadband_exit = "3 um"',
+        *(
+            Rule(
+                (f"controller.{window}", f"controller.{window}_exit"),
+                lambda f, key=f"controller.{window}": f.get(f"{key}_exit", np.inf) >= f.get(key, 0.0),
+                f"a {window.replace('_', ' ')} that is left at a larger error than that at which it is entered",
+                f'{window} = "1 um", {window}_exit = "3 um"',
+            )
+            for window in WINDOWS
         ),
     )
 
@@ -149,7 +155,8 @@ class Stage(Section):
     def axis_kind(self) -> AxisKind:
         """Return the kind of axis, linear or rotary, and the force or torque per ampere."""
         kind = KINDS[self.axis.kind] if self.axis else LINEAR
-        return replace(kind, per_ampere=float(self.actuator.motor_constant)) if self.actuator else kind
+        exerts = self.actuator.exerts if self.actuator else ()
+        return replace(kind, exerts=exerts, counted=counted_by(kind, vars(self)))
 
     @field_validator("name", "source", "note", "unknown")
     @classmethod
@@ -300,6 +307,8 @@ class Stage(Section):
             if isinstance(section, UncertainSection):
                 values = {key: value for key, value in section.numbers.items() if value is not None}
                 flat |= {f"{table}.{key}": _plain(value) for key, value in values.items()}
+        if self.actuator and (braking := self.actuator.braking) is not None:
+            flat[BRAKING] = braking
         return flat
 
     @cached_property
@@ -473,13 +482,28 @@ def axis_written(tables: Mapping[str, Any]) -> AxisKind:
     """
     name = _of_table(tables, "axis", "kind")
     kind = KINDS.get(name, LINEAR) if isinstance(name, str) else LINEAR
-    if tables.get("actuator") is None:
+    kind = replace(kind, counted=counted_by(kind, tables))
+    table = tables.get("actuator")
+    if table is None:
         return kind
     try:
-        constant = MOTOR_CONSTANT.on(kind).read(_of_table(tables, "actuator", "motor_constant"))
-        return replace(kind, per_ampere=float(constant))
-    except InputError:  # a later check reports this error
-        return replace(kind, per_ampere=1.0)
+        actuator = table if isinstance(table, Actuator) else Actuator.on(kind, dict(table))
+        return replace(kind, exerts=actuator.exerts)
+    except (InputError, TypeError, ValueError):  # a later check reports this error
+        return replace(kind, exerts=tuple((command, 1.0) for command in COMMANDS))
+
+
+def counted_by(kind: AxisKind, tables: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
+    """Return the size of a count of the encoder [m or rad], and the time of a sample [s], as far as [drive] has them.
+
+    Errors in [drive] are found later.
+    """
+    counted = []
+    for name, key, unit in (("count", "encoder_resolution", "m"), ("sample", "sample_time", "s")):
+        with suppress(InputError):
+            if (entry := _of_table(tables, "drive", key)) is not None:
+                counted.append((name, float(Quantity(unit, positive, f"1 {unit}").on(kind).read(entry))))
+    return tuple(counted)
 
 
 def _of_table(tables: Mapping[str, Any], name: str, key: str) -> Any:

@@ -40,14 +40,68 @@ MOTOR_CONSTANT = MotorConstant("N/A", positive, "50 N/A")
 
 
 class Actuator(Section):
-    """What an ampere exerts, for drives whose gains are in amperes.
+    """What a drive's command exerts: amperes, or volts on the motor's resistance.
 
-    Forces, also per length or time, may then be written in A, A/mm, A*s/m, ... in every table. How far the true
-    constant is off is drive.motor_constant_ratio.
+    Without a resistance the drive commands a current. Forces, also per length or time, may then be written in A, A/mm,
+    A*s/m, ... in every table. With a resistance it commands a voltage: forces may be written in V, with a supply also
+    in %, with full_pwm also in PWM, and the motor brakes by its back-EMF. How far the true constant is off is
+    drive.motor_constant_ratio.
     """
 
-    motor_constant: Annotated[Value, MOTOR_CONSTANT]
-    """Force per ampere at the load; for a motor with a screw, its torque per ampere times 2 pi / lead."""
+    motor_constant: Annotated[Value | None, MOTOR_CONSTANT] = None
+    """Force per ampere at the load; for a motor with a screw, its torque per ampere times 2 pi / lead. Default: the
+    back-EMF."""
+    resistance: Annotated[Value | None, Quantity("ohm", positive, "2 ohm")] = None
+    """Resistance between the terminals, of a motor whose voltage the drive commands."""
+    back_emf: Annotated[Value | None, Quantity("V*s/m", positive, "50 V*s/m")] = None
+    """Voltage per speed of the load; default: the motor constant, in SI the same number with a commutator."""
+    supply: Annotated[Value | None, Quantity("V", positive, "24 V")] = None
+    """Voltage of a command of 100 %, and of full_pwm."""
+    full_pwm: Annotated[float | None, Number(positive, "255")] = None
+    """Command, in PWM counts, at which the motor gets the whole supply."""
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if self.motor_constant is None and self.back_emf is None:
+            expected = "what an ampere exerts, or the back_emf"
+            raise StageError("motor_constant", "nothing", expected, 'motor_constant = "50 N/A"')
+        for key, other, example in (
+            ("back_emf", "resistance", 'resistance = "2 ohm"'),
+            ("supply", "resistance", 'resistance = "2 ohm"'),
+            ("full_pwm", "supply", 'supply = "24 V"'),
+        ):
+            if getattr(self, key) is not None and getattr(self, other) is None:
+                raise StageError(other, "nothing", f"what belongs to {key}", example)
+        return self
+
+    @property
+    def _constants(self) -> tuple[float, float]:
+        """Return force per ampere and voltage per speed, in SI."""
+        force, voltage = self.motor_constant, self.back_emf
+        return float(voltage if force is None else force), float(force if voltage is None else voltage)  # type: ignore[arg-type]
+
+    @property
+    def exerts(self) -> tuple[tuple[str, float], ...]:
+        """Return the force [N or N m] at standstill per unit of each command that the drive may have."""
+        force, _ = self._constants
+        if self.resistance is None:
+            return (("A", force),)
+        per_volt = force / float(self.resistance)
+        full = None if self.supply is None else per_volt * float(self.supply)
+        listed = [("V", per_volt), *([] if full is None else [("%", full / 100)])]
+        return (*listed, *([("PWM", full / self.full_pwm)] if full is not None and self.full_pwm else []))
+
+    @property
+    def braking(self) -> float | None:
+        """Return the force per speed [N s/m or N m s/rad] by which back-EMF brakes; None for a commanded current."""
+        if self.resistance is None:
+            return None
+        force, voltage = self._constants
+        return force * voltage / float(self.resistance)
+
+
+BRAKING = "actuator.braking"
+"""Key of the damping by back-EMF, which follows from the table."""
 
 
 class Masses(UncertainSection):
@@ -188,6 +242,12 @@ class Bias(UncertainSection):
 
 TIME_ROUNDING = 1e-12
 """Relative tolerance for limits on times, which are sums of decimal numbers."""
+
+
+class PositionTolerance(UncertainSection):
+    """The deviation from its reference within which the stage counts as in position."""
+
+    within: Annotated[Value, Quantity("m", positive, "5 um")]
 
 
 class StatedMoves(Section):

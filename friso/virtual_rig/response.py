@@ -17,7 +17,7 @@ from friso.engine.simulate import checked_interval, time_axis, usual_interval
 from friso.engine.tolerance import checked_rtol
 from friso.equations.as_built import AsBuilt
 from friso.errors import InputError
-from friso.hunting.measures import Measures, SampledSolver, measure_traces
+from friso.hunting.measures import Measures, SampledSolver, bands_of, measure_traces
 from friso.stage import Stage
 from friso.version import VERSION
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run_flat
@@ -70,7 +70,8 @@ def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
     time, status = response["time"].to_numpy(), {one.text: one for one in Status}[response.attrs["status"]]
     deviation = (response["position"] - response["reference"]).to_numpy()[None]
     counts = (np.array([value]) for value in (status, response.attrs["steps"], response.attrs["rejected"]))
-    return measure_traces(stage.flat(), time, deviation, response["command"].to_numpy()[None], SampledSolver(*counts))
+    flat, command = stage.flat(), response["command"].to_numpy()[None]
+    return measure_traces(flat, time, deviation, command, SampledSolver(*counts), bands_of(flat))
 
 
 def _dataset(stage: Stage, flat: dict[str, Any], recorded: RecordedRuns, rtol: float) -> xr.Dataset:

@@ -89,6 +89,9 @@ class Cascade(ControllerSection):
         {"kv": 1, "kp": 1, "position_integral_time": -1, "velocity_integral_time": -1, "velocity_filter": -1}
     )
     loop_gain = ("kp",)
+    integral_gain: ClassVar[Mapping[str, int]] = MappingProxyType(
+        {"position_integral_time": -1, "velocity_integral_time": -1}
+    )
     feeds_back = "velocity"
     decisive = ("velocity_filter", *FEEDFORWARD)
     shares: ClassVar[Mapping[str, str]] = MappingProxyType(

@@ -66,6 +66,7 @@ class PidGains(Pid):
     asked = "any of kp, ki, kd"
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"kp": 2, "ki": 3, "kd": 1, "tau": -1})
     loop_gain = ("kp", "ki", "kd")
+    integral_gain: ClassVar[Mapping[str, int]] = MappingProxyType({"ki": 1})
     decisive = ("ki", "kd", "tau")
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({**Pid.shares, "f": "feedforward"})
     symbols: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType(

@@ -77,7 +77,7 @@ class Ensemble:
         hold the stage at the window's edge as a relay does.
         """
         controller = self.structure.controller
-        return self.structure.joint == "free" or (controller is not None and bool(controller.settings.push))
+        return self.structure.joint == "free" or (controller is not None and "stiction_push" in controller.settings)
 
     def searching_rtol(self, rtol: float) -> float:
         """Return the relative tolerance at which many cycles are closed: `rtol`, or a wider one if they may chatter."""

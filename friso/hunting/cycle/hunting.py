@@ -23,7 +23,7 @@ from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import settings
 from friso.hunting.doubt import HuntingDoubt
-from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm
+from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm, unstable
 from friso.stage import Stage
 from friso.stage.controllers import dead_band
 
@@ -164,7 +164,7 @@ def why_not(form: Structure) -> str:
         return "there is no friction to stick to"
     if form.controller is None or not form.controller.integral:
         return "the controller has no integral action that could wind up"
-    return DITHERS if form.controller.settings.dither else ""
+    return DITHERS if "dither_amplitude" in form.controller.settings else ""
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -179,7 +179,11 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
     if reason := cannot_hunt(stage):
         held = Ensemble.held(stage.flat(), 1)
         calm = bool(surely_calm(held)[0])
-        return Hunting((), reason if calm or reason == DITHERS else HuntingDoubt.LOOP, calm, None)
+        if not calm and reason != DITHERS:
+            form = held.structure.controller
+            switches = form is not None and form.settings.swings_alone and not unstable(stage)
+            reason = HuntingDoubt.SWITCHES if switches else HuntingDoubt.LOOP
+        return Hunting((), reason, calm, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat).standing, variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)

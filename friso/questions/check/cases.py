@@ -13,7 +13,6 @@ from friso import hunting
 from friso.axis import axis_shown
 from friso.hunting import MORE_WORK, Case, CheckPart, Cycle, Kick, Tracking
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.measures import BANDS
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
 from friso.questions.check.words import at_the_end, edge_text, moves_tried
@@ -56,12 +55,12 @@ def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...
     entry are left out.
     """
     effort = axis_shown().effort
-    fine, coarse = map(band_text, BANDS)
-    texts = [
-        (name.format(effort=effort, fine=fine, coarse=coarse), [text(item.case) for item in cases])
+    fine, coarse = map(band_text, cases[0].case.bands)
+    texts = {
+        name.format(effort=effort, fine=fine, coarse=coarse): [text(item.case) for item in cases]
         for name, text in columns.items()
-    ]
-    return [(name, row) for name, row in texts if set(row) != {NOTHING}]
+    }
+    return [(name, row) for name, row in texts.items() if set(row) != {NOTHING}]
 
 
 def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
@@ -205,12 +204,13 @@ def _peaks(case: Case) -> str:
     return f"{case.peaks}{remarks.get((case.verdict, case.peaks > 0), '')}"
 
 
-def _settled_within(band: float) -> Callable[[Case], str]:
-    """Return a function that writes a stage's settling time into a band [m]."""
+def _settled_within(number: int) -> Callable[[Case], str]:
+    """Return a function that writes a stage's settling time into its band with this number, 0 or 1."""
 
     def text(case: Case) -> str:
         """Write the settling time of a stage, or why there is none."""
-        time = case.settling_time.get(band)
+        band = case.bands[number]
+        time = case.settling_time[band]
         if case.tracking:
             return NOTHING
         if time is not None:
@@ -247,8 +247,8 @@ _NUMBERS: dict[str, Callable[[Case], str]] = {
     "Period, last quarter": lambda case: with_unit(case.period, "s"),
     "Largest error on the way": _tracked(lambda tracking: tracking.largest),
     "Error on the way, RMS": _tracked(lambda tracking: tracking.rms),
-    "Settling time into {fine}": _settled_within(BANDS[0]),
-    "Settling time into {coarse}": _settled_within(BANDS[1]),
+    "Settling time into {fine}": _settled_within(0),
+    "Settling time into {coarse}": _settled_within(1),
     "Largest actuator {effort}": lambda case: with_unit(case.largest_force, "N"),
 }
 
@@ -269,15 +269,16 @@ def _feeding(feeding: hunting.Feeding) -> dict[str, Any]:
 
 def case_document(case: hunting.Case) -> dict[str, Any]:
     """Return all results for one state of the joint: verdict, run, cycle, margins and basins."""
-    into_1um, into_10um = case.settling_time.values()
-    last_1um, last_10um = case.in_the_end.values()
+    into_fine, into_coarse = (case.settling_time[band] for band in case.bands)
+    last_fine, last_coarse = (case.in_the_end[band] for band in case.bands)
     judgement = case.judgement
     return {
         **entries(case, "verdict", "peaks", "peak_to_peak_m", "period_s"),
-        "settling_time_s": into_1um,
-        "settling_time_10um_s": into_10um,
-        "settling_time_in_the_end_s": last_1um,
-        "settling_time_10um_in_the_end_s": last_10um,
+        "bands_m": case.bands,
+        "settling_time_s": into_fine,
+        "settling_time_10um_s": into_coarse,
+        "settling_time_in_the_end_s": last_fine,
+        "settling_time_10um_in_the_end_s": last_coarse,
         **entries(case, "largest_force_n", "unmoved"),
         "breakaway_force_n": case.breakaway,
         "cycle": _cycle(judgement.cycle) if judgement.cycle else None,

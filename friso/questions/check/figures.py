@@ -158,7 +158,8 @@ def _settling(cases: list[ShownCase]) -> Panel:
         (float(np.max(line.y[np.isfinite(line.y)], initial=LEAST_DEVIATION)) for line in lines), default=LEAST_DEVIATION
     )
     dashes: tuple[Dash, ...] = ("dotted", "dashed")
-    bands = tuple(Limit((band,), band_text(band), INK, dash) for band, dash in zip(BANDS, dashes, strict=True))
+    own = zip(dict.fromkeys(cases[0].case.bands), dashes, strict=False)
+    bands = tuple(Limit((band,), band_text(band), INK, dash) for band, dash in own)
     axis = Axis("|Deviation|", "m", (LEAST_DEVIATION, max(2 * largest, 1e-3)), log=True)
     return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
 

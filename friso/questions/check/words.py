@@ -20,7 +20,6 @@ from friso.hunting import (
     MoveShare,
 )
 from friso.hunting.criteria import ATTRACTED, Verdict
-from friso.hunting.measures import BANDS
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
 from friso.shown.cases import ShownCase, band_text, shown_cases
@@ -37,11 +36,9 @@ from friso.shown.drawing.prefixes import (
 from friso.shown.loop_words import unstable_where
 from friso.shown.motion_words import dwell_sentences, following_sentence, stick_slip_sentences
 from friso.shown.unknown import if_so
-from friso.stage.controllers import FORCE_LIMIT, ControllerSection, integral_leak
+from friso.stage.controllers import FORCE_LIMIT, ControllerSection, dead_band, integral_leak
 from friso.stage.motion import motion_of
 from friso.stage.section import numeric_fields
-
-_MICRON, _TEN_MICRON = BANDS
 
 _AFTERWARDS = {
     "stable": "dies out slowly, if at all",
@@ -179,7 +176,12 @@ def _reserve(case: Case) -> str:
 
 def at_the_end(case: Case) -> str:
     """Write the peak-to-peak motion in the last quarter of a run."""
-    return length_at_rest(case.peak_to_peak)
+    return length_at_rest(case.peak_to_peak, encoder_step(case))
+
+
+def encoder_step(case: Case) -> float:
+    """Return the step of the stage's encoder [m]; 0 if the stage file states none."""
+    return float(case.stage.flat().get("drive.encoder_resolution", 0.0))
 
 
 def _hunting(case: Case) -> list[str]:
@@ -258,14 +260,14 @@ def _transient(case: Case) -> list[str]:
         cannot = f"cannot hunt, because {judgement.hunting.reason}; but this motion "
         return [f"{cannot if judgement.hunting.certain else ''}has not settled at its end ({end}){_held(case)}."]
     leaks = _held_by_a_leak(case)
-    if leaks and case.peak_to_peak < _TEN_MICRON and judgement.hunting.certain and not judgement.runs_away:
+    if leaks and case.peak_to_peak < case.bands[1] and judgement.hunting.certain and not judgement.runs_away:
         stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
         return [f"does not hunt, but {leaks}{stays}."]
     first = f"does not hunt, but has not settled at the end of its run ({end}){_held(case)}"
     if judgement.runs_away:
         first += "; afterwards it runs away from its reference"
     elif judgement.settled_after is not None:
-        first += f"; it settles to within {band_text(_TEN_MICRON)} in {with_unit(judgement.settled_after, 's')}"
+        first += f"; it settles to within {band_text(case.bands[1])} in {with_unit(judgement.settled_after, 's')}"
     elif judgement.followed is not None:
         first += f"; it does not in {with_unit(judgement.followed, 's')} either"
     seen_to_its_end = judgement.settled_after or judgement.followed or judgement.runs_away
@@ -280,7 +282,8 @@ def _held_by_a_leak(case: Case) -> str:
     """Say how far off its reference the leak of the integral holds a stage; empty without a leak, or at a limit."""
     if not integral_leak(case.stage.flat()) or case.force_limit is not None:
         return ""
-    return f"rests {length_at_rest(abs(case.offset))} off its reference: the leak of its integral holds it there"
+    off = length_at_rest(abs(case.offset), encoder_step(case))
+    return f"rests {off} off its reference: the leak of its integral holds it there"
 
 
 def _held(case: Case) -> str:
@@ -309,10 +312,11 @@ def _settling(case: Case) -> list[str]:
 def _later(case: Case) -> str:
     """Say that a motion which still swings at the end of its run comes to rest later.
 
-    The text is empty if the motion settles within its run, or swings by less than 10 um. It is also empty if the stage
-    ends more than 10 um off its reference.
+    The text is empty if the motion settles within its run, or swings by less than the wider band. It is also empty if
+    the stage ends farther off its reference.
     """
-    if case.in_the_end.get(_TEN_MICRON) is not None or case.peak_to_peak < _TEN_MICRON or case.offset > _TEN_MICRON:
+    band = case.bands[1]
+    if case.in_the_end[band] is not None or case.peak_to_peak < band or case.offset > band:
         return ""
     return f" (later than in its run of {with_unit(case.stage.flat()['motion.duration'], 's')})"
 
@@ -327,25 +331,34 @@ def _stuck(case: Case) -> str:
 
 def _settling_sentence(case: Case) -> str:
     """Say how fast a stage settles, and into which band."""
-    fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
-    stuck = _stuck(case)
-    if fine == 0 and stuck:
-        return f"settles: it ends within {band_text(_MICRON)} of its reference{stuck}."
-    if fine == 0:
-        return f"stays within {band_text(_MICRON)} of its reference from the end of the motion on."
-    if fine is not None:
-        return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}{stuck}."
-    if coarse is not None:
-        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}{stuck}"
+    (fine, coarse), (into_fine, into_coarse) = case.bands, map(case.settling_time.get, case.bands)
+    stuck, small, wide = _stuck(case), _band(case, fine), _band(case, coarse)
+    if into_fine == 0 and stuck:
+        return f"settles: it ends within {small} of its reference{stuck}."
+    if into_fine == 0:
+        return f"stays within {small} of its reference from the end of the motion on."
+    if into_fine is not None:
+        return f"settles to within {small} in {with_unit(into_fine, 's')}{stuck}."
+    if into_coarse is not None:
+        within = f"settles to within {wide} in {with_unit(into_coarse, 's')}{stuck}"
         swing = _small_swing(case)
-        off = abs(case.offset) > _MICRON and case.in_the_end.get(_MICRON) is None
-        finer = f"not to within {band_text(_MICRON)}{_at_the_far_end(case, _MICRON)}"
+        off = abs(case.offset) > fine and case.in_the_end[fine] is None
+        finer = f"not to within {small}{_at_the_far_end(case, fine)}"
         finer = (off and _held_by_a_leak(case)) or finer
-        return f"{within}, but {f'does not stay within {band_text(_MICRON)}{swing}' if swing else finer}."
-    if far := _at_the_far_end(case, _TEN_MICRON):
-        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(case.in_the_end[_TEN_MICRON] or 0.0, 's')}"
+        return f"{within}, but {f'does not stay within {small}{swing}' if swing else finer}."
+    if far := _at_the_far_end(case, coarse):
+        within = f"settles to within {wide} in {with_unit(case.in_the_end[coarse] or 0.0, 's')}"
         return f"{within}{stuck}, but not{far}."
-    return f"settles{stuck}, but not to within {band_text(_TEN_MICRON)} ({_end(case)}){_held(case)}."
+    return f"settles{stuck}, but not to within {wide} ({_end(case)}){_held(case)}."
+
+
+def _band(case: Case, band: float) -> str:
+    """Write a band [m], and what of the machine makes it so wide."""
+    causes = {
+        float(dead_band(case.stage.flat())): "within which its controller exerts no force",
+        encoder_step(case): "a step of its encoder",
+    }
+    return f"{band_text(band)}{f' ({causes[band]})' if band in causes else ''}"
 
 
 def _at_the_far_end(case: Case, band: float) -> str:
@@ -354,8 +367,8 @@ def _at_the_far_end(case: Case, band: float) -> str:
 
 
 def _small_swing(case: Case) -> str:
-    """Describe the swing of a motion that stays within 10 um; empty if it does not swing."""
-    if not case.period or case.peak_to_peak < _MICRON:
+    """Describe the swing of a motion that stays within the wider band; empty if it does not swing."""
+    if not case.period or case.peak_to_peak < case.bands[0]:
         return ""
     return f": at its end it swings by {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
 
@@ -593,7 +606,8 @@ def _swing(case: Case) -> str:
     """Write the size and period of the hunting cycle, such as "±0.52 mm every 1.63 s"."""
     swing = case.judgement.swing
     assert swing  # the verdict implies an attracting cycle
-    size, turns = plus_minus(swing.amplitude, "m"), swing.swings / 2
+    turns, step = swing.swings / 2, encoder_step(case)
+    size = plus_minus(swing.amplitude, "m") if swing.amplitude > step else f"by less than ± {with_unit(step, 'm')}"
     often = f"{size} every {with_unit(swing.period / turns, 's')}"
     if turns == 1:
         return often
@@ -602,8 +616,8 @@ def _swing(case: Case) -> str:
 
 def _end(case: Case) -> str:
     """Write the residual motion in the last quarter of the run."""
-    if case.peak_to_peak < _TEN_MICRON:
-        return f"at rest, but {length_at_rest(abs(case.offset))} off its reference"
+    if case.peak_to_peak < case.bands[1]:
+        return f"at rest, but {length_at_rest(abs(case.offset), encoder_step(case))} off its reference"
     if not case.period:
         return f"in its last quarter it still moves by {at_the_end(case)}"
     return f"still {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"

@@ -45,7 +45,9 @@ def notes(gains: Gains) -> list[str]:
     texts = [f"Also part of the controller: {'; '.join(others)}"] if others else []
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
         texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
-    if not any(unit.startswith("A") for row in gains.conversions for _, unit in row.values):
+    if not gains.stage.axis_kind.exerts and not any(
+        unit.startswith("A") for row in gains.conversions for _, unit in row.values
+    ):
         texts.append('Amperes are added by --set motor_constant="30 N/A" (per turn: "0.5 N*m/A"; or an [actuator])')
     if gains.kind is not None:
         texts.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source})")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.hunting.criteria import CREEPS, OUTCOME_CRITERION, REST_BAND, RESTS, SWINGS
-from friso.hunting.measures import BANDS, LAST_QUARTER, Measures
+from friso.hunting.criteria import CREEPS, OUTCOME_CRITERION, RESTS, SWINGS
+from friso.hunting.measures import LAST_QUARTER, Measures
 from friso.shown.documents import dwells_document, plain_json
 from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
 from friso.shown.motion_words import off_its_reference
@@ -83,13 +83,14 @@ def _settling(measures: Measures) -> str:
     (fine, coarse), (last_fine, last_coarse) = (
         tuple(map(_value, times)) for times in (measures.settling_time, measures.in_the_end)
     )
-    text = f"within {with_unit(REST_BAND, 'm')} of its reference, {with_unit(last_coarse, 's')} after its last corner"
+    small, wide = (with_unit(band, "m") for band in measures.bands)
+    text = f"within {wide} of its reference, {with_unit(last_coarse, 's')} after its last corner"
     if not np.isnan(last_fine):
-        text = f"{text}; within {with_unit(BANDS[0], 'm')} after {with_unit(last_fine, 's')}"
+        text = f"{text}; within {small} after {with_unit(last_fine, 's')}"
     if np.isnan(coarse):
-        return f"{text}; not within {with_unit(REST_BAND, 'm')} at the far end before it returned"
+        return f"{text}; not within {wide} at the far end before it returned"
     if np.isnan(fine) and not np.isnan(last_fine):
-        return f"{text}; not within {with_unit(BANDS[0], 'm')} at the far end before it returned"
+        return f"{text}; not within {small} at the far end before it returned"
     far = f"{with_unit(coarse, 's')} and {with_unit(fine, 's')}" if fine > last_fine else with_unit(coarse, "s")
     return f"{text} (at the far end {far})" if coarse > last_coarse or fine > last_fine else text
 
@@ -106,7 +107,7 @@ def simulate_document(
 
     `name` is the name of the stage.
     """
-    into_1um, into_10um = measures.settling_time
+    into_fine, into_coarse = measures.settling_time
     return plain_json(
         {
             "conclusion": conclusion,
@@ -115,8 +116,9 @@ def simulate_document(
             "criterion": OUTCOME_CRITERION,
             "peak_to_peak_m": measures.peak_to_peak[0],
             "period_s": measures.period[0],
-            "settling_time_s": into_1um[0],
-            "settling_time_10um_s": into_10um[0],
+            "bands_m": measures.bands,
+            "settling_time_s": into_fine[0],
+            "settling_time_10um_s": into_coarse[0],
             **({"dwells": dwells_document(dwells)} if dwells else {}),
             "solver": {key: response.attrs[key] for key in ("status", "steps", "rejected", "rtol")},
         }

@@ -71,12 +71,14 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     return f"{number:.{digits - 1}e} {text}"
 
 
-def length_at_rest(value: float) -> str:
+def length_at_rest(value: float, step: float = 0.0) -> str:
     """Write how far [m] a stage still moves.
 
-    Below a nanometre, digits would only show the solver's error.
+    Below a nanometre, digits would only show the solver's error, and below a `step` of the encoder [m] nobody sees it.
     """
-    return f"< 1 {unit_shown('nm')}" if value < SOLVED_LENGTH else with_unit(value, "m")
+    if value < max(step, SOLVED_LENGTH):
+        return f"< {with_unit(step, 'm')}" if step > SOLVED_LENGTH else f"< 1 {unit_shown('nm')}"
+    return with_unit(value, "m")
 
 
 def digits_that_differ(values: Sequence[float]) -> int:
