@@ -21,8 +21,7 @@ import numpy as np
 
 from benchmarks.windows_by_hand import relaxed, trace
 from friso.equations.bandwidth import faster
-from friso.hunting import Hunting, hunting
-from friso.hunting.margin import search_bandwidths
+from friso.hunting import Hunting, find_margin, hunting
 from friso.stage import Stage, loads
 
 MASS, STEP, LONG = 1.7, 3e-5, 25.0
@@ -158,7 +157,7 @@ def compared(number: int, seed: int = 87) -> Compared:
     one, edge = drawn(number, seed), ""
     said = hunting(one.stage)
     attracts, lasting = bool(said.attracting or said.observed), len(swings(one.stage.flat(), sticking(said)))
-    margin = search_bandwidths(one.stage, True).margin if attracts else None
+    margin = find_margin(one.stage, True) if attracts else None
     if margin and margin.certain:
         below, above = (faster(one.stage.flat(), factor) for factor in (0.9 * margin.factor, 1.1 * margin.quiet))
         slower = one.stage.with_numbers(
