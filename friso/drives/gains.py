@@ -71,7 +71,7 @@ def output_of(stage: Stage, user_values: Mapping[str, Any]) -> tuple[str, float]
             raise InputError("--set", quoted(key), f"a key of the stage, {TRAVEL} or {MOTOR_CONSTANT}")
     flat = stage.flat()
     answers = UserAnswers({**_told(stage, flat), **user_values})
-    if per_ampere := Turn.of(flat, answers, stage.axis_kind.per_ampere).per_ampere:
+    if per_ampere := Turn.of(flat, answers, stage.axis_kind.exerts).per_ampere:
         return "A", 1 / per_ampere
     if of_output := flat.get("drive.force_per_output"):
         return "output of the drive", 1 / of_output

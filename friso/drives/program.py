@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -135,7 +136,9 @@ class LinearController:
         ((a, b, c, d),) = self.samples
         column = self.inputs.index(name)
         z = np.exp(1j * turns)[:, None, None]
-        inside = np.linalg.solve(z * np.eye(len(a)) - a, np.broadcast_to(b[:, [column]], (len(turns), len(a), 1)))
+        inside = np.linalg.solve(
+            z * np.eye(len(a)) - a, np.broadcast_to(b[:, column : column + 1], (len(turns), len(a), 1))
+        )
         return (c @ inside)[:, 0, 0] + d[0, column]
 
     def as_system(self) -> Any:
@@ -144,8 +147,7 @@ class LinearController:
         Loops at several rates are lifted to their common period, which is then dt: its inputs and outputs are those of
         the samples in it, one after another, such as position_0 and position_1.
         """
-        import control
-
+        control: Any = import_module("control")  # its own annotations mislead the type checker about NumPy elsewhere
         n, count, width = len(self.states), len(self.samples), len(self.inputs)
         along, pushed = np.eye(n), np.zeros((n, count * width))
         c, d = np.zeros((count, n)), np.zeros((count, count * width))
@@ -364,13 +366,12 @@ def linear_controller(flat: Mapping[str, Any], samples: int = 1) -> LinearContro
     from dataclasses import replace
 
     from friso.equations.sampled import counter
-    from friso.stage.controllers import FrictionSettings
     from friso.stage.rig import LOOPS
 
     form = AsBuilt.of(flat)
     control = form.structure.controller
     assert control is not None
-    bare = replace(control, anti_windup=None, settings=FrictionSettings(leak=control.settings.leak))
+    bare = replace(control, anti_windup=None, settings=control.settings.only("integral_leak"))
     plain = {**flat, "drive.feedforward_coulomb": 0.0, "drive.integrator_deadband": 0.0, "drive.integrator_reset": 0.0}
     inputs, output, memories = _discrete(replace(form, structure=replace(form.structure, controller=bare)), plain)
     inputs = [one for one in inputs if one != DIRECTION]
@@ -384,7 +385,7 @@ def linear_controller(flat: Mapping[str, Any], samples: int = 1) -> LinearContro
         along: Sequence[Any] = [*(one.symbol for one in states), *inputs]
         rows = [in_arithmetic(sp.sympify(row)).replace(floored, sp.floor) for row in rows]
         jacobian = sp.Matrix(rows).jacobian(along).xreplace({DIRECTION: sp.S.Zero, **values})
-        whole = np.array(jacobian.evalf(subs={}), dtype=float)
+        whole = np.asarray(jacobian.evalf(subs={}).tolist(), dtype=float)
         n = len(states)
         sets.append((whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]))
     return LinearController(

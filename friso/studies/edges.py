@@ -113,8 +113,8 @@ def fine_edges(
         for axis in axes
     )
     sides = [one.place(np.sort(axis.values)) for one, axis in zip(ranges, axes, strict=True)]
-    order = np.ix_(*(np.argsort(axis.values) for axis in axes))
-    levels = verdict_levels(runs[metric].transpose(*study.names).to_numpy().astype(str)[order])
+    first, second = (np.argsort(axis.values) for axis in axes)
+    levels = verdict_levels(runs[metric].transpose(*study.names).to_numpy().astype(str)[first][:, second])
     space = Space(ranges, lambda values: flat_cells(study.stage, study.links, values))
     search = _Search(study, metric, space, crew, progress)
     near, far = (np.stack([_mesh(sides)] * 2) for _ in range(2))

@@ -183,7 +183,7 @@ def message(runs: xr.Dataset, metric: str, edges: MapEdges | None) -> str:
     if len(axes) != 2 or any(axis.words for axis in axes):
         return ""
     words = np.asarray(runs[metric].transpose(*(axis.key for axis in axes)).values).astype(str)
-    levels = verdict_levels(words[np.ix_(*(axis.places for axis in axes))])
+    levels = verdict_levels(words[axes[0].places][:, axes[1].places])
     if np.isnan(levels).all():
         return ""
     hunts, decided = levels == HUNTS_LEVEL, ~np.isnan(levels)
