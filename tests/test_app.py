@@ -636,7 +636,7 @@ def test_the_loops_of_the_limit_cases_come_before_those_of_the_family(served: Se
     answer = friso.bode(RIG)
     first, family, words = (part for part in served.ask("bode", RIG) if part["kind"] != "message")
     drawn = [[figure["name"] for figure in part["figures"]] for part in (first, family)]
-    assert drawn[0] == ["bode_plant", "bode_loop"]
+    assert drawn[0] == ["bode_loop", "bode_plant"]
     assert [*drawn[0], *drawn[1]] == family["names"] == [figure.name for figure in answer.figures()]
     assert first["names"] is None
     assert (words["sentences"], "figures" in words) == ([*answer.sentences()], False)
