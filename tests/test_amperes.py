@@ -158,10 +158,10 @@ def test_gains_to_type_in_name_the_log_to_record_next(tmp_path: Path) -> None:
     """The file of a stage leads on; a stage without a file, or with changed keys, has no name to lead on with."""
     file = tmp_path / "axis.toml"
     file.write_text(Path(friso.example("thesis_rig")).read_text())
-    gains = friso.export("gains", file)
+    gains = friso.export(file)
     assert gains.next_steps([]) == [f"friso identify NEW_LOG.csv --against {file}"]
-    assert friso.export("gains", file, set={"controller.crossover": "9 Hz"}).next_steps([]) == []
-    assert friso.export("gains", Stage(**LINEAR)).next_steps([]) == []
+    assert friso.export(file, set={"controller.crossover": "9 Hz"}).next_steps([]) == []
+    assert friso.export(Stage(**LINEAR)).next_steps([]) == []
 
 
 def test_volts_exert_what_the_motor_draws_at_standstill() -> None:

@@ -32,7 +32,7 @@ QUICK: dict[str, list[str]] = {
     "bode": ["bode", RIG, *OUT],
     "simulate": ["simulate", RIG, *OUT],
     "flexure": ["flexure", LEAVES, *OUT],
-    "export": ["export", "gains", STICK_SLIP, "--to", "linuxcnc", "--set", "machine_unit=mm",
+    "export": ["export", STICK_SLIP, "--to", "linuxcnc", "--set", "machine_unit=mm",
                "--set", "force_per_output=20 N", *OUT],
     "logs": ["logs", "log.csv", *OUT],
     "init": ["init", "stage.toml"],
