@@ -12,7 +12,7 @@ from math import isclose, isfinite, pi
 from typing import Any
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.questions import UserAnswers
+from friso.drives.questions import OpenQuestion, UserAnswers
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
 from friso.stage.controllers import controller_of
@@ -103,6 +103,30 @@ class Turn:
             expected = f"that of [actuator], {per_ampere:.6g} {unit} at the load, which is enough"
             raise InputError(MOTOR_CONSTANT, f"{exerted:.6g} {unit} at the load", expected)
         return cls(travel, (("A", exerted), *(one for one in exerts if one[0] != "A")))
+
+
+def kind_of_turn(answers: UserAnswers) -> AxisKind:
+    """Return the kind of axis that the answer on the travel of a turn implies; linear without an answer."""
+    return answers.kind_of(TRAVEL, TRAVELS)[0] if TRAVEL in answers else LINEAR
+
+
+def open_turn(answers: UserAnswers, meaning: str, example: str) -> list[OpenQuestion]:
+    """Ask how far a turn moves the load unless it is answered."""
+    return [] if TRAVEL in answers else [OpenQuestion(TRAVEL, meaning, example)]
+
+
+def open_turn_back(flat: Mapping[str, Any], answers: UserAnswers, meaning: str) -> list[OpenQuestion]:
+    """Ask how far a turn moves the load unless a transmission or an answer tells."""
+    if travel_of(flat) is not None:
+        return []
+    return open_turn(answers, meaning, TRAVELS[axis_of(flat)].written_example)
+
+
+def travel_back(flat: Mapping[str, Any], answers: UserAnswers) -> float:
+    """Return how far a turn moves the load [m or rad], by an answer or by the transmission."""
+    travel = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else travel_of(flat)
+    assert travel is not None  # refused earlier if missing
+    return float(travel)
 
 
 Convert = Callable[[float, Turn, AxisKind], list[Other]]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import isclose
 from typing import Any
 
-from friso.axis import KINDS, LINEAR, AxisKind, axis_of
+from friso.axis import KINDS, LINEAR, AxisKind
 from friso.drives.format import AxisParameters, FlatStage, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers
 from friso.errors import InputError
@@ -111,11 +111,6 @@ def open_units(answers: UserAnswers, kind: AxisKind, output: str, position: str 
 def force_of(answers: UserAnswers, kind: AxisKind) -> float:
     """Return what an output of 1 exerts at the load [N or N m], as the user answers."""
     return answers.value(FORCE, FORCE_FIELD.on(kind))
-
-
-def open_units_back(flat: FlatStage, answers: UserAnswers, output: str, position: str = "") -> tuple[OpenQuestion, ...]:
-    """List what is open of the units for the way from a stage back to the drive."""
-    return tuple(open_units(answers, axis_of(flat), output, position))
 
 
 SAMPLE_TIME = "drive.sample_time"

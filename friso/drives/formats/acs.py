@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
+from friso.drives.pid_units import open_period
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Number, positive
 
 GAIN, TIME = "controller.kp", "controller.velocity_integral_time"
-SAMPLE_TIME = "drive.sample_time"
 
 _VARIABLE = re.compile(
     r"(?<![\w.])([A-Z][A-Z0-9_]{2,20})[ \t]*\([ \t]*(\d{1,3})[ \t]*\)[ \t]*=(?!=)[ \t]*([^\s;!]{1,60})"
@@ -59,12 +59,12 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
     """List what the program leaves open: the machine, and what the velocity loop exerts."""
     asked = [
         OpenQuestion(GAIN, f"force per velocity error that SLVKP = {axis.number('SLVKP'):g} makes", '"500 N*s/m"'),
-        OpenQuestion(SAMPLE_TIME, "period of the loops", '"50 us"'),
     ]
     if axis.is_set("SLVKI"):
         what = f"integral time that SLVKI = {axis.number('SLVKI'):g} makes"
         asked.append(OpenQuestion(TIME, what, '"5 ms"'))
-    return (*(one for one in asked if one.key not in answers), *of_the_machine(answers))
+    period = open_period(answers, '"50 us"')
+    return (*(one for one in asked if one.key not in answers), *period, *of_the_machine(answers))
 
 
 def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from math import pi
 from typing import Any
 
-from friso.axis import LINEAR, AxisKind, axis_of
-from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
+from friso.axis import LINEAR, AxisKind
+from friso.drives.conversions import TRAVEL, TRAVELS, kind_of_turn, open_turn, open_turn_back, travel_back
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
@@ -22,6 +22,7 @@ from friso.quantities import Number, Quantity, positive, quoted
 CYCLE, GAIN = "drive.position_sample_time", "controller.kp"
 CURRENT, TIME, PER_AMPERE = "MOT_VELO_KP", "MOT_VELO_TI", "MOT_TRQ_CONST_MNM_P_A"
 LIMIT = "MOT_I_MAX_MA"
+TURN = "what one turn of the motor moves"
 
 _YAML = re.compile(r"( *)([A-Za-z_]\w*):[ \t]*([^#\n]*?)[ \t]*(?:#.*)?")
 _COMMAND = re.compile(r"[ \t]*epicsEnvSet\([ \t]*\"?(\w+)\"?[ \t]*,[ \t]*\"?([^\"),]*)\"?[ \t]*\)[ \t]*(?:#.*)?")
@@ -53,11 +54,9 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """List what the file leaves open: the machine, and the loop that the other file has."""
-    kind = answers.kind_of(TRAVEL, TRAVELS)[0] if TRAVEL in answers else LINEAR
+    kind = kind_of_turn(answers)
     of_motor = CURRENT in axis.values
-    asked = []
-    if of_motor and TRAVEL not in answers:
-        asked.append(OpenQuestion(TRAVEL, "what one turn of the motor moves; an angle on a rotary axis", '"10 mm"'))
+    asked = open_turn(answers, f"{TURN}; an angle on a rotary axis", '"10 mm"') if of_motor else []
     if of_motor and "controller.kv" not in answers:
         asked.append(OpenQuestion("controller.kv", "Kp of the axis's YAML file", '"15 1/s"'))
     if not of_motor and GAIN not in answers:
@@ -107,20 +106,16 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """Ask what a turn of the motor moves, and for its constant; () if a transmission or answers tell."""
-    turn = OpenQuestion(TRAVEL, "what one turn of the motor moves", '"10 mm"')
     ampere = OpenQuestion(PER_AMPERE.lower(), "torque constant of the motor in mN m/A", "96")
-    asked = [] if TRAVEL in answers or travel_of(flat) is not None else [turn]
-    return (*asked, *([] if ampere.key in answers else [ampere]))
+    return (*open_turn_back(flat, answers, TURN), *([] if ampere.key in answers else [ampere]))
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the gains of both loops. Raises InputError for a controller other than a cascade."""
     if flat["controller.kind"] != "cascade":
         raise lacks(f'kind = "{flat["controller.kind"]}"', "a cascade, the only structure of ecmc and its drive")
-    travel = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else travel_of(flat)
-    assert travel is not None  # refused earlier if missing
     constant = answers.value(PER_AMPERE.lower(), Number(positive, "96"))
-    force = 2 * pi / travel
+    force = 2 * pi / travel_back(flat, answers)
     kv, integral = flat["controller.kv"], flat.get("controller.position_integral_time")
     cycle = flat.get(CYCLE, flat.get("drive.sample_time", 0.0))
     values = {"Kp": kv, "Ki": kv * cycle / integral if integral else 0.0}

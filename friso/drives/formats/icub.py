@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 from friso.axis import KINDS, axis_of
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks
-from friso.drives.pid_units import PidUnits, force_of, open_units, open_units_back
+from friso.drives.pid_units import PidUnits, force_of, open_units
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 
@@ -67,7 +67,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """Ask what a unit of PWM exerts unless it is answered."""
-    return open_units_back(flat, answers, OUTPUT)
+    return tuple(open_units(answers, axis_of(flat), OUTPUT))
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:

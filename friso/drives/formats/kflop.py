@@ -19,7 +19,6 @@ from friso.drives.pid_units import (
     force_of,
     kind_of_length,
     open_units,
-    open_units_back,
 )
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
@@ -107,7 +106,7 @@ def _biquad(axis: AxisParameters, number: int) -> dict[str, Any] | None:
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """Ask for the units of output and position unless they are answered."""
-    return open_units_back(flat, answers, OUTPUT, COUNT)
+    return tuple(open_units(answers, axis_of(flat), OUTPUT, COUNT))
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:

@@ -12,7 +12,7 @@ from math import pi
 from typing import Any
 
 from friso.axis import LINEAR, axis_of
-from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
+from friso.drives.conversions import TRAVEL, TRAVELS, kind_of_turn, open_turn, open_turn_back, travel_back
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters
 from friso.drives.pid_units import PidUnits, open_period
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
@@ -46,9 +46,8 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """List what the configuration leaves open: the machine, and what a revolution of the output moves."""
-    kind = answers.kind_of(TRAVEL, TRAVELS)[0] if TRAVEL in answers else LINEAR
-    turn = [] if TRAVEL in answers else [OpenQuestion(TRAVEL, TURN, '"360 deg"')]
-    return (*turn, *open_period(answers, '"33.3 us"'), *of_the_machine(answers, kind))
+    period = open_period(answers, '"33.3 us"')
+    return (*open_turn(answers, TURN, '"360 deg"'), *period, *of_the_machine(answers, kind_of_turn(answers)))
 
 
 def _units(kind: Any, travel: float) -> PidUnits:
@@ -75,17 +74,12 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """Ask what a revolution of the output moves; () if a transmission or an answer tells."""
-    if TRAVEL in answers or travel_of(flat) is not None:
-        return ()
-    return (OpenQuestion(TRAVEL, TURN, TRAVELS[axis_of(flat)].written_example),)
+    return tuple(open_turn_back(flat, answers, TURN))
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the parameters of a moteus. Raises InputError for a controller other than a PID by its gains."""
-    kind = axis_of(flat)
-    travel = answers.value(TRAVEL, TRAVELS[kind]) if TRAVEL in answers else travel_of(flat)
-    assert travel is not None  # refused earlier if missing
-    return _units(kind, travel).parameters(flat, NAMES)
+    return _units(axis_of(flat), travel_back(flat, answers)).parameters(flat, NAMES)
 
 
 def text(settings: Mapping[str, float]) -> str:

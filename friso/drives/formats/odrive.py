@@ -14,9 +14,9 @@ from collections.abc import Mapping
 from math import inf, pi
 from typing import Any
 
-from friso.axis import LINEAR, AxisKind, axis_of
+from friso.axis import LINEAR, AxisKind
 from friso.drives.arithmetic import number_in
-from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
+from friso.drives.conversions import TRAVEL, TRAVELS, kind_of_turn, open_turn, open_turn_back, travel_back
 from friso.drives.format import (
     AsStage,
     AxisParameters,
@@ -37,6 +37,7 @@ from friso.stage.lists import row_keys
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
 LIMITS_OF_MOVES = f"{MOVE}.vel_limit", f"{MOVE}.accel_limit"
 GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
+TURN = "what one turn of the motor moves"
 SAMPLE_RATE = 8000.0
 """Samples of the controller per second, in ODrive 3."""
 
@@ -263,14 +264,9 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
             asked.append(OpenQuestion(GAINS_IN, what, TURNS))
         elif answers.choice(GAINS_IN, (TURNS, COUNTS)) == COUNTS:
             raise _in_counts(GAINS_IN, COUNTS)
-    kind = LINEAR
-    if TRAVEL in answers:
-        kind, _ = answers.kind_of(TRAVEL, TRAVELS)
-    else:
-        what = 'what one turn of the motor moves; an angle on a rotary axis, "360 deg" without a gear'
-        asked.append(OpenQuestion(TRAVEL, what, '"10 mm"'))
+    asked += open_turn(answers, f'{TURN}; an angle on a rotary axis, "360 deg" without a gear', '"10 mm"')
     moved = all(map(axis.is_set, LIMITS_OF_MOVES))
-    return (*asked, *of_the_machine(answers, kind, moved))
+    return (*asked, *of_the_machine(answers, kind_of_turn(answers), moved))
 
 
 def _mode(axis: AxisParameters, name: str, default: float) -> float:
@@ -390,10 +386,7 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """Ask how far a turn moves the load; () if a transmission or an answer tells."""
-    if TRAVEL in answers or travel_of(flat) is not None:
-        return ()
-    example = '"10 mm"' if axis_of(flat) == LINEAR else '"360 deg"'
-    return (OpenQuestion(TRAVEL, "what one turn of the motor moves", example),)
+    return tuple(open_turn_back(flat, answers, TURN))
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
@@ -408,9 +401,7 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
         raise lacks("an integral in the position loop", "a proportional position loop")
     if flat[f"{name}proportional_on"] != "error":
         raise lacks('proportional_on = "measurement"', 'proportional_on = "error"')
-    answered = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else travel_of(flat)
-    assert answered is not None  # refused earlier if missing
-    travel = float(answered)
+    travel = travel_back(flat, answers)
     force = 2 * pi / travel
     kp, time = flat[f"{name}kp"] * travel / force, flat.get(f"{name}velocity_integral_time")
     ahead = flat[f"{name}velocity_feedforward"] == 1.0
