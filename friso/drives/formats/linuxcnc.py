@@ -29,14 +29,13 @@ from friso.drives.format import (
     si,
     there_and_back,
 )
+from friso.drives.pid_units import FORCE, FORCE_FIELD
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
 
-FORCE = "force_per_output"
 VELOCITY = "velocity_per_output"
 UNIT = "machine_unit"
-FORCE_FIELD = Quantity("N", positive, "20 N")
 VELOCITY_FIELD = Quantity("m/s", positive, "5 mm/s")
 
 UNITY_RANGE = (0.9, 1.1)
