@@ -974,7 +974,8 @@ def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: B
     page.reload()
     page.wait_for_selector("#answer .rest .note")  # the whole verdict, which else is asked for behind the pictures
     page.click("#tab-map")
-    page.wait_for_selector(".plot .main-svg")
+    page.select_option("#metric", "outcome")  # done in a moment
+    page.wait_for_selector(".plot .heatmaplayer image")
     page.wait_for_function("() => document.querySelector('.plot').data.some((one) => one.z?.length === 41)")
     page.wait_for_load_state("networkidle")
     page.on("request", lambda request: asked.append(request.url))
