@@ -100,12 +100,16 @@ def kind_of_length(answers: UserAnswers) -> tuple[AxisKind, float]:
 
 def open_units(answers: UserAnswers, kind: AxisKind, output: str, position: str = "") -> list[OpenQuestion]:
     """List what is open of the units: what an `output` of 1 exerts, and what a `position` of 1 is, unless it is ""."""
-    asked = []
-    if position and LENGTH not in answers:
-        asked.append(OpenQuestion(LENGTH, f"how far {position} moves the load; an angle on a rotary axis", '"0.5 um"'))
+    asked = open_length(answers, position, '"0.5 um"') if position else []
     if FORCE not in answers:
         asked.append(OpenQuestion(FORCE, f"what {output} exerts at the load", FORCE_FIELD.on(kind).written_example))
     return asked
+
+
+def open_length(answers: UserAnswers, position: str, example: str) -> list[OpenQuestion]:
+    """Ask how far a `position` of 1 is unless it is answered."""
+    what = f"how far {position} moves the load; an angle on a rotary axis"
+    return [] if LENGTH in answers else [OpenQuestion(LENGTH, what, example)]
 
 
 def force_of(answers: UserAnswers, kind: AxisKind) -> float:
