@@ -30,6 +30,7 @@ from friso.drives.format import (
     there_and_back,
 )
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
+from friso.drives.settings import drive_settings
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage.controllers import FILTERS_KEY
@@ -49,8 +50,7 @@ GAIN_SCHEDULE, CLIPPED, LINE = "gain_schedule", "clipped", "line"
 """Key of the user's answer on how gains fall to their least ratio, and the two answers."""
 
 SCHEDULE = ("schedule_error", "schedule_factor")
-NO_RATIO = 0.01
-"""Least ratio of the gains in a stage whose drive lets them fall to 0 with the error."""
+"""Keys of [controller] that hold a schedule of gains."""
 
 CONTROL_MODES = ("VOLTAGE_CONTROL", "TORQUE_CONTROL", "VELOCITY_CONTROL", "POSITION_CONTROL")
 POSITION_CONTROL = CONTROL_MODES.index("POSITION_CONTROL")
@@ -300,7 +300,7 @@ def _scheduled(axis: AxisParameters, answers: UserAnswers, unit: float, kind: Ax
         actual = f"{axis.number(SCHEDULE_WIDTH):g} turns and a least ratio of {least:g}"
         raise InputError(SCHEDULE_WIDTH, actual, "a width above 0, and a ratio from 0 to below 1", "0.01")
     line = least > 0 and answers.choice(GAIN_SCHEDULE, (CLIPPED, LINE)) == LINE
-    least = least or NO_RATIO
+    least = least or drive_settings.least_gain_ratio
     places = [si(0.0 if line else least * width, kind.unit("m")), si(width, kind.unit("m"))]
     return {"schedule_error": places, "schedule_factor": [least, 1.0]}
 
@@ -386,7 +386,9 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
         unknown = f"the firmware, which no {IN_TURNS} tells"
         left.append(f"{unknown}: gains in turns and N m are assumed, as 0.5.1 and later have")
     if axis.flag(SCHEDULED) and axis.is_set(SCHEDULE_WIDTH) and not axis.is_set(LEAST_RATIO):
-        left.append(f"gains that fall to 0 with the error: here they stay at {NO_RATIO:g} of theirs, or more")
+        left.append(
+            f"gains that fall to 0 with the error: here they stay at {drive_settings.least_gain_ratio:g} of theirs, or more"
+        )
     if axis.flag(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
     if mode == PASSTHROUGH:
