@@ -69,7 +69,7 @@ class DriveFileSettings(Settings):
     """Largest number of what may be gains that is said of a file of another kind. More fill the screen."""
 
     least_gain_ratio: float = setting(0.01, "")
-    """Least ratio of scheduled gains in a stage whose drive lets them fall to 0 with the error: no loop is left at 0."""
+    """Least ratio of scheduled gains in a stage whose drive lets them fall to 0: a loop needs some gain."""
 
 
 drive_settings = DriveFileSettings.live()

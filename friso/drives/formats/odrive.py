@@ -386,9 +386,8 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
         unknown = f"the firmware, which no {IN_TURNS} tells"
         left.append(f"{unknown}: gains in turns and N m are assumed, as 0.5.1 and later have")
     if axis.flag(SCHEDULED) and axis.is_set(SCHEDULE_WIDTH) and not axis.is_set(LEAST_RATIO):
-        left.append(
-            f"gains that fall to 0 with the error: here they stay at {drive_settings.least_gain_ratio:g} of theirs, or more"
-        )
+        least = f"{drive_settings.least_gain_ratio:g}"
+        left.append(f"gains that fall to 0 with the error: here they stay at {least} of theirs, or more")
     if axis.flag(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
     if mode == PASSTHROUGH:
