@@ -134,6 +134,16 @@ def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
     return sigma_0 * z + flat["friction.bristle_damping"] * z_rate + viscous, z_rate
 
 
+def aged(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
+    """Return force and rates of bristles whose level follows a Stribeck curve with a delay."""
+    sigma_0, z, lack = flat["friction.bristle_stiffness"], s["bristle_deflection"], s["lack"]
+    z_rate = v - sigma_0 * abs(v) / (flat["friction.static"] - lack) * z
+    force = sigma_0 * z + flat["friction.bristle_damping"] * z_rate + flat["friction.viscous"] * v
+    slides = 1 + abs(v) / flat["friction.stribeck_velocity"]
+    missing = flat["friction.static"] - stribeck_level(flat, v) - lack
+    return force, {"bristle_deflection": z_rate, "lack": slides * missing / flat["friction.dwell_time"]}
+
+
 def elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
     """Friction force [N] of elements that stick or slip against the velocity v, and their rates [m/s], in the mode in
     which a run begins in this state."""
@@ -297,7 +307,7 @@ def joint(flat: Flat, deflection: float, rate: float) -> float:
     return force
 
 
-SIDE_BY_SIDE = {"maxwell_slip": elements, "gms": generalised_elements}
+SIDE_BY_SIDE = {"maxwell_slip": elements, "gms": generalised_elements, "dwell": aged}
 
 
 def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]], list[float]]:

@@ -14,7 +14,7 @@ from friso.stage.tables import STATE_PREFIX
 if TYPE_CHECKING:
     import sympy as sp
 
-    from friso.equations.component import Component, Kink
+    from friso.equations.component import Component, Kink, Output, State
 
 COULOMB_BELOW_STATIC = Rule(
     ("friction.coulomb", "friction.static"),
@@ -62,6 +62,12 @@ class Friction:
             part, states=states, kinks=tuple(k.with_values(values) for k in part.kinks), outputs=outputs
         )
         return Friction(force, self.breakaway, component, self.sliding)
+
+    def joined(self, states: tuple[State, ...], outputs: Mapping[str, Output]) -> Friction:
+        """Return the law with further states and outputs."""
+        part = self.component
+        joined = replace(part, states=(*part.states, *states), outputs={**part.outputs, **outputs})
+        return Friction(self.force, self.breakaway, joined, self.sliding)
 
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
         """Return the law's states, and the sides of its kinks, in steady motion at the velocity.
