@@ -122,6 +122,11 @@ def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
     if law == "dahl":
         return sigma_0 * z + viscous, v - sigma_0 * abs(v) / flat["friction.coulomb"] * z
     z_rate = v - sigma_0 * abs(v) / stribeck_level(flat, v) * z
+    if law == "load_dependent":
+        corner = 1e-7 * flat["friction.static"]
+        share, load = flat["friction.load_coefficient"], hypot(flat["drive"], corner) - corner
+        z_rate = v - sigma_0 * abs(v) / ((1 - share) * stribeck_level(flat, v) + share * load) * z
+        viscous *= 1 - share
     if law == "elasto_plastic":
         begins, limit = flat["friction.breakaway_deflection"], stribeck_level(flat, v) / sigma_0
         rising = 0.5 * (1 + sin(pi * (abs(z) - (limit + begins) / 2) / (limit - begins)))
@@ -317,9 +322,10 @@ def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]]
         s = dict(zip(names, x, strict=True))
         y, v = s["position"], s["velocity"]
         force, rate = control(flat, s, y, v, *reference(flat, t))
-        force += flat.get("bias.stage", 0.0)
+        driven, force = force, force + flat.get("bias.stage", 0.0)
         rate |= {"position": v}
         cart_velocity, rubbing = s.get("cart_velocity", v), under_conditions(flat, reference(flat, t)[2])
+        rubbing = {**rubbing, "drive": driven}
         if flat["friction.model"] in SIDE_BY_SIDE:
             drag, rates_within = SIDE_BY_SIDE[flat["friction.model"]](rubbing, cart_velocity, s)
             rate |= rates_within

@@ -85,9 +85,12 @@ def test_mass_lines(rig: Stage, case: str, frequency: float, mass: float) -> Non
 # --- the equations ---
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", [name for name in VARIANTS if "load-dependent" not in name])
 def test_closed_loop_is_the_jacobian_of_the_whole_model(name: str) -> None:
-    """Plant and controller put together against the Jacobian of the assembled equations, bristles and all."""
+    """Plant and controller put together against the Jacobian of the assembled equations, bristles and all.
+
+    Of friction that follows the drive's force, the linear systems have what it is without another load.
+    """
     flat = VARIANTS[name].flat()
     for one in limit_cases(flat).values():
         whole = np.linalg.eigvals(jacobian(flat, one))
