@@ -34,6 +34,11 @@ TEXTS = {
     "ecmc": "# axis\naxis:\n  id: 2\ncontroller:\n  Kp: 12\n  Ki: 0.05\n  Kd: 0\n"
     "  deadband:\n    tol: 0.0004\n    time: 80\n  inner:\n    Kp: 4\n    Ki: 0.2\n    tol: 0.0015\n"
     "monitoring:\n  target:\n    enabled: true\n    tolerance: 0.0008\n",
+    "twincat": '<TcSmItem ClassName="CNcAxisDef">\n<Axis Id="7">\n<Name>__FILENAME__</Name>\n'
+    '<Encoder Name="Enc"><EncPara ScaleFactorNumerator="5e-05"/></Encoder>\n'
+    '<Controller Name="Ctrl" CtrType="2"><CtrPara PriorControlFactor="0.9">\n'
+    '<PosDiffControl Range="0.8"/><PID DeadBandPosition="0.002"/></CtrPara></Controller></Axis>\n'
+    '<Mappings><Link VarA="Drive^Outputs^Out^nDataOut2[0]" VarB="STM Velocity^Velocity"/></Mappings></TcSmItem>\n',
     "acs": "! gains\nSLPKP(0)=140\nSLVKP(0)=65\nSLVKI(0)=150\nSLDZMIN(0)=0.0008\nSLDZMAX(0)=0.004\nSLDZTIME(0)=1\n"
     "SLAFF(0)=1500\nSTOP\n",
     "odrive": '{"axis0.config.motor.torque_constant": 0.06, "axis0.config.motor.current_soft_max": 18.0,\n'
@@ -52,6 +57,10 @@ ANSWERS: dict[str, dict[str, Any]] = {
     "moteus": {**MACHINE, "travel_per_turn": "10 mm", "drive.sample_time": "50 us"},
     "icub": {**JOINT, "force_per_output": "1 mN*m"},
     "ecmc": {**MACHINE, **CYCLES, "controller.kp": "5 kN*s/m", "length_per_unit": "1 mm"},
+    "twincat": {
+        **{**MACHINE, **CYCLES, "controller.kp": "5 kN*s/m", "controller.kv": "20 1/s", "length_per_unit": "1 mm"},
+        "error_beyond_deadband": "whole",
+    },
     "acs": {
         **{**MACHINE, "length_per_unit": "1 mm", "dead_zone": "error", "dead_zone_time": "1 ms"},
         "drive.sample_time": "50 us",
@@ -80,6 +89,10 @@ BY_HAND: dict[str, dict[str, float]] = {
         **{"freeze_window": 4e-7, "freeze_window_time": 80e-3, "windows_in_position_loop": True},
         **{"standstill_window": 1.5e-6, "standstill_factor": 4 / 12, "standstill_integral_factor": 0.2 / 0.05},
     },
+    "twincat": {
+        **{"kv": 20.0, "kp": 5e3, "velocity_feedforward": 0.9},
+        **{"error_deadband": 2e-6, "error_deadband_exit": 2e-6},
+    },
     "acs": {
         **{"kv": 140.0, "kp": 5e3, "velocity_integral_time": 5e-3},
         **{"error_deadband": 8e-7, "error_deadband_exit": 4e-6, "error_deadband_time": 1e-3},
@@ -101,6 +114,7 @@ ONLY_THERE = {"error_beyond_deadband", "dead_zone", "dead_zone_time"}
 SAME = {
     **dict.fromkeys(("kflop", "moteus", "icub"), ("kp", "ki", "kd")),
     "ecmc": ("kv", "position_integral_time"),
+    "twincat": ("velocity_feedforward",),
     "acs": ("kv",),
     "odrive": ("kv", "kp", "velocity_integral_time"),
 }
@@ -148,6 +162,10 @@ def test_the_settings_of_a_stage_that_was_changed_are_those_written_back(tmp_pat
     changes = {
         "ecmc": ({"freeze_window": "2 um", "standstill_factor": 0.5}, {"deadband.tol": 2e-3, "inner.Kp": 6.0}),
         "acs": ({"error_deadband_exit": "9 um"}, {"SLDZMAX": 9e-3}),
+        "twincat": (
+            {"error_deadband": "7 um", "error_deadband_exit": "7 um", "kv": "30 1/s"},
+            {"PID.DeadBandPosition": 7e-3, "Kv": 30.0},
+        ),
         "kflop": ({"error_deadband": "5 um", "error_deadband_gain": 0.1}, {"DeadBandRange": 10, "DeadBandGain": 0.1}),
         "odrive": (
             {"schedule_error": ["20 um", "200 um"], "schedule_factor": [0.1, 1]},
@@ -168,6 +186,7 @@ def test_the_settings_of_a_stage_that_was_changed_are_those_written_back(tmp_pat
     [
         ("ecmc", {"freeze_window_exit": "9 um"}, "freeze_window"),
         ("acs", {"error_deadband_gain": 0.2}, "error_deadband_gain"),
+        ("twincat", {"error_deadband_exit": "9 um"}, "error_deadband_exit"),
         ("kflop", {"error_deadband_time": "2 ms"}, "error_deadband"),
         ("odrive", {"schedule_factor": [0.3, 1.2]}, "schedule_factor.2"),
     ],
@@ -187,6 +206,7 @@ def test_settings_that_a_drive_cannot_hold_are_named(
     ("kind", "without", "asked"),
     [
         ("kflop", "error_beyond_deadband", "error_beyond_deadband"),
+        ("twincat", "controller.kv", "controller.kv"),
         ("ecmc", "length_per_unit", "length_per_unit"),
         ("acs", "dead_zone", "dead_zone"),
         ("acs", "dead_zone_time", "dead_zone_time"),
@@ -244,6 +264,23 @@ def test_a_dead_band_of_ecmc_acts_if_the_target_is_watched(
 def test_what_a_stage_does_not_take_over_is_told(tmp_path: Path, kind: str, word: str) -> None:
     read = stage_from(written(tmp_path, kind), "joint_1" if kind == "icub" else None, ANSWERS[kind])
     assert any(word in sentence for sentence in read.left_out)
+
+
+def test_axes_of_a_twincat_nc_are_asked_about_and_those_commanded_by_position_refused(tmp_path: Path) -> None:
+    path = tmp_path / "nc.xti"
+    axis = TEXTS["twincat"].split("<Axis")[1].partition("</Axis>")[0]
+    other = axis.replace("__FILENAME__", "Y axis").replace("0.002", "0.004")
+    path.write_text(f"<Axes><Axis{axis}</Axis><Axis{other}</Axis></Axes>", "utf-8")
+    with pytest.raises(InputError, match="2 axes") as refused:
+        stage_from(path, None, ANSWERS["twincat"])
+    assert "axis 7, Y axis" in refused.value.expected
+    flat = stage_from(path, "Y axis", ANSWERS["twincat"]).stage.flat()
+    assert flat["controller.error_deadband"] == pytest.approx(4e-6)
+    assert flat["drive.encoder_resolution"] == pytest.approx(5e-8)
+    position = TEXTS["twincat"].replace("nDataOut2[0]", "nDataOut1").replace("STM Velocity^Velocity", "MDT^Position")
+    path.write_text(position, "utf-8")
+    with pytest.raises(InputError, match="velocity"):
+        stage_from(path, None, ANSWERS["twincat"])
 
 
 def test_the_velocity_loop_of_an_ecmc_motor_is_in_its_commands(tmp_path: Path) -> None:

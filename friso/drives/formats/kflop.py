@@ -16,8 +16,11 @@ from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFor
 from friso.drives.pid_units import (
     LENGTH,
     PidUnits,
+    deadband_back,
+    deadband_of,
     force_of,
     kind_of_length,
+    open_beyond,
     open_units,
 )
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
@@ -28,9 +31,6 @@ SERVO_PERIOD = "90 us"
 """Period of the servo loop of KFLOP and KOGNA."""
 
 NAMES = {"kp": "P", "ki": "I", "kd": "D", "force_limit": "MaxOutput", "integral_limit": "MaxI"}
-BEYOND, REDUCED, WHOLE = "error_beyond_deadband", "reduced", "whole"
-"""Key of the user's answer on what is left of an error beyond DeadBandRange, and the two answers."""
-
 BAND, SHARE = "DeadBandRange", "DeadBandGain"
 OUTPUT, COUNT = "an output of 1", "one count of the encoder"
 NO_SERVO = ("STEP", "NO_OUTPUT")
@@ -67,9 +67,8 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         raise InputError("OutputMode", quoted(mode), "a servo axis, whose loop can hunt", "DAC_SERVO_MODE")
     kind = kind_of_length(answers)[0] if LENGTH in answers else LINEAR
     asked = open_units(answers, kind, OUTPUT, COUNT)
-    if _has_deadband(axis) and BEYOND not in answers:
-        what = f"what is left of an error beyond {BAND}: {REDUCED}, by what is lost within, or {WHOLE}"
-        asked.append(OpenQuestion(BEYOND, what, REDUCED))
+    if _has_deadband(axis):
+        asked += open_beyond(answers, BAND)
     return (*asked, *of_the_machine(answers, kind))
 
 
@@ -88,10 +87,8 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     left = [f"{name} = {axis.number(name):g}: {what}, in units that nobody documents" for name, what in _SIDE.items()
             if axis.is_set(name)]  # fmt: skip
     if _has_deadband(axis):
-        band = si(axis.number(BAND) * units.length, kind.unit("m"))
-        table |= {"error_deadband": band, "error_deadband_gain": axis.number(SHARE)}
-        if answers.choice(BEYOND, (REDUCED, WHOLE)) == WHOLE:
-            table["error_deadband_exit"] = band
+        table |= deadband_of(answers, si(axis.number(BAND) * units.length, kind.unit("m")))
+        table["error_deadband_gain"] = axis.number(SHARE)
         left.append(f"whether {SHARE} counts for D too: here D acts on the whole error")
     tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": {"sample_time": SERVO_PERIOD}}
     if kind != LINEAR:
@@ -124,14 +121,13 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the parameters of an axis. Raises InputError for a controller other than a PID by its gains."""
-    kind, key = axis_of(flat), "controller.error_deadband"
+    kind = axis_of(flat)
     units = PidUnits(kind, force_of(answers, kind), kind_of_length(answers)[1], _period())
     of_loop = units.parameters(flat, NAMES)
-    if key not in flat or f"{key}_time" in flat or flat.get(f"{key}_exit", flat[key]) != flat[key]:
+    if (deadband := deadband_back(flat)) is None:
         return of_loop
-    band = {BAND: flat[key] / units.length, SHARE: flat.get(f"{key}_gain", 0.0)}
-    held = {"error_deadband", "error_deadband_gain", "error_deadband_exit"}
-    return Parameters({**of_loop.values, **band}, of_loop.held | held)
+    band = {BAND: deadband[0] / units.length, SHARE: flat.get("controller.error_deadband_gain", 0.0)}
+    return Parameters({**of_loop.values, **band}, of_loop.held | deadband[1] | {"error_deadband_gain"})
 
 
 def text(settings: Mapping[str, float]) -> str:
