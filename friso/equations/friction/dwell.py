@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @register_friction
-class Dwell(StribeckSection):
+class DwellFriction(StribeckSection):
     """LuGre bristles below a level that follows its Stribeck curve with a delay.
 
     z' = v - sigma_0 abs(v)/(F_s - w) z, w' = (1 + abs(v)/v_s) (F_s - g(v) - w)/T, F = sigma_0 z + sigma_1 z' +
@@ -46,6 +46,8 @@ class Dwell(StribeckSection):
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
     dwell_time: Annotated[Value, Quantity("s", positive, "0.5 s")]
+    usual_times: ClassVar[tuple[float, float]] = (0.01, 10.0)
+    """Dwell times [s] that metal on metal with grease shows."""
     decided_by: ClassVar[Mapping[str, str]] = dict.fromkeys(
         ("", "friction.dwell_time"), "static friction after rests of different length"
     )
@@ -82,12 +84,12 @@ class Dwell(StribeckSection):
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
         """Return the law's keys for measured friction, with a dwell time in the middle of what may be."""
-        return keeping_bristle(measured, dwell_time=float(np.sqrt(np.prod(USUAL_DWELL_TIMES))))
+        return keeping_bristle(measured, dwell_time=float(np.sqrt(np.prod(DwellFriction.usual_times))))
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Return the range of dwell times, of which neither friction over speed nor the virgin curve tells."""
-        return {"friction.dwell_time": USUAL_DWELL_TIMES}
+        return {"friction.dwell_time": DwellFriction.usual_times}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
@@ -96,7 +98,3 @@ class Dwell(StribeckSection):
         It is LuGre's, as the level stays between Coulomb and static friction.
         """
         return bristles_active(flat)
-
-
-USUAL_DWELL_TIMES = 0.01, 10.0
-"""Dwell times [s] that metal on metal with grease shows."""

@@ -46,6 +46,10 @@ class LoadDependent(StribeckSection):
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
     load_coefficient: Annotated[float, Number(from_0_below_1, "0.1")]
+    rounded: ClassVar[float] = 1e-7
+    """Force of the drive, relative to static friction, below which its size is rounded."""
+    usual_coefficients: ClassVar[tuple[float, float]] = (0.02, 0.3)
+    """Coefficients of the load that joints with strain-wave and cycloid gears show."""
     decided_by: ClassVar[Mapping[str, str]] = dict.fromkeys(
         ("", "friction.load_coefficient"), "the drive's force in slow motion to and fro under several loads"
     )
@@ -59,7 +63,10 @@ class LoadDependent(StribeckSection):
 
         forward = direction(velocity, key("friction.stribeck_velocity"))
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
-        share, corner = key("friction.load_coefficient"), ROUNDED_LOAD * friction_level("static", variant.conditions)
+        share, corner = (
+            key("friction.load_coefficient"),
+            LoadDependent.rounded * friction_level("static", variant.conditions),
+        )
         level = stribeck_level(velocity, forward.sign, variant)
         load = sqrt(transmitted_force() ** 2 + corner**2) - corner
         rate = velocity - stiffness * forward.sign * velocity / ((1 - share) * level + share * load) * deflection
@@ -85,21 +92,14 @@ class LoadDependent(StribeckSection):
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
         """Return the law's keys for measured friction, with a coefficient in the middle of what may be."""
-        return keeping_bristle(measured, load_coefficient=sum(USUAL_COEFFICIENTS) / 2)
+        return keeping_bristle(measured, load_coefficient=sum(LoadDependent.usual_coefficients) / 2)
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Return the range of coefficients, of which friction without a load does not tell."""
-        return {"friction.load_coefficient": USUAL_COEFFICIENTS}
+        return {"friction.load_coefficient": LoadDependent.usual_coefficients}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
         """Return the condition of passivity that the law violates without a load; "" if it is passive."""
         return bristles_active(flat)
-
-
-ROUNDED_LOAD = 1e-7
-"""Force of the drive, relative to static friction, below which its size is rounded."""
-
-USUAL_COEFFICIENTS = 0.02, 0.3
-"""Coefficients of the load that joints with strain-wave and cycloid gears show."""
