@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from friso.axis import unit_shown
 from friso.hunting import Case
 from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
+from friso.shown.loop_words import UNSTABLE_AS_BUILT, unstable_in_short
+from friso.shown.motion_words import stick_slip_in_short
 from friso.stage import Stage
 
 COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
@@ -17,6 +19,36 @@ LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
 def band_text(band: float) -> str:
     """Write a settling band [m] in words, such as 10 µm."""
     return f"{1e6 * band:.4g} {unit_shown('µm')}"
+
+
+def verdict_in_short(case: Case) -> str:
+    """Write the verdict as tables, pages and documents show it: how the loop is unstable, then what the stage does."""
+    if case.unstable:
+        does = "" if swings_by_its_loop(case) else f"; {_does(case)}"
+        return f"{unstable_in_short(case.unstable)}{does}"
+    if built := case.unstable_as_built:
+        return f"{unstable_in_short(built).replace('unstable', 'unstable with its delay')}; without: {_does(case)}"
+    return _does(case)
+
+
+def swings_by_its_loop(case: Case) -> bool:
+    """Tell whether a stage does not come to rest because its loop is unstable, without a cycle that was found."""
+    return bool(case.unstable) and case.verdict in ("transient", "undecided")
+
+
+def doubt(case: Case) -> str:
+    """Return why the verdict is not certain, beside what the drive does to the loop; empty if it is."""
+    hunting = case.judgement.hunting
+    return "" if hunting.certain or hunting.reason == UNSTABLE_AS_BUILT else str(hunting.reason)
+
+
+def _does(case: Case) -> str:
+    """Write what a stage does, whatever its loop, and whether that is certain."""
+    if case.runs_away:
+        return "runs away"
+    if case.verdict == "none":
+        return (case.stick_slip and stick_slip_in_short(case.stick_slip)) or "no verdict: its reference keeps moving"
+    return f"{case.verdict}{' (not certain)' if doubt(case) else ''}"
 
 
 @dataclass(frozen=True)

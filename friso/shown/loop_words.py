@@ -9,6 +9,9 @@ from friso.shown.drawing.prefixes import listed
 if TYPE_CHECKING:
     from friso.hunting import LoopState
 
+UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with which the loop is unstable"
+"""Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
+
 
 def unstable_loop(states: tuple[LoopState, ...]) -> list[str]:
     """Say in which states the loop of the stage as given is unstable; [] for a stable loop."""
@@ -19,3 +22,8 @@ def unstable_where(states: tuple[LoopState, ...]) -> str:
     """Say in which states a loop is unstable, and what to do about it."""
     where = listed([f"while the stage {state}" for state in states], "and")
     return f"unstable {where}, whatever the friction: retune the controller (friso bode)"
+
+
+def unstable_in_short(states: tuple[LoopState, ...]) -> str:
+    """Say in the fewest words that a loop is unstable, and in which state if it is stable in the other."""
+    return "unstable" if len(states) > 1 else f"unstable while it {states[0]}"

@@ -28,17 +28,25 @@ def following_sentence(tracking: Tracking) -> str:
     return f"{says}{ends}."
 
 
+def stick_slip_in_short(speeds: StickSlipSpeeds) -> str:
+    """Say what a stage does at a constant speed; empty if that was not decided."""
+    if speeds.lasts is None:
+        return ""
+    if not speeds.lasts:
+        return "slides smoothly"
+    return "sticks and slips" if speeds.sticks else "swings about its reference"
+
+
 def stick_slip_sentences(speeds: StickSlipSpeeds, speed: float) -> list[str]:
     """Say whether a stage slides smoothly at the constant `speed` [m/s] of its reference, and at which others."""
-    at = f"at {with_unit(speed, 'm/s')}"
-    if speeds.lasts is None:
+    at, does = f"at {with_unit(speed, 'm/s')}", stick_slip_in_short(speeds)
+    if not does:
         stopped = "the run was stopped" if np.isnan(speeds.swing) else "its error still changes after the longest run"
         first = f"{at}, whether it slides smoothly was not decided: {stopped}"
     elif not speeds.lasts:
-        first = f"slides smoothly {at}"
+        first = f"{does} {at}"
     else:
         often = f" every {with_unit(speeds.period, 's')}" if speeds.period else ""
-        does = "sticks and slips" if speeds.sticks else "swings about its reference"
         first = f"{does} {at}, by {with_unit(speeds.swing, 'm')} peak to peak{often}"
     left = [f"It was not decided at {speeds.open_speeds} of the speeds tried."] if speeds.open_speeds else []
     low, high = (with_unit(value, "m/s") for value in speeds.tried)

@@ -231,9 +231,10 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
             keys |= {f"{PARTS}.integral": scale * leak * share / (1 - half), f"{PARTS}.leak": leak / (1 - half)}
             stiffness, zeros, poles = scale * leak * static, others, rest
     keys[f"{PARTS}.stiffness"] = stiffness
-    if not stiffness > 0 or (infinite.any() and not scale > 0):
-        actual = f"a static stiffness of {stiffness:.6g}{' beside the integral' if infinite.any() else ''}"
-        raise _wrong(actual, "a controller that pulls back: static stiffness greater than 0")
+    terms = {"static stiffness": stiffness, **({"gain of the integral": scale * share} if infinite.any() else {})}
+    for name, value in terms.items():
+        if not value > 0:
+            raise _wrong(f"a {name} of {value:.6g}", f"a controller that pulls back: a {name} greater than 0")
     sections = zip_longest(_sections(zeros), _sections(poles), fillvalue=(0.0, None))
     for number, ((b1, b2), (a1, a2)) in enumerate(sections, start=1):
         keys |= {f"{PARTS}.{number}.b1": b1, f"{PARTS}.{number}.a1": a1}

@@ -16,7 +16,7 @@ from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
 from friso.questions.check.words import at_the_end, edge_text, moves_tried
-from friso.shown.cases import ShownCase, band_text
+from friso.shown.cases import ShownCase, band_text, verdict_in_short
 from friso.shown.documents import dwells_document, entries, plain_json, tracking_document, unit_suffix
 from friso.shown.drawing.prefixes import (
     NOTHING,
@@ -117,13 +117,6 @@ def _observed(case: Case) -> str:
     return (
         "; ".join(f"{plus_minus(s.amplitude, 'm', 4)} every {with_unit(s.period, 's', 4)}" for s in swings) or NOTHING
     )
-
-
-def _verdict(case: Case) -> str:
-    """Write the verdict on a stage, and whether it is certain."""
-    if case.runs_away:
-        return f"{case.verdict} (runs away)"
-    return case.verdict if case.judgement.hunting.certain else f"{case.verdict} (not certain)"
 
 
 def _edge(case: Case) -> str:
@@ -231,7 +224,7 @@ def _tracked(size: Callable[[Tracking], float]) -> Callable[[Case], str]:
 
 
 _NUMBERS: dict[str, Callable[[Case], str]] = {
-    "Verdict": _verdict,
+    "Verdict": verdict_in_short,
     "Hunting cycle, amplitude": _of_the_cycle(_amplitude),
     "Hunting cycle, period": _of_the_cycle(lambda cycle: with_unit(cycle.period, "s", 4)),
     "Other hunting cycles": _further_cycles,
@@ -273,7 +266,9 @@ def case_document(case: hunting.Case) -> dict[str, Any]:
     last_fine, last_coarse = (case.in_the_end[band] for band in case.bands)
     judgement = case.judgement
     return {
-        **entries(case, "verdict", "peaks", "peak_to_peak_m", "period_s"),
+        "verdict": case.verdict,
+        "verdict_in_short": verdict_in_short(case),
+        **entries(case, "peaks", "peak_to_peak_m", "period_s"),
         "bands_m": case.bands,
         "settling_time_s": into_fine,
         "settling_time_10um_s": into_coarse,

@@ -33,10 +33,6 @@ if TYPE_CHECKING:
     from friso.studies.laws.verdicts import VerdictsByLaw
 
 
-UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with which the loop is unstable"
-"""Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
-
-
 MACHINES_DIFFER = "machines drawn from the uncertain keys differ"
 """Reason for an uncertain verdict at the centre of ranges over which the verdict changes."""
 
@@ -262,7 +258,11 @@ def _as_built(case: Case) -> Case:
     where = tuple(state for state, unstable in zip(states, lost, strict=True) if unstable)
     if not where:
         return case
-    hunting = replace(case.judgement.hunting, certain=False, reason=UNSTABLE_AS_BUILT)
+    from friso.shown.loop_words import UNSTABLE_AS_BUILT
+
+    own = case.judgement.hunting
+    reason = UNSTABLE_AS_BUILT if own.certain else f"{own.reason}; {UNSTABLE_AS_BUILT}"
+    hunting = replace(own, certain=False, reason=reason)
     return replace(case, unstable_as_built=where, judgement=replace(case.judgement, hunting=hunting))
 
 

@@ -22,7 +22,7 @@ from friso.hunting import (
 from friso.hunting.criteria import ATTRACTED, Verdict
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
-from friso.shown.cases import ShownCase, band_text, shown_cases
+from friso.shown.cases import ShownCase, band_text, doubt, shown_cases, swings_by_its_loop
 from friso.shown.drawing.prefixes import (
     digits_that_differ,
     length_at_rest,
@@ -74,7 +74,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     `cases` holds all cases of the check, so that advice on one may use the others.
     """
     case, first = item.case, _verdict(item.case)
-    if case.runs_away or case.verdict not in _SAYS:
+    if _friction_has_no_say(case):
         return _after_loop(case, first[0])
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
     return _after_loop(
@@ -82,10 +82,16 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     )
 
 
+def _friction_has_no_say(case: Case) -> bool:
+    """Tell whether hunting by friction is no question: the loop, alone or with its drive, or the run decide first."""
+    looped = swings_by_its_loop(case) or bool(case.unstable_as_built)
+    return looped or case.runs_away or case.verdict not in _SAYS
+
+
 def details_sentences(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """Say more about one case: what feeds hunting, other bandwidths, dwells, and what was not determined."""
     case, first = item.case, _verdict(item.case)
-    if case.runs_away or case.verdict not in _SAYS:
+    if _friction_has_no_say(case):
         return []
     attracted = case.verdict in ATTRACTED
     feeds = feeding_sentences(case.feeding) if case.feeding else []
@@ -138,7 +144,8 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
 
 def _goes_on(cases: Mapping[str, Case], says: Sequence[str]) -> Iterator[str]:
     """Yield which commands have no limit of work, if the sentences `says` on the cases leave something open."""
-    if any(MORE_WORK in text for text in says) or any(case.judgement.given_up for case in cases.values()):
+    asked = [case for case in cases.values() if not _friction_has_no_say(case)]
+    if any(MORE_WORK in text for text in says) or any(case.judgement.given_up for case in asked):
         yield (
             "A check ends after a fixed amount of work. Without that limit, friso boundary follows hunting over a "
             "range of your choice (--x speed=0.5..2, or another key), friso map runs stages over one, and friso "
@@ -268,7 +275,8 @@ def _transient(case: Case) -> list[str]:
     if leaks and case.peak_to_peak < case.bands[1] and judgement.hunting.certain and not judgement.runs_away:
         stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
         return [f"does not hunt, but {leaks}{stays}."]
-    first = f"does not hunt, but has not settled at the end of its run ({end}){_held(case)}"
+    none = "" if swings_by_its_loop(case) else "does not hunt, but "
+    first = f"{none}has not settled at the end of its run ({end}){_held(case)}"
     if judgement.runs_away:
         first += "; afterwards it runs away from its reference"
     elif judgement.settled_after is not None:
@@ -380,8 +388,8 @@ def _small_swing(case: Case) -> str:
 
 def _doubt_of(case: Case) -> str:
     """Say why the verdict is not certain, as the end of its sentence; empty if it is certain."""
-    hunting = case.judgement.hunting
-    return "" if hunting.certain else f" (not certain: {hunting.reason})"
+    why = doubt(case)
+    return f" (not certain: {why})" if why else ""
 
 
 def _running_away(case: Case) -> str:
