@@ -29,9 +29,10 @@ def case(
     cycle = SimpleNamespace(amplitude=5e-4, multiplier=-0.5) if verdict == "hunts" else None
     quiet = None if edge is None else edge / (4 if edge_certain else 3)
     margin = edge and SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=1e-5)
-    hunting = SimpleNamespace(certain=certain, target=cycle)
+    hunting = SimpleNamespace(certain=certain, target=cycle, reason="")
     judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, given_up=given_up, observed=False)
-    return SimpleNamespace(verdict=verdict, judgement=judgement)
+    loop = {"runs_away": False, "unstable": (), "unstable_as_built": (), "stick_slip": None}
+    return SimpleNamespace(verdict=verdict, judgement=judgement, **loop)
 
 
 def under(law: str, *verdicts: Any) -> LawVerdict:
@@ -137,9 +138,21 @@ def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple) -
     assert laws.uncertain("given") == ["gms"]
     assert laws.deciding("given") == [friction_law("gms").decided_by[""]]
     assert "Under gms that is not certain. Edge 6.00 to 6.10 Hz" in laws_sentences(laws)[0]
-    assert dict(laws_rows(laws))["As given: verdict"] == ["settles", "settles", f"{verdict[0]} (not certain)"]
+    words = verdict[0] if verdict[0] == "failed" else f"{verdict[0]} (not certain)"
+    assert dict(laws_rows(laws))["As given: verdict"] == ["settles", "settles", words]
     document = laws_document(laws)["cases"]["given"]
     assert (document["hunts"], document["depends_on_law"], document["not_certain"]) == (None, False, ["gms"])
+
+
+def test_no_law_says_that_a_stage_does_not_hunt_whose_reference_keeps_moving() -> None:
+    """There is no verdict then: each law says whether the stage slides smoothly, in sentence and table alike."""
+    laws = across(under("lugre", ("none",)), under("gms", ("none",)))
+    for verdict, sticks in zip(laws.verdicts, (True, False), strict=True):
+        verdict.trials[0].cases["given"].stick_slip = SimpleNamespace(lasts=sticks, sticks=sticks)
+    assert (laws.hunts("given"), laws.answers("given")) == (None, set())
+    says = laws_sentences(laws)[0]
+    assert ("hunt" in says, says.count("smoothly under gms")) == (False, 1)
+    assert dict(laws_rows(laws))["As given: verdict"] == ["sticks and slips", "slides smoothly"]
 
 
 def test_no_law_that_gives_one_answer() -> None:

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from friso.errors import InputError, StageError
 from friso.platform.system import shell_word
-from friso.quantities import Quantity, exactly, quoted
+from friso.quantities import Bound, Quantity, exactly, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
 from friso.stage.plausible import idle_encoder, implausible_values
@@ -219,6 +219,31 @@ def quantity_of(value: str | float, name: str, quantity: Quantity) -> float:
         return float(quantity.read(text_of(value, quantity.unit)))
     except InputError as error:
         raise InputError(name, error.actual, error.expected, f"{name}={error.example}") from None
+
+
+def with_tolerance(stage: Stage, within: LengthLike | None) -> Stage:
+    """Return a stage that counts as in position `within` a deviation; None stands for its own.
+
+    Raises InputError for a deviation that is not greater than 0, or more than a metre or radian.
+    """
+    if within is None:
+        return stage
+    length = Quantity("m", _AT_MOST_1, "5 um").on(stage.axis_kind)
+    size = quantity_of(within, "within", length)
+    return stage.replace({"tolerance.within": exactly(size, length.unit)})
+
+
+def in_position(stage: Stage, within: LengthLike | None) -> float:
+    """Return which deviation [m] of a stage counts as in position, by the option `within` or by its file.
+
+    It is never finer than a step of the encoder, or than an error at which the controller exerts no force.
+    """
+    from friso.hunting.measures import bands_of
+
+    return bands_of(with_tolerance(stage, within).flat())[0]
+
+
+_AT_MOST_1 = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
 
 
 def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:

@@ -36,7 +36,9 @@ SHARED: Mapping[str, SharedOption] = {
     "rtol": SharedOption("float", "Relative tolerance of the solver, 1e-12 to 1e-2."),
     "seed": SharedOption("int", "Seed of the draws: the same seed gives the same machines."),
     "within": SharedOption(
-        "str or float, optional", 'Deviation that counts as in position, "1 um" or a number [m]; default: 1 um.'
+        "str or float, optional",
+        'Deviation that counts as in position, "5 um" or a number [m]; default: that of [tolerance], or 1 um. It is '
+        "never finer than a step of the encoder, or than an error at which the controller exerts no force.",
     ),
     "link": SharedOption(
         "dict, optional",

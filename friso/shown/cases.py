@@ -36,10 +36,10 @@ def swings_by_its_loop(case: Case) -> bool:
     return bool(case.unstable) and case.verdict in ("transient", "undecided")
 
 
-def doubt(case: Case) -> str:
-    """Return why the verdict is not certain, beside what the drive does to the loop; empty if it is."""
+def in_doubt(case: Case) -> bool:
+    """Tell whether the verdict is not certain for another reason than what the drive does to the loop."""
     hunting = case.judgement.hunting
-    return "" if hunting.certain or hunting.reason == UNSTABLE_AS_BUILT else str(hunting.reason)
+    return not hunting.certain and hunting.reason != UNSTABLE_AS_BUILT
 
 
 def _does(case: Case) -> str:
@@ -48,7 +48,7 @@ def _does(case: Case) -> str:
         return "runs away"
     if case.verdict == "none":
         return (case.stick_slip and stick_slip_in_short(case.stick_slip)) or "no verdict: its reference keeps moving"
-    return f"{case.verdict}{' (not certain)' if doubt(case) else ''}"
+    return f"{case.verdict}{' (not certain)' if in_doubt(case) else ''}"
 
 
 @dataclass(frozen=True)

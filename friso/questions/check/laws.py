@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from friso.axis import axis_shown
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import percent
-from friso.shown.cases import case_labels
+from friso.shown.cases import case_labels, verdict_in_short
 from friso.shown.drawing.prefixes import NOTHING, digits_that_differ, listed, range_with_unit, with_unit
 from friso.stage.stage import declared_keys
 
@@ -72,6 +72,8 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
     if hunts is not None:
         verdicts = {name for verdict in laws.verdicts for name in verdict.verdicts(case)}
         return f"under {_all(laws)} the stage {_does(verdicts)}, {edges}."
+    if all(verdict.verdicts(case) == ("none",) for verdict in laws.verdicts):
+        return _while_moving(laws, case)
     if not laws.answers(case):
         return "the verdict is not certain under any law that was tried."
     parts = []
@@ -88,6 +90,15 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
     decide = f"To decide, measure {measure}" if measure else ""
     said = [first, *left_open, edges[0].upper() + edges[1:], decide]
     return " ".join(f"{text}." for text in said if text)
+
+
+def _while_moving(laws: VerdictsByLaw, case: str) -> str:
+    """Say what a stage whose reference keeps moving does under each law."""
+    does: dict[str, list[str]] = {}
+    for verdict in laws.verdicts:
+        does.setdefault(_verdict(verdict, case), []).append(verdict.law)
+    parts = [f"{words} under {listed(names, 'and')}" for words, names in does.items()]
+    return f"{'; '.join(parts)}."
 
 
 def _all(laws: VerdictsByLaw) -> str:
@@ -209,7 +220,7 @@ def _verdict(verdict: LawVerdict, case: str) -> str:
 
     `case` is "given", "locked" or "free". "(not certain)" is added where it applies.
     """
-    return f"{' or '.join(verdict.verdicts(case))}{'' if verdict.certain(case) else ' (not certain)'}"
+    return " or ".join(dict.fromkeys(verdict_in_short(trial.cases[case]) for trial in verdict.trials))
 
 
 def _amplitude(verdict: LawVerdict, case: str) -> str:

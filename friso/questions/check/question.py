@@ -16,7 +16,6 @@ from friso.interface.answer import Answer, question
 from friso.interface.inputs import LOGGER, Changes, LengthLike, Seed, StageLike, Tolerance, Whole
 from friso.platform.interrupts import answers_interrupts
 from friso.progress import Progress, silent
-from friso.quantities import Quantity, exactly, positive
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
 from friso.studies.draws import Draws
@@ -155,9 +154,6 @@ def check(
         as many as a fixed work allows, some tens, and none if the loop is unstable.
     laws : bool
         Give also the verdict under other friction laws, which keep what was measured as far as they can.
-    within : str or float, optional
-        Deviation that counts as in position, "5 um" or a number [m]; default: that of [tolerance], or 1 um. It is never
-        finer than a step of the encoder, or than an error at which the controller exerts no force.
 
     Returns
     -------
@@ -180,10 +176,7 @@ def check(
     """
     chosen, tolerance = inputs.read_stage(stage, set, uncertain_too=True), inputs.tolerance_of(rtol)
     correlations, file = inputs.correlations_of(stage, chosen), inputs.file_of(stage, set)
-    if within is not None:
-        length = Quantity("m", positive, "5 um").on(chosen.axis_kind)
-        size = inputs.quantity_of(within, "within", length)
-        chosen = chosen.replace({"tolerance.within": exactly(size, length.unit)})
+    chosen = inputs.with_tolerance(chosen, within)
     return checked_stage(chosen, correlations, tolerance, draws, seed, laws, progress, file)
 
 

@@ -22,7 +22,7 @@ from friso.hunting import (
 from friso.hunting.criteria import ATTRACTED, Verdict
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
-from friso.shown.cases import ShownCase, band_text, doubt, shown_cases, swings_by_its_loop
+from friso.shown.cases import ShownCase, band_text, in_doubt, shown_cases, swings_by_its_loop
 from friso.shown.drawing.prefixes import (
     digits_that_differ,
     length_at_rest,
@@ -388,8 +388,7 @@ def _small_swing(case: Case) -> str:
 
 def _doubt_of(case: Case) -> str:
     """Say why the verdict is not certain, as the end of its sentence; empty if it is certain."""
-    why = doubt(case)
-    return f" (not certain: {why})" if why else ""
+    return f" (not certain: {case.judgement.hunting.reason})" if in_doubt(case) else ""
 
 
 def _running_away(case: Case) -> str:

@@ -72,8 +72,7 @@ def compare(
     >>> friso.compare(friso.example("thesis_drive"), machines=200)  # doctest: +SKIP
     """
     chosen = inputs.read_stage(stage, set, leaves_out=(), uncertain_too=True)
-    length = Quantity("m", positive, "1 um").on(chosen.axis_kind)
-    tolerance = inputs.quantity_of(length.example if within is None else within, "within", length)
+    tolerance = inputs.in_position(chosen, within)
     hertz = Quantity("Hz", positive, "15 Hz")
     limit = None if bandwidth_limit is None else inputs.quantity_of(bandwidth_limit, "bandwidth_limit", hertz)
     from friso.studies.compare.study import compare as compared

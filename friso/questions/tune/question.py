@@ -36,9 +36,6 @@ from friso.stage import Stage
 if TYPE_CHECKING:
     from friso.remedies.verified import RemedyOutcome
 
-_IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
-"""Deviations [m or rad] that may count as in position."""
-
 
 class TuneAnswer(Answer):
     """The remedies, the least change first; `result` is the `Advice`."""
@@ -197,7 +194,7 @@ def _goal(
         return None if value is None else inputs.quantity_of(value, name, quantity)
 
     return Goal(
-        within=read("within", within, "m", "1 um", _IN_POSITION) or Goal.within,
+        within=inputs.in_position(stage, within),
         settle=read("settle", settle, "s", "0.3 s"),
         force_limit=read("force_limit", force_limit, "N", "50 N"),
         bandwidth_limit=read("bandwidth_limit", bandwidth_limit, "Hz", "25 Hz"),

@@ -41,7 +41,7 @@ class Trial:
     def certain(self, case: str) -> bool:
         """Tell whether the verdict in a case is certain."""
         shown = self.cases[case]
-        return shown.verdict != "failed" and shown.judgement.hunting.certain
+        return shown.verdict not in ("failed", "none") and shown.judgement.hunting.certain
 
     def edge_sought(self, case: str) -> bool:
         """Tell whether the search for a case's edge of hunting was finished, with or without edge."""
