@@ -11,6 +11,7 @@ from variants import MEASURED, gains, lugre, release, stage
 
 import friso
 from friso.hunting.measures import BANDS, bands_of
+from friso.questions.tune.question import _goal
 from friso.stage import Stage
 
 
@@ -57,6 +58,18 @@ def test_check_judges_within_what_the_user_says(resting: Stage) -> None:
     assert times[0] == times[1]
     assert [*times[0]] == [5e-5]
     assert by_option.to_dict()["cases"]["given"]["bands_m"] == pytest.approx([5e-5, 5e-5])
+
+
+@pytest.mark.parametrize("within", [None, "1 um"])
+def test_compare_and_tune_judge_within_the_tolerance_of_the_machine(
+    resting: Stage, within: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its controller exerts no force within 400 um, so a finer wish does not count."""
+    asked: list[float] = []
+    monkeypatch.setattr("friso.studies.compare.study.compare", lambda *options: asked.append(options[3]))
+    friso.compare(resting, within=within)
+    goal = _goal(resting, within, *7 * [None])
+    assert [*asked, goal.within] == pytest.approx([4e-4, 4e-4])
 
 
 def test_no_sentence_is_finer_than_the_encoder(tmp_path: Path, resting: Stage) -> None:

@@ -137,7 +137,22 @@ DRIVES = (
 )
 """Axes with friction at the motor, in addition to that of the guide or alone."""
 
-SERIES = {"stages": FORMS, "machines": MACHINES, "axes": AXES, "drives": DRIVES}
+SERVOS = tuple(
+    replace(form, axis=True)
+    for form in (
+        Form("rigid", "dwell"),
+        Form("rigid", "load_dependent"),
+        Form("rigid", setting="schedule"),
+        Form("rigid", control="cascade", setting="inner gains"),
+        Form("free", "dwell"),
+        Form("rigid", "load_dependent", control="cascade"),
+        Form("rigid", "dwell", setting="freeze"),
+        Form("rigid", "load_dependent", setting="rest in moves"),
+    )
+)
+"""Axes with the friction of robots' joints, and with what drives' files set at standstill."""
+
+SERIES = {"stages": FORMS, "machines": MACHINES, "axes": AXES, "drives": DRIVES, "servos": SERVOS}
 
 
 def draw(seed: int, number: int, series: str = "stages") -> Stage:
@@ -349,6 +364,22 @@ class _Draw:
             },
             "reset": {"integral_reset": True},
             "standstill": {"standstill_window": _text(error, "m"), "standstill_factor": self.log(0.1, 3.0)},
+            "schedule": {
+                "schedule_error": [_text(error, "m"), _text(error * self.log(2.0, 30.0), "m")],
+                "schedule_factor": [self.log(0.2, 2.0), 1.0],
+            },
+            "inner gains": {
+                "standstill_window": _text(error, "m"),
+                "standstill_window_exit": _text(error * self.log(1.0, 10.0), "m"),
+                "standstill_factor": self.log(0.1, 3.0),
+                "standstill_integral_factor": self.log(0.1, 3.0),
+                "windows_at_rest": True,
+            },
+            "freeze": {
+                "freeze_window": _text(error, "m"),
+                "freeze_window_exit": _text(error * self.log(1.0, 10.0), "m"),
+            },
+            "rest in moves": {"integral_rests_in_moves": True},
             "push": {"stiction_push": _text(force, "N"), "stiction_push_window": _text(error, "m")},
         }
         return settings[self.form.setting]

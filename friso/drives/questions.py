@@ -114,8 +114,9 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
         raise InputError("friction.model", quoted(model), f"one of {', '.join(sorted(FRICTION.classes))}")
     law: type[Section] = friction_law(model)
     names = [name for name in numeric_fields(law) if law.model_fields[name].is_required() and not guessed]
-    instead = '; or --set friction.guess="ball screw", or friction.model=none' if model == "lugre" else ""
-    meaning = dict.fromkeys(names, f"friction of the guide{instead}")
+    contact, of_what = ("ball screw", "the guide") if kind == LINEAR else ("strain-wave gear", "the bearings and the gear")
+    instead = f'; or friction.coulomb and friction.guess="{contact}" alone, or friction.model=none'
+    meaning = dict.fromkeys(names, f"friction of {of_what}{instead if model == 'lugre' else ''}")
     asked += _of_table("friction", law, names, meaning, kind)
     if not moved and "motion.kind" not in answers:
         names = ["acceleration", "acceleration_time"]
@@ -144,6 +145,8 @@ def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
     if asked:
         values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"
         width = max(len(question.option) for question in asked)
-        lines = [f"{question.option:<{width}}  {question.meaning}" for question in asked]
+        before = ["", *(question.meaning for question in asked)]
+        says = ["as above" if q.meaning == last else q.meaning for q, last in zip(asked, before, strict=False)]
+        lines = [f"{question.option:<{width}}  {text}" for question, text in zip(asked, says, strict=True)]
         expected = "\n            ".join(["set all of these:" if len(asked) > 1 else "set:", *lines])
         raise InputError("", f"{values} missing", expected, origin=origin)
