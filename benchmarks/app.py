@@ -86,6 +86,8 @@ def main() -> None:
         page.goto(address[0])
         page.wait_for_selector(".js-plotly-plot .main-svg", timeout=120_000)
         page.wait_for_selector("#answer .rest .note", timeout=120_000)
+        page.click("#tab-run")
+        page.wait_for_selector(".plot .main-svg")
         page.evaluate(WATCH)
         _report("picture of a dragged slider", _steps(page, ".plots", chosen.steps))
         page.evaluate("""document.querySelector('[data-path="controller.crossover"] input[type=range]')

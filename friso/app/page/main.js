@@ -2,7 +2,7 @@
 import * as answers from "./answer.js";
 import { $, anew, el, plain, tabs } from "./dom.js";
 import { drawing } from "./drawing.js";
-import { edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
+import { alongTracks, colourTracks, edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
 import { DRAWING, FIELDS, isNow, look, mark, now } from "./shown.js";
@@ -20,13 +20,16 @@ let held = "";
 let begun = false;
 let late = false; // what is on the left is drawn again once that takes nothing from under the hand
 let pressed = false;
+let tracked = { version: null, tracks: {} }; // the verdicts along the sliders, and the version that they are of
 let drawn = {}; // the machine and the part whose keys are there
 
 const sent = () => ({ machine: machines.sent(), pinned: machines.pinned() });
 const set = (values, dragged = false) => machines.set(values, dragged);
 
+answers.onCure({ set: (label, values) => machines.cure(label, withUnits(values)), taken: machines.cured, back: () => undo() });
+
 const pictures = new Pictures(sent, {
-  set: (values) => set(values),
+  set,
   worded: withUnits,
   progress: answers.progress,
   shown: (part, tab, version) => version.answers.set(tab, part),
@@ -48,8 +51,7 @@ function withUnits(values) {
   const all = shown.tables.flatMap((table) => table.keys);
   return Object.fromEntries(
     Object.entries(values).map(([path, si]) => {
-      const key = all.find((item) => item.path === path);
-      return [path, worded(key, si)];
+      return [path, typeof si === "number" ? worded(all.find((item) => item.path === path), si) : si];
     }),
   );
 }
@@ -134,6 +136,13 @@ function without(part, version) {
   answers.refused(part.text, version);
 }
 
+/** Colour the sliders' tracks by the verdict along them. */
+async function tracks() {
+  const version = now();
+  const part = await ask("tracks", pictures.body({ values: alongTracks() }), "tracks");
+  if (part?.kind === "answer" && isNow(version)) colourTracks((tracked = { version, tracks: part.tracks }).tracks);
+}
+
 async function check(draws) {
   const version = now();
   const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item, "check"));
@@ -144,6 +153,7 @@ async function check(draws) {
   answers.note(part.verdict, version, machines.back); // it may come before the quick verdict, which is then not asked for
   version.answers.set("check", part);
   pictures.checked(part, version);
+  tracks();
 }
 
 function redraw() {
@@ -170,6 +180,7 @@ function left() {
     edit: editText,
   });
   mark($("keys"), now(), FIELDS);
+  if (tracked.version && isNow(tracked.version)) colourTracks(tracked.tracks);
 }
 
 /** The text of the machine as it is set now, which the server may not have written yet. */
@@ -195,6 +206,7 @@ function pointed(event) {
 function choose(part) {
   chosen = part;
   left();
+  if (now().answers.has("check")) tracks();
 }
 
 function bar() {

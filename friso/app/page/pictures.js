@@ -1,29 +1,31 @@
 // The pictures of the answer, in tabs: each asks its own question.
 import { $, el, tabs, words } from "./dom.js";
-import { worded } from "./keys.js";
+import { unitOf, withUnit, worded } from "./keys.js";
 import { Beside } from "./beside.js";
+import { handle, small } from "./handle.js";
 import { Logs } from "./logs.js";
 import { clear, draw } from "./plot.js";
 import { Remedies } from "./remedies.js";
-import { FIELDS, isNow, look, mark, now } from "./shown.js";
+import { ANSWER, FIELDS, isNow, look, mark, now } from "./shown.js";
 import * as machines from "./state.js";
 import { ask, Live } from "./wire.js";
 import { paragraphs, table } from "./tables.js";
 
 const AT_REST = 250;
 const LANE = "picture";
+const HOME = "map";
 
 export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
   constructor(sent, tell) {
-    Object.assign(this, { sent, tell, shown: "run", then: null, machine: null, answer: null, timer: 0, kept: new Map() });
+    Object.assign(this, { sent, tell, shown: HOME, then: null, machine: null, answer: null, timer: 0, kept: new Map() });
     this.live = this.follows("run");
     this.loops = this.follows("loops");
     this.tabs = [
+      { id: "map", label: "Map" },
       { id: "run", label: "Run" },
       { id: "check", label: "Hunting" },
       { id: "bode", label: "Loops" },
-      { id: "map", label: "Map" },
       { id: "boundary", label: "Boundary" },
       { id: "flexure", label: "Leaf springs", when: () => this.has("flexure") },
       { id: "remedies", label: "What stops it" },
@@ -51,7 +53,7 @@ export class Pictures {
 
   bar() {
     const there = this.machine ? [...this.tabs.filter((tab) => !tab.when || tab.when()), ...this.machine.others] : [];
-    if (this.machine && !there.some((tab) => tab.id === this.shown)) this.show("run");
+    if (this.machine && !there.some((tab) => tab.id === this.shown)) this.show(HOME);
     const buttons = there.map(({ id, label }) =>
       el("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === this.shown), "aria-controls": "picture", onclick: () => this.show(id) }, label),
     );
@@ -77,6 +79,7 @@ export class Pictures {
   described(machine, version) {
     Object.assign(this, { machine, of: version });
     this.bar();
+    if (!machines.dragging() && this.answer) this.glance();
     if ($("axes")) mark($("axes"), version, FIELDS);
   }
 
@@ -104,7 +107,7 @@ export class Pictures {
   /** There is no machine, and no tabs. */
   none() {
     this.machine = null;
-    this.show("run");
+    this.show(HOME);
     this.halt();
     if (this.plots) clear(this.plots);
     this.below?.replaceChildren();
@@ -119,10 +122,11 @@ export class Pictures {
       place.append(this.own[this.shown].place);
       return look(); // the machine may be another one since it was there
     }
-    if (this.shown === "map" || this.shown === "boundary") this.form = this.axes(place);
     this.plots = el("div", { class: "plots" });
     this.below = el("div", {});
-    place.append(this.plots, this.below);
+    place.append(this.plots);
+    if (this.shown === "map" || this.shown === "boundary") this.form = this.axes(place);
+    place.append(this.below);
   }
 
   /** The machine has changed; `dragged`: not yet for good. `then` is called once a picture that follows is drawn. */
@@ -133,7 +137,7 @@ export class Pictures {
     if (this.own[this.shown]) return;
     if (!this.plots) this.begin($("picture"));
     if (this.shown === "run") {
-      this.live.ask(this.body(), { version: now(), then });
+      this.live.ask(this.body(this.own.logs.laid()), { version: now(), then });
     } else {
       clearTimeout(this.timer);
       if (dragged && this.shown === "bode") return this.loops.ask(this.body(), { version: now(), then: null });
@@ -152,7 +156,7 @@ export class Pictures {
   async ask() {
     const { shown } = this;
     if (!this.machine || this.own[shown] || this.of.machine.text !== machines.current().text) return; // asked once it is described
-    if (shown === "run") return this.live.ask(this.body(), { version: now(), then: this.then });
+    if (shown === "run") return this.live.ask(this.body(this.own.logs.laid()), { version: now(), then: this.then });
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;
@@ -178,8 +182,9 @@ export class Pictures {
       return mark(this.below, version);
     }
     Object.assign(this, { answer, version });
-    if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) }, answer.names);
-    for (const box of this.plots.children) if (answer.figures?.some((figure) => figure.name === box.dataset.name)) mark(box, version);
+    if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point), drawn: () => this.glance() }, answer.names);
+    const free = this.shown === "map" && answer.axes ? Object.values(answer.axes) : [];
+    for (const box of this.plots.children) if (answer.figures?.some((figure) => figure.name === box.dataset.name)) mark(box, version, ANSWER, free);
     if (answer.kind === "partly" && !answer.sentences.length) return this.tell.shown(answer, this.shown, version); // its words follow
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = (answer.drawings ?? []).map((item) => this.drawn(item));
@@ -187,6 +192,21 @@ export class Pictures {
     this.below.replaceChildren(...working, ...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
     mark(this.below, version);
     this.tell.shown(answer, this.shown, version);
+  }
+
+  /** The handle on the map, and the small picture, of what is drawn. */
+  glance() {
+    const box = this.plots?.querySelector(".figure");
+    const plotted = box?.querySelector(".plot");
+    if (!plotted?.data) return;
+    if ($("small").getClientRects().length) small($("small"), plotted);
+    if (this.shown !== "map" || !this.answer.axes) return;
+    const values = Object.values(this.answer.axes).map((path) => this.numeric().find((key) => key.path === path)?.si);
+    handle(box, this.answer, values, (set, dragged) => this.tell.set(this.tell.worded(set), dragged));
+  }
+
+  numeric() {
+    return this.machine.tables.filter((item) => item.present).flatMap((item) => item.keys);
   }
 
   drawn({ label, svg }) {
@@ -199,7 +219,7 @@ export class Pictures {
 
   /** The two keys of a map, with their ranges; gives the options of the question. */
   axes(place) {
-    const numeric = this.machine.tables.filter((item) => item.present).flatMap((item) => item.keys.filter((key) => key.range && typeof key.value === "string"));
+    const numeric = this.numeric().filter((key) => key.range && typeof key.value === "string");
     const wanted = this.kept.get("axes") ?? ["controller.crossover", "friction.static"];
     const chosen = wanted.map((path, k) => numeric.find((key) => key.path === path) ?? numeric[k]);
     const fields = chosen.map((key, k) => this.axis(numeric, key, "xy"[k]));
@@ -242,6 +262,8 @@ export class Pictures {
       low.value = worded(item, item.si / 4, 3);
       high.value = worded(item, item.si * 4, 3);
     };
+    const complete = ({ target }) => (target.value = withUnit(target.value, unitOf(numeric.find((one) => one.path === key.value))));
+    for (const end of [low, high]) end.addEventListener("change", complete);
     key.addEventListener("change", fill);
     fill();
     const label = name === "x" ? "To the right" : "Upwards";
