@@ -63,15 +63,16 @@ export class Pictures {
   }
 
   show(id) {
-    if (id === this.shown) return;
+    if (id !== this.shown) this.turn(id);
+  }
+
+  /** Show a tab anew. */
+  turn(id) {
     this.shown = id;
     this.goOn();
     this.halt();
-    const place = $("picture");
-    if (this.plots) clear(this.plots);
-    place.replaceChildren();
     this.bar();
-    this.begin(place);
+    this.begin();
     this.ask();
   }
 
@@ -85,10 +86,11 @@ export class Pictures {
 
   /** Another machine was opened: the keys and ranges of its maps are others. */
   opened() {
-    if (!this.form) return;
-    clear(this.plots);
-    $("picture").replaceChildren();
-    this.begin($("picture"));
+    if (this.isMap()) this.begin();
+  }
+
+  isMap() {
+    return this.shown === "map" || this.shown === "boundary";
   }
 
   /** Nothing that is on its way is of the machine as it is set now. */
@@ -106,16 +108,15 @@ export class Pictures {
 
   /** There is no machine, and no tabs. */
   none() {
-    this.machine = null;
-    this.show(HOME);
-    this.halt();
-    if (this.plots) clear(this.plots);
-    this.below?.replaceChildren();
-    this.bar();
+    this.machine = this.then = null;
+    this.turn(HOME);
   }
 
-  /** What stands above the plots of a tab. */
-  begin(place) {
+  /** What stands on a tab before its answer is there. */
+  begin() {
+    const place = $("picture");
+    if (this.plots) clear(this.plots);
+    place.replaceChildren();
     this.form = null;
     this.plots = null;
     if (this.own[this.shown]) {
@@ -125,7 +126,7 @@ export class Pictures {
     this.plots = el("div", { class: "plots" });
     this.below = el("div", {});
     place.append(this.plots);
-    if (this.shown === "map" || this.shown === "boundary") this.form = this.axes(place);
+    if (this.isMap() && this.machine) this.form = this.axes(place);
     place.append(this.below);
   }
 
@@ -135,7 +136,7 @@ export class Pictures {
     this.then = then;
     if (this.shown !== "run") this.goOn();
     if (this.own[this.shown]) return;
-    if (!this.plots) this.begin($("picture"));
+    if (!this.plots) this.begin();
     if (this.shown === "run") {
       this.live.ask(this.body(this.own.logs.laid()), { version: now(), then });
     } else {
