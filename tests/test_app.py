@@ -37,7 +37,7 @@ import uvicorn
 from patience import LIMIT, wait_until
 
 import friso
-from friso.app import connections, gate, uploads
+from friso.app import connections, gate, questions, uploads
 from friso.app import machine as machines
 from friso.app.connections import Connection
 from friso.app.gate import Access
@@ -710,6 +710,27 @@ def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: py
     assert answers[-1]["command"].endswith("--metric outcome --log")
     layout = answers[-1]["figures"][0]["layout"]
     assert layout["xaxis"]["type"] == layout["yaxis"]["type"] == "log"
+
+
+def test_a_map_comes_from_coarse_to_fine_and_ends_as_that_of_friso(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a page shows before its check has ended is the first picture alone, unless the whole map is there."""
+    monkeypatch.setattr(questions, "COARSE_TO_FINE", (2, 4))
+    axes = {"x": "controller.crossover=7 Hz..12 Hz", "y": "friction.static=2.5 N..3.5 N"}
+    given, locked = {**axes, "metric": "sketch"}, {"joint.locked": True}
+
+    def rows(coarse: bool) -> list[int]:
+        """Return the number of rows of each picture that is shown."""
+        shown = [part for part in served.ask("map", RIG, locked, **given, coarse=coarse) if "figures" in part]
+        return [len(part["places"]["y"]) for part in shown]
+
+    assert rows(coarse=True) == [2]
+    whole = served.ask("map", RIG, locked, **given)[-1]
+    expected = friso.sweep(RIG, set=locked, metric="sketch", **{name: f"{text}:4" for name, text in axes.items()})
+    assert whole["sentences"] == [*expected.sentences()]
+    assert whole["figures"][0]["title"] == expected.figures()[0].title
+    assert rows(coarse=True) == [4]
 
 
 def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:

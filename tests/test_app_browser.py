@@ -1123,6 +1123,38 @@ def test_the_machine_is_dragged_on_its_map_which_stays(browsed: Browsed) -> None
     assert float(browsed.changes()["controller.crossover"].split()[0]) > 8
 
 
+def test_the_map_is_refined_once_the_check_has_ended(browsed: Browsed) -> None:
+    """It takes no time from the check, and shows something before."""
+    page, checks, maps = browsed.page, [], []
+    page.click("#tab-map")
+    page.select_option("#metric", "outcome")  # done in a moment
+    page.route("**/ask/check", lambda route: checks.append(route))
+    page.on("requestfinished", lambda request: maps.append(request.url) if "ask/map" in request.url else None)
+    rows = "document.querySelector('.plot')?.data?.find((one) => one.z)?.z.length"
+    with page.expect_request("**/ask/check"):
+        browsed.change({"masses.stage": "0.52 kg"})
+    page.wait_for_function(f"() => {rows} === 6")
+    page.wait_for_function("() => !document.querySelector('.figure').inert")
+    assert page.evaluate(rows) == 6
+    checks[0].continue_()
+    page.wait_for_function(f"() => {rows} === 21")
+    assert len(maps) <= 2
+
+
+def test_a_slider_that_is_let_go_keeps_its_verdict(browsed: Browsed) -> None:
+    page, asked = browsed.page, []
+    page.wait_for_selector("#answer .rest .note")
+    page.on("request", lambda request: asked.append(request.url.rpartition("/")[2]))
+    place = page.locator(f"{ROW} input[type=range]").bounding_box()
+    page.mouse.move(place["x"] + 0.7 * place["width"], place["y"] + 2)
+    with page.expect_response("**/ask/verdict"):
+        page.mouse.down()
+    page.wait_for_function("() => !document.querySelector('#verdict .word').inert")
+    with page.expect_request("**/ask/check"):
+        page.mouse.up()
+    assert asked.count("verdict") == 1
+
+
 def test_tracks_of_sliders_have_the_colours_of_verdicts(browsed: Browsed) -> None:
     page = browsed.page
     track = f"document.querySelector('{ROW} input[type=range]').style.getPropertyValue('--track')"

@@ -1,4 +1,4 @@
-"""Compute verdicts over keys for the page: maps without located edges, and the tracks of sliders."""
+"""Compute verdicts over keys for the page: maps, first without located edges, and the tracks of sliders."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from typing import Any
 
 from friso.app.machine import Machine
 from friso.errors import InputError
-from friso.interface.inputs import read_stage
+from friso.interface.inputs import mention_sampling, mention_unstable_loop, read_stage
 from friso.progress import Progress, silent
 from friso.questions.map.figures import map_figure
+from friso.questions.map.findings import own_values
 from friso.questions.map.question import SweepAnswer
 from friso.questions.map.study import Varied, study_for
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
-from friso.studies.cells import of_runs_alone
+from friso.studies.cells import of_runs_alone, runs_as_built
+from friso.studies.edges import fine_edges
 from friso.studies.execute import local_crew
 from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory
@@ -41,9 +43,20 @@ def sketched(stage: Stage, *, metric: str, log: bool, progress: Progress = silen
     """
     varied = Varied.of_texts({}, axes["x"], axes["y"], (), None, None, False, log)
     (study,) = _studies(stage, [varied.axes], metric, log)
+    if runs_as_built(study.stage, [metric]):
+        mention_sampling(study.stage)
+    mention_unstable_loop(study.stage)
     with local_crew() as crew:
         (runs,) = run_in_memory([study], crew, progress)
     return SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, exports=(), edges=None)
+
+
+def located(sketch: SweepAnswer, progress: Progress) -> SweepAnswer:
+    """Return a map with its edges located: the answer of `friso.sweep`, of which the cells are there."""
+    study, runs, metric = sketch.study, sketch.result, sketch.metric
+    with local_crew() as crew:
+        edges = fine_edges(study, runs, metric, own_values(runs), crew, progress)
+    return SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, exports=(), edges=edges)
 
 
 def tracks_of(stage: Stage, values: Mapping[str, Sequence[Any]], progress: Progress) -> dict[str, list[str]]:

@@ -19,7 +19,7 @@ from friso.app.ghosts import ghosts_of, with_edge, with_log, with_other_joint
 from friso.app.kept import KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
-from friso.app.maps import home_of, sketched, tracks_of, without_own
+from friso.app.maps import home_of, located, sketched, tracks_of, without_own
 from friso.app.settings import app_settings
 from friso.app.uploads import Uploads
 from friso.axis import speaking_of
@@ -276,7 +276,7 @@ def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "check": ("draws",),
-    "map": ("x", "y", "log", "metric", "edge"),
+    "map": ("x", "y", "log", "metric", "edge", "coarse"),
     "boundary": ("x", "y", "log"),
     "tune": ("within", "settle", "force_limit", "bandwidth_limit", "margin", "only", "keep"),
 }
@@ -289,7 +289,8 @@ COARSE_TO_FINE = (6, 21)
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield a map over two keys from coarse to fine, with marks where the machines lie in it.
 
-    If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead.
+    If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead. With the option
+    `coarse` the first picture is all, unless the map is there: a page asks for more once its verdict is known.
     """
     options = asked.chosen(*OPTIONS["map"])
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
@@ -304,15 +305,19 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         """Return the ranges of both axes with `count` points."""
         return {name: f"{text}:{count}" for name, text in axes.items()}
 
-    def swept(function: Callable[..., Answer], count: int) -> SweepAnswer:
-        """Return the map with `count` points along each axis."""
-        return KEPT.answer(function, home, work, {**ranges(count), **shown})
+    def cells(count: int) -> SweepAnswer:
+        """Return the map with `count` points along each axis, without located edges."""
+        return KEPT.answer(sketched, home, work, {**ranges(count), **shown})
 
-    def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
-        """Return a map as the page shows it, with the machines and the edge of hunting on it."""
+    def part(answer: SweepAnswer, count: int, edge: Answer | None = None, title: str = "") -> AnswerPart:
+        """Return a map as the page shows it, with the machines and the edge of hunting on it.
+
+        `title` stands above it instead of what it shows.
+        """
 
         def drawn(figure: Figure) -> Figure:
-            return with_edge(_on_map(figure, asked, [*keys.values()]), edge)
+            titled = replace(figure, title=title or figure.title)
+            return with_edge(_on_map(titled, asked, [*keys.values()]), edge)
 
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges(count), **shown}, "sweep")}
@@ -322,10 +327,14 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         return {**figures_of(answer, drawn, lambda: without_own(answer)), **words, **more}
 
     finest = COARSE_TO_FINE[-1]
-    if not KEPT.holds(friso.sweep, home, {**ranges(finest), **shown}):
+    whole_options = {**ranges(finest), **shown}
+    if not KEPT.holds(friso.sweep, home, whole_options):
         for count in COARSE_TO_FINE:
-            yield {**part(swept(sketched, count), count), "kind": "partly", "sentences": [], "details": []}
-    answer = swept(friso.sweep, finest)
+            title = f"A first look: {count} by {count} cells, whose edges are not located yet"
+            yield {**part(cells(count), count, title=title), "kind": "partly", "sentences": [], "details": []}
+            if options.get("coarse"):
+                return
+    answer = KEPT.answer(friso.sweep, home, work, whole_options, lambda: located(cells(finest), work.progress))
     whole = part(answer, finest)
     if options.get("edge"):
         yield {**whole, "kind": "partly"}
@@ -532,8 +541,8 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
 QUICK = frozenset({"machine"})
 """The questions that need no computation."""
 
-PICTURES = frozenset({"run", "cell", "loops", "bode", "flexure", "map"})
-"""The questions whose first part is a picture that appears soon; all other questions wait for it."""
+FIRST = frozenset({"verdict", "run", "cell", "loops", "bode", "flexure", "map"})
+"""The questions whose first part, a verdict or a picture, appears soon; all other questions wait for it."""
 
 
 def _answered(command: str, asked: PageRequest, work: Work) -> Answer:
@@ -548,7 +557,7 @@ def _mapped(asked: PageRequest, work: Work) -> Answer:
     The edge of hunting belongs to the command boundary and is left out.
     """
     options = asked.chosen(*OPTIONS["map"])
-    options.pop("edge", None)
+    options = {name: value for name, value in options.items() if name not in ("edge", "coarse")}
     options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
     return KEPT.answer(friso.sweep, asked.machine, work, options)
 

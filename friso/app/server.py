@@ -18,7 +18,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
-from friso.app.questions import PICTURES, QUICK, PageRequest, job_of
+from friso.app.questions import FIRST, QUICK, PageRequest, job_of
 from friso.app.uploads import Uploads
 from friso.app.work import Workshop
 from friso.errors import InputError
@@ -55,7 +55,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]
         number = data.get("number")
         number = number if isinstance(number, int) else 0
-        frames = workshop.answer(page, lane, number, partial(job, asked), name in QUICK, name in PICTURES)
+        frames = workshop.answer(page, lane, number, partial(job, asked), name in QUICK, name in FIRST)
         return StreamingResponse(frames, media_type=BINARY)
 
     async def started_with(request: Request) -> Response:

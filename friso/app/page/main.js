@@ -43,6 +43,7 @@ const verdict = new Live("verdict", "verdict", 5000, (part, version) => {
   if (part.kind === "message") return answers.progress(part, "verdict");
   if (part.kind === "failed") return answers.refused(part.text, version);
   if (part.kind !== "answer") return; // what is wrong with the machine is said where it was set
+  version.answers.set("verdict", part);
   answers.quick(part, version);
   answers.note(part.verdict, version, machines.back);
 });
@@ -76,7 +77,7 @@ function changed(dragged) {
 /** The picture follows the machine, and then the verdict: both at once would be slower. */
 function follow(dragged) {
   const version = now();
-  pictures.changed(dragged, () => verdict.ask({ machine: version.sent }, version));
+  pictures.changed(dragged, () => version.answers.has("verdict") || verdict.ask({ machine: version.sent }, version)); // a slider that is let go keeps its verdict
 }
 
 /** The server has read the machine, or refused it. */
@@ -147,6 +148,8 @@ async function check(draws) {
   const version = now();
   const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item, "check"));
   if (!part || !isNow(version)) return;
+  version.concluded = true;
+  pictures.concluded();
   if (part.kind !== "answer") return answers.refused(part.text, version);
   verdict.stop();
   answers.whole(part, version, shown.uncertain.length ? check : null);

@@ -163,9 +163,15 @@ export class Pictures {
     if (options === null) return;
     if (!this.plots.children.length) this.below.replaceChildren(el("progress", { "aria-label": "Progress" })); // the line of the answer is the check's, too
     const version = now();
+    if (shown === "map") options.coarse = this.rough = !version.concluded;
     const part = (answer) => this.shown === shown && (answer.kind === "partly" ? this.arrived(answer, version) : answer.kind !== "answer" && this.tell.progress(answer, LANE));
     const answer = await ask(shown, this.body(options), LANE, part);
-    if (answer && this.shown === shown) this.arrived(answer, version);
+    if (answer && answer.kind !== "partly" && this.shown === shown) this.arrived(answer, version);
+  }
+
+  /** The check has ended: a map that waited for it is refined. */
+  concluded() {
+    if (this.shown === "map" && this.rough) this.ask();
   }
 
   /** The check is there, whose figures are one of the pictures: what waits would tell less. */
@@ -186,7 +192,7 @@ export class Pictures {
     if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point), drawn: () => this.glance() }, answer.names);
     const free = this.shown === "map" && answer.axes ? Object.values(answer.axes) : [];
     for (const box of this.plots.children) if (answer.figures?.some((figure) => figure.name === box.dataset.name)) mark(box, version, ANSWER, free);
-    if (answer.kind === "partly" && !answer.sentences.length) return this.tell.shown(answer, this.shown, version); // its words follow
+    if (answer.kind === "partly" && !answer.sentences.length && this.shown !== "map") return this.tell.shown(answer, this.shown, version); // its words follow
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = (answer.drawings ?? []).map((item) => this.drawn(item));
     const working = answer.kind === "partly" ? [el("progress", { "aria-label": "Progress" })] : [];

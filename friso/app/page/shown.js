@@ -9,7 +9,8 @@ let latest = null;
 let timer = 0;
 
 /** The machine shown as it is set now, one object until that changes: its name, text and file (`machine`), the keys `given`, what is
- * `sent` of it, what the server made of it (`described`; `read` waits for that), and the `answers` about it, by tab. */
+ * `sent` of it, what the server made of it (`described`; `read` waits for that), the `answers` about it, by tab, and whether its check
+ * has ended (`concluded`). */
 export function now() {
   const machine = machines.current();
   const given = machines.changes();
@@ -18,7 +19,7 @@ export function now() {
   if (latest?.machine !== machine || latest.key !== key || latest.pinned !== pinned) {
     let settle;
     const read = new Promise((resolve) => (settle = resolve));
-    latest = { machine, given, key, pinned, sent: machines.sent(), described: null, read, settle, answers: new Map() };
+    latest = { machine, given, key, pinned, sent: machines.sent(), described: null, read, settle, answers: new Map(), concluded: false };
   }
   return latest;
 }
