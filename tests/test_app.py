@@ -126,7 +126,7 @@ def parts(content: bytes) -> Iterator[Any]:
 def unpacked(value: Any, numbers: bytes) -> Any:
     if isinstance(value, list):
         return [unpacked(item, numbers) for item in value]
-    if isinstance(value, dict) and "shape" in value:
+    if isinstance(value, dict) and isinstance(value.get("shape"), list):
         count = int(np.prod(value["shape"]))
         return np.frombuffer(numbers, "<f4", count, value["array"]).reshape(value["shape"])
     return {key: unpacked(item, numbers) for key, item in value.items()} if isinstance(value, dict) else value

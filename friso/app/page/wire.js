@@ -129,7 +129,7 @@ function joined(chunks, size) {
 function unpacked(value, numbers) {
   if (Array.isArray(value)) return value.map((item) => unpacked(item, numbers));
   if (value === null || typeof value !== "object") return value;
-  if (value.shape) {
+  if (Array.isArray(value.shape)) { // that of a hatching is a text
     const [rows, columns] = value.shape;
     if (columns === undefined) return new Float32Array(numbers, value.array, rows);
     return Array.from({ length: rows }, (_, row) => new Float32Array(numbers, value.array + 4 * row * columns, columns));
