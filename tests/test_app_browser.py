@@ -1155,6 +1155,19 @@ def test_a_slider_that_is_let_go_keeps_its_verdict(browsed: Browsed) -> None:
     assert asked.count("verdict") == 1
 
 
+def test_a_text_that_is_called_shape_stays_one_beside_arrays(browsed: Browsed) -> None:
+    """A hatching has one."""
+    read = browsed.page.evaluate(
+        """async bytes => {
+            const { frames } = await import('/wire.js');
+            const chunks = [{ value: new Uint8Array(bytes) }, { done: true }];
+            for await (const part of frames({ read: async () => chunks.shift() })) return { ...part, x: [...part.x] };
+        }""",
+        [*frame({"fillpattern": {"shape": "/"}, "x": np.arange(3.0)})],
+    )
+    assert read == {"fillpattern": {"shape": "/"}, "x": [0, 1, 2]}
+
+
 def test_tracks_of_sliders_have_the_colours_of_verdicts(browsed: Browsed) -> None:
     page = browsed.page
     track = f"document.querySelector('{ROW} input[type=range]').style.getPropertyValue('--track')"

@@ -175,24 +175,22 @@ setTimeout(look, LOOKED);
  */
 export class Live {
   constructor(question, lane, patience, done) {
-    Object.assign(this, { question, lane, patience, done, busy: false, asked: null, next: null, begun: 0, timer: 0 });
+    Object.assign(this, { question, lane, patience, done, busy: false, next: null, begun: 0, timer: 0 });
   }
 
-  /** What is on its way already is not asked again. */
   ask(body, tag) {
-    clearTimeout(this.timer);
-    const asked = JSON.stringify(body);
-    this.next = this.busy && asked === this.asked ? null : { body, tag, asked };
-    if (!this.next) return;
+    this.next = { body, tag };
     const left = this.busy ? this.begun + this.patience - performance.now() : 0;
     if (left <= 0) return this.go();
+    clearTimeout(this.timer);
     this.timer = setTimeout(() => this.go(), left);
   }
 
   async go() {
     clearTimeout(this.timer);
-    const { body, tag, asked } = this.next;
-    Object.assign(this, { asked, next: null, busy: true });
+    const { body, tag } = this.next;
+    this.next = null;
+    this.busy = true;
     const begun = (this.begun = performance.now());
     const answer = await ask(this.question, body, this.lane, (part) => (part.kind === "message" || part.kind === "partly") && this.done(part, tag));
     if (begun !== this.begun) return;
@@ -203,7 +201,7 @@ export class Live {
 
   stop() {
     clearTimeout(this.timer);
-    this.next = this.asked = null;
+    this.next = null;
     end(this.lane);
   }
 }
