@@ -66,8 +66,8 @@ def parcel_of(control: str, machine: str, samples: int = SHORT) -> Parcel:
 
 def written(folder: Path, target: str, parcel: Parcel) -> Path:
     folder.mkdir(exist_ok=True)
-    for name, text in TARGETS[target].files(parcel).items():
-        (folder / name).write_text(text, "utf-8")
+    for name, content in TARGETS[target].files(parcel).items():
+        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     return folder
 
 
@@ -358,8 +358,9 @@ def test_files_are_identical_from_the_same_input() -> None:
         "from friso.drives.target import TARGETS\n"
         "from friso.questions.export.parcel import packed\n"
         "parcel = packed(target_stages.stage_of('cascade', 'rigid_lugre'), TARGETS['c'], 'axis', {}, 100)\n"
-        "texts = [text for name in TARGETS for text in TARGETS[name].files(parcel).values()]\n"
-        "print(hashlib.sha256(''.join(texts).encode()).hexdigest())"
+        "contents = [one for name in TARGETS for one in TARGETS[name].files(parcel).values()]\n"
+        "contents = [one if isinstance(one, bytes) else one.encode() for one in contents]\n"
+        "print(hashlib.sha256(b''.join(contents)).hexdigest())"
     )
     paths = [str(EXAMPLES.parent), str(Path(__file__).parent)]
     seen = set()
