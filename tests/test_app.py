@@ -245,6 +245,29 @@ def test_a_later_server_lets_in_who_proves_the_secret_and_nobody_else(tmp_path: 
     assert Access.at("127.0.0.1", 8000, store).secret == later.secret != first.secret
 
 
+def test_what_the_secret_let_in_is_out_once_two_have_seen_a_token(tmp_path: Path) -> None:
+    """Who takes the token of another user also learns the secret: both end as the owner comes."""
+    access = Access.at("127.0.0.1", 8000, tmp_path / "secret")
+    token = access.token_for_once()
+    thief, again = access.session_of(token), access.entered_again
+    assert access.has(thief)
+    assert access.has(again)
+    assert again != access.session
+    access.session_of(token)
+    assert not access.has(thief)
+    assert not access.has(again)
+    assert access.has(access.session)
+
+
+def test_a_page_with_a_key_is_told_the_secret_again(served: Served) -> None:
+    """No browser stores it: a page that is loaded again asks for it."""
+    status, _, content = served.request("POST", "/enter")
+    assert (status, json.loads(content)["secret"]) == (200, served.access.secret)
+    proof = hmac.new(served.access.secret.encode(), served.access.challenge.encode(), "sha256").hexdigest()
+    status, _, content = served.request("POST", "/enter", Authorization=None, Friso_Proof=proof)
+    assert (status, json.loads(content)["key"]) == (200, served.access.entered_again)
+
+
 def test_a_websocket_is_refused_without_advice_on_the_terminal(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -78,7 +78,8 @@ class Access:
 
     `hosts` holds names with the port. `token` stands in the address that friso prints, and stays valid. A browser
     exchanges it for `session`, the key of later requests, and for the `secret` by which it enters a later server at
-    the same port. The secret is kept in the file `store`, if there is one.
+    the same port, with the key `entered_again`. The secret is kept in the file `store`, if there is one; with it ends
+    the key.
     """
 
     hosts: frozenset[str]
@@ -92,6 +93,7 @@ class Access:
     """Text from which this server's proofs are made."""
     store: Path | None = None
     secret: str = ""
+    entered_again: str = field(default_factory=lambda: secrets.token_urlsafe(32))
 
     def __post_init__(self) -> None:
         with suppress(OSError, UnicodeDecodeError):
@@ -100,8 +102,8 @@ class Access:
             self._renew()
 
     def _renew(self) -> None:
-        """Make a new secret, with which no earlier page enters."""
-        self.secret = secrets.token_urlsafe(32)
+        """Make a new secret: no earlier page enters with the old one, and what entered with it is out."""
+        self.secret, self.entered_again = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
         if self.store:
             with suppress(OSError):  # then pages are not let in again
                 write_private(self.store, self.secret.encode("ascii"))
@@ -164,7 +166,7 @@ class Access:
     def has(self, key: str) -> bool:
         """Tell whether a key belongs to a session that has not ended."""
         begun = {session for _, session in self.once.values() if session}
-        return any(_same(key, session) for session in {self.session, *begun} - self.ended)
+        return any(_same(key, session) for session in {self.session, self.entered_again, *begun} - self.ended)
 
 
 HTTP_PORT = 80
@@ -212,8 +214,11 @@ class Gate:
             return _refused()
         key = headers.get("authorization", "").removeprefix(BEARER)
         if path == ENTRY and scope["method"] == "POST":
-            proven = access.session if access.is_proven(headers.get(PROOF, "")) else ""
-            session = access.session_of(headers.get(TOKEN, ""), key) or proven
+            session = access.session_of(headers.get(TOKEN, ""), key)
+            if not session and access.is_proven(headers.get(PROOF, "")):
+                session = access.entered_again
+            elif not session and access.has(key):
+                session = key
             entered = {"key": session, "secret": access.secret}
             return JSONResponse(entered) if session else _refused({CHALLENGE: access.challenge})
         if access.has(key):
