@@ -163,7 +163,7 @@ def reproduce(
         readings[name] = _read_otherwise(entry, base, words)
         if (attracts := _by_attraction(entry, base, surveyed, cycles)) is not None:
             attracting[name] = attracts
-    space = plausible(entries, draws, kept, tally)
+    space = plausible(entries, by_count, draws, kept, tally)
     others = _others(entries, base, loose)
     verdicts = tuple(
         verdict(

@@ -75,19 +75,31 @@ class JudgeSettings(Settings):
     """Work of each experiment on a drawn rig, in runs of a map: as measured on two drawn rigs, in milliseconds of
     processor time. Equal work for all told half an hour for claims of half a minute."""
 
+    draw_looks: tuple[int, ...] = setting((7, 17, 51), "draws")
+    """Numbers of draws after which a claim is looked at; a claim whose interval has decided is drawn no further. Seven
+    draws that all hold lie above `half_share`, seventeen of which none does below `rare_share`, and with fifty-one an
+    interval is at most a third wide. Looking three times, each interval may miss by a third of 5 %."""
+
+    rail_count: int = setting(20, "rails")
+    """Number of rails at friso's own choice of the open values, on which a share is known to 22 % at worst."""
+
+    draw_rails: int = setting(8, "rails")
+    """Number of rails in a draw, which the eight lanes of a register run at once. They are fewer than at friso's own
+    choice, as the maps of a draw are coarser: what scatters from rail to rail adds to the scatter of the draws."""
+
     half_share: float = setting(0.5, "")
     """Share of the draws in which a claim must hold to agree; the whole interval must lie above it. With less, a claim
     could fail in most of what the thesis leaves open."""
 
     rare_share: float = setting(0.25, "")
     """Largest share of the draws in which a claim that fails at friso's choice may hold, and still fail. The upper end
-    of the interval counts: thirteen draws without one that holds show it, and one of 48 does not turn it."""
+    of the interval counts: seventeen draws without one that holds show it, and one of 51 does not turn it."""
 
     stray_share: float = setting(0.05, "")
     """Share that the lower end of an interval must exceed to say that a claim holds in more than stray draws. It is
     that of “few” cells of a map. Twice as much would need ten of 48 draws."""
 
-    least_decided: int = setting(6, "draws")
+    least_decided: int = setting(7, "draws")
     """Least number of decided draws. With fewer, even if all agree, the interval of the share reaches below a half."""
 
 
