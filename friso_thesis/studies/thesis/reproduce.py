@@ -110,9 +110,9 @@ def reproduce(
     Maps have `points` values per axis, and for judging at least `JUDGED_POINTS`. With `only`, just these claims are
     judged, with what they need, and the result has no others. `with_cycles` also computes the hunting
     cycles behind every map, and adds to each judgement what attracts the stages. With `draws`, every claim is judged in
-    as many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not computed
-    again. `progress` is called with steps done, steps in all and what comes next. Raises InputError for an unknown
-    study or claim and for numbers that are too low or too high, ValueError for an unusable rtol.
+    up to as many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not
+    computed again. `progress` is called with steps done, steps in all and what comes next. Raises InputError for an
+    unknown study or claim and for numbers that are too low or too high, ValueError for an unusable rtol.
     """
     chosen, asked = _studies(names), _claims(only)
     _check("points", points, 3, MOST_POINTS, "41")

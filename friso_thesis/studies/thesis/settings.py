@@ -26,8 +26,8 @@ class JudgeSettings(Settings):
     """Lowest crossover tried over the first eigenfrequency: 0.3 Hz, low enough that the resonance stays below 0 dB
     while the cart slides. From 0.8 Hz on it reaches 0 dB, and the loop crosses there."""
 
-    crossovers_tried: int = setting(31, "")
-    """Number of crossovers tried beside the first eigenfrequency, 19 % apart, finer than “about” by far."""
+    crossovers_tried: int = setting(21, "")
+    """Number of crossovers tried beside the first eigenfrequency, 30 % apart, finer than “about”."""
 
     tuned_masses: int = setting(9, "")
     """Number of masses for which the controller is tuned, from the stage's to the whole mass. More show the same

@@ -72,14 +72,20 @@ class ClaimVerdict:
             sentence += f"; that depends on {_listed(self.space)}." if self.space.hangs_on else "."
             sentence += " No choice of the unstated values that was tried makes it hold." if self.robust else ""
             sentence += self._too_few
+        return " ".join((sentence, *self.besides))
+
+    @property
+    def besides(self) -> tuple[str, ...]:
+        """Say in sentences what turns a criterion, or may, besides the random open values."""
+        sentences = []
         if self.turned:
-            sentence += f" With {' and with '.join(self.turned)} a criterion is judged otherwise."
+            sentences.append(f"With {' and with '.join(self.turned)} a criterion is judged otherwise.")
         if self.reread:
             turns = "; ".join(f"{name}: {self._word_of(finding)}" for name, finding in self.reread.items())
-            sentence += f" Other readings of the thesis's words turn a criterion: {turns}."
+            sentences.append(f"Other readings of the thesis's words turn a criterion: {turns}.")
         if self.undrawn:
-            sentence += f" It depends also on what is assumed and not drawn: {self.undrawn}."
-        return sentence
+            sentences.append(f"It depends also on what is assumed and not drawn: {self.undrawn}.")
+        return tuple(sentences)
 
     @property
     def _too_few(self) -> str:
