@@ -128,7 +128,8 @@ def reproduce(
     judged_points = max(points, JUDGED_POINTS)
     half = -(-judged_points // 2)
     total = len(studies) * (judged_points**2 + half**2) + sum(map(_part_work, parts)) + work_of(entries, draws)
-    total += with_cycles * sum(map(_survey_work, studies.values())) + 2 * points**2 * ("isolator-damping" in studies)
+    surveyed_studies = _surveyed_studies(entries, studies, asked) if with_cycles else []
+    total += sum(map(_survey_work, surveyed_studies)) + 2 * points**2 * ("isolator-damping" in studies)
     tally = Tally(progress, total)
     tally.add(0, "responses")
     base = evidence(needs - STUDIES.keys(), judged_points, rtol, kept=kept)
@@ -153,9 +154,9 @@ def reproduce(
         tally.add(_survey_work(study) // 2, f"edges of hunting, map {study.panel}")
         return surveyed, cycles
 
-    studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
-    surveyed = {name: of_map for name, (of_map, _) in zip(studies, studied, strict=with_cycles)}
-    cycles = {name: of_map for name, (_, of_map) in zip(studies, studied, strict=with_cycles)}
+    studied = side_by_side([partial(behind, study) for study in surveyed_studies])
+    surveyed = {study.name: of_map for study, (of_map, _) in zip(surveyed_studies, studied, strict=True)}
+    cycles = {study.name: of_map for study, (_, of_map) in zip(surveyed_studies, studied, strict=True)}
     by_count, readings, attracting = {}, {}, {}
     for name, entry in entries.items():
         with words_read() as words:
@@ -196,6 +197,17 @@ def reproduce(
 def _part_work(part: str) -> int:
     """Return the progress steps that a part of the linear analysis, or an experiment, takes."""
     return dict(settings.experiment_work).get(part, settings.linear_work)
+
+
+def _surveyed_studies(
+    entries: Mapping[str, Registered], studies: Mapping[str, ThesisStudy], asked: frozenset[str] | None
+) -> list[ThesisStudy]:
+    """Return the studies behind whose maps cycles are looked for: all, or those of claims `asked` for by name.
+
+    Claims about runs alone need none.
+    """
+    needs = {need for entry in entries.values() if not entry.of_runs for need in entry.needs}
+    return [study for name, study in studies.items() if asked is None or name in needs]
 
 
 def _survey_work(study: ThesisStudy) -> int:

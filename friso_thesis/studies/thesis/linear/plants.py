@@ -206,9 +206,9 @@ def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
 
 def _low_lines(flat: Mapping[str, Any], member: Members, lowest: float) -> LowLines:
     """Return the lines of a plant at frequencies far below the `lowest` searched [rad/s], where nothing resonates."""
-    omega = lowest * np.array([1e-4, 1e-1])
-    spring, force = 1 / plants(flat, member, omega)[0]
-    return LowLines(spring.real, force.imag / omega[1], (spring.real - force.real) / omega[1] ** 2)
+    omega = float(lowest) * np.array([1e-4, 1e-1])
+    spring, force = (complex(value) for value in 1 / plants(flat, member, omega)[0])
+    return LowLines(spring.real, force.imag / float(omega[1]), (spring.real - force.real) / float(omega[1]) ** 2)
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
