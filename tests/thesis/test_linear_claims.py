@@ -58,7 +58,6 @@ def test_the_rig(linear: Linear, claim: str, holds: tuple[bool, ...]) -> None:
     finding = judged(claim, linear)
     assert finding.pattern == holds, finding
     assert all(part.holds or part.why or part.open for part in finding.parts)
-    assert {type(part.holds) for part in finding.parts} == {bool}  # findings are kept as JSON
     assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
 
 

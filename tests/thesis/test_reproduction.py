@@ -863,6 +863,13 @@ def assert_same(again: Any, made: Any) -> None:
         assert again == made or (again != again and made != made)
 
 
+def test_findings_are_kept_whatever_their_judge_compared(tmp_path: Path) -> None:
+    """NumPy's truth is kept, too, which JSON does not know."""
+    kept = Kept(tmp_path)
+    (made,) = kept.findings(("a",), lambda: {"F28": Finding((Part("a criterion", np.True_, "1"),))}).values()
+    assert kept.findings(("a",), lambda: pytest.fail("they were kept")) == {"F28": made}
+
+
 def test_what_is_kept_depends_on_all_sources_it_was_computed_with() -> None:
     """Every part of friso that these parts import is one of them, or decides on no number."""
     package = files("friso")
