@@ -866,8 +866,9 @@ def assert_same(again: Any, made: Any) -> None:
 def test_findings_are_kept_whatever_their_judge_compared(tmp_path: Path) -> None:
     """NumPy's truth is kept, too, which JSON does not know."""
     kept = Kept(tmp_path)
-    (made,) = kept.findings(("a",), lambda: {"F28": Finding((Part("a criterion", np.True_, "1"),))}).values()
-    assert kept.findings(("a",), lambda: pytest.fail("they were kept")) == {"F28": made}
+    kept.findings(("a",), lambda: {"F28": Finding((Part("a criterion", cast("Any", np.True_), "1"),))})
+    (again,) = kept.findings(("a",), lambda: pytest.fail("they were kept")).values()
+    assert again.parts[0].holds is True
 
 
 def test_what_is_kept_depends_on_all_sources_it_was_computed_with() -> None:
