@@ -43,6 +43,10 @@ COLOURS = {
 }
 
 
+FAILS_FIRST = ("differs", "holds in part", "depends", *[*COLOURS][4:-1], "holds")
+"""Judgements in the order of the claims as text."""
+
+
 @dataclass(frozen=True)
 class FigureSection:
     """A figure or table of the thesis, with the verdicts on its claims.
@@ -146,11 +150,12 @@ def claims_markdown(reproduction: Reproduction) -> str:
     how = (
         f"Computed by `friso reproduce` (friso {VERSION}) on {today.day} {today:%B %Y}: {reproduction.judged_points} "
         f"values per axis, up to {len(reproduction.plausible.draws)} joint draws of what the thesis leaves open. The "
-        "figures, the quotes and the criteria are on the page that it writes besides."
+        "figures, the quotes and the criteria are on the page that it writes besides. Below the table stand numbers and "
+        "reasons: what fails first."
     )
     table = "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows)
     parts = ["# The thesis, claim by claim", conclusion(reproduction), how, table]
-    for judgement in reversed(COLOURS):
+    for judgement in FAILS_FIRST:
         those = [item for item in verdicts if item.finding and item.judgement == judgement]
         if those:
             parts += [f"## {words.AGREEMENT[judgement].capitalize()}", "\n".join(map(_reasoned, those))]

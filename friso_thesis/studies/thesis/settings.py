@@ -97,7 +97,7 @@ class JudgeSettings(Settings):
 
     stray_share: float = setting(0.05, "")
     """Share that the lower end of an interval must exceed to say that a claim holds in more than stray draws. It is
-    that of “few” cells of a map. Twice as much would need ten of 48 draws."""
+    that of “few” cells of a map. Twice as much would need ten of 51 draws."""
 
     least_decided: int = setting(7, "draws")
     """Least number of decided draws. With fewer, even if all agree, the interval of the share reaches below a half."""
