@@ -150,8 +150,8 @@ def claims_markdown(reproduction: Reproduction) -> str:
     how = (
         f"Computed by `friso reproduce` (friso {VERSION}) on {today.day} {today:%B %Y}: {reproduction.judged_points} "
         f"values per axis, up to {len(reproduction.plausible.draws)} joint draws of what the thesis leaves open. The "
-        "figures, the quotes and the criteria are on the page that it writes besides. Below the table stand numbers and "
-        "reasons: what fails first."
+        "figures, the quotes and the criteria are on the page that it writes besides. Below the table stand numbers "
+        "and reasons: what fails first."
     )
     table = "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows)
     parts = ["# The thesis, claim by claim", conclusion(reproduction), how, table]

@@ -59,20 +59,20 @@ class JudgeSettings(Settings):
 
     experiment_work: tuple[tuple[str, int], ...] = setting(
         (
-            ("locked_line", 900),
-            ("joint_steps", 200),
-            ("slow_motion", 200),
-            ("constant_speed", 6000),
-            ("rig_loops", 1800),
-            ("moves", 7000),
-            ("grid", 12_000),
-            ("cycles", 4500),
-            ("standstill", 4000),
+            ("locked_line", 700),
+            ("joint_steps", 140),
+            ("slow_motion", 90),
+            ("constant_speed", 4100),
+            ("rig_loops", 1000),
+            ("moves", 1600),
+            ("grid", 3000),
+            ("cycles", 2500),
+            ("standstill", 3000),
             ("traces", 1000),
         ),
         "runs",
     )
-    """Work of each experiment on a drawn rig, in runs of a map: as measured on two drawn rigs, in milliseconds of
+    """Work of each experiment on a drawn rig, in runs of a map: as measured on three drawn rigs, in milliseconds of
     processor time. Equal work for all told half an hour for claims of half a minute."""
 
     draw_looks: tuple[int, ...] = setting((7, 17, 51), "draws")
