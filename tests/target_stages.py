@@ -1,4 +1,4 @@
-"""Stages whose controllers leave friso in tests: four controllers on three machines."""
+"""Stages whose controllers leave friso in tests: five controllers on three machines."""
 
 from __future__ import annotations
 
@@ -52,6 +52,27 @@ CONTROLLERS: dict[str, dict[str, Any]] = {
             "force_limit": "60 N",
         },
         "drive": {**_DRIVE, "feedforward_mass": "1.7 kg"},
+    },
+    "scheduled": {
+        "controller": {
+            "kind": "pid",
+            "crossover": "9 Hz",
+            "alpha": 0.1,
+            "beta": 2,
+            "force_limit": "120 N",
+            "schedule_error": ["5 um", "50 um"],
+            "schedule_factor": [0.5, 1],
+            "error_deadband": "1 um",
+            "error_deadband_exit": "3 um",
+            "error_deadband_time": "2 ms",
+            "integral_rests_in_moves": True,
+            "freeze_window": "0.5 um",
+            "freeze_window_exit": "5 um",
+            "freeze_window_time": "5 ms",
+            "standstill_window": "20 um",
+            "standstill_factor": 0.8,
+        },
+        "drive": _DRIVE,
     },
 }
 MACHINES = {"rigid_lugre": "lugre_stick_slip", "isolator": "thesis_rig", "gms": "thesis_rig_gms"}

@@ -185,13 +185,14 @@ def test_series_adds_the_thesis_formula_beside(rig: Stage) -> None:
 def test_the_last_crossover_and_its_phase_margin_are_marked(rig: Stage) -> None:
     loops = bode(rig)
     above, below = _figures(loops)["bode_loop"].panels
-    for mark, margin, case in zip(
-        above.markers, below.series[-len(above.markers) :], loops.cases.values(), strict=True
-    ):
+    margins = below.series[-len(above.markers) :]
+    lines = above.series[: len(above.markers)]
+    for mark, line, margin, case in zip(above.markers, lines, margins, loops.cases.values(), strict=True):
         assert mark.x == pytest.approx(case.margins.crossovers[-1:])
-        assert f"{abs(margin.y[1] - margin.y[0]):.0f}°" in mark.label
+        assert mark.colour == line.colour
+        assert line.label.endswith(f" {abs(margin.y[1] - margin.y[0]):.0f}°")
     last = loops.cases["sliding"].margins
-    assert f"{last.phase_margin:.0f}°" in above.markers[1].label
+    assert f" {last.phase_margin:.0f}°" in above.series[1].label
 
 
 def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode, snapshots: Snapshots) -> None:
@@ -242,7 +243,7 @@ def test_an_unstable_loop_is_a_plain_statement(unstable: Bode, snapshots: Snapsh
     assert len(case["crossovers_hz"]) == 3
     figures = _figures(unstable)
     assert [line.label for line in figures["bode_sensitivity"].panels[0].series] == ["Stuck, limiter touched"]
-    labels = [line.label for line in figures["bode_loop"].panels[0].series]
+    labels = [line.label.split(":")[0] for line in figures["bode_loop"].panels[0].series]
     assert labels[:3] == ["Stuck (unstable)", "Sliding (unstable)", "Stuck, limiter touched"]
     assert all(line.label.endswith("(unstable)") for line in figures["bode_speeds"].panels[0].series)
     first, why, fast = sentences(unstable)
@@ -335,7 +336,7 @@ def test_the_plant_is_drawn_with_its_mass_lines(response: Bode) -> None:
 
 def test_loops_cross_0_db_where_the_table_says(response: Bode) -> None:
     magnitude, phase = _figures(response)["bode_loop"].panels
-    (sliding,) = (line for line in magnitude.series if line.label == "Sliding")
+    (sliding,) = (line for line in magnitude.series if line.label.startswith("Sliding: "))
     passes = np.flatnonzero(np.diff(np.sign(sliding.y)))
     expected = response.cases["sliding"].margins.crossovers
     assert sliding.x[passes] == pytest.approx(expected, rel=0.02)

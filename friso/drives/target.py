@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -104,15 +105,17 @@ class Parcel:
 class CodeTarget:
     """A form in which a controller leaves friso.
 
-    `files` writes the files by name. `own_names` are names that the form takes for itself, and `ignores_case` tells
-    that names which differ in case alone are one. A target that `holds_machine` can write the machine, too.
+    `files` writes the files by name, as texts or bytes. `own_names` are names that the form takes for itself, and
+    `ignores_case` tells that names which differ in case alone are one. A target that `holds_machine` can write the
+    machine, too. `remark` is a sentence on what was written.
     """
 
     title: str
-    files: Callable[[Parcel], Mapping[str, str]]
+    files: Callable[[Parcel], Mapping[str, Any]]
     own_names: frozenset[str] = frozenset()
     ignores_case: bool = False
     holds_machine: bool = False
+    remark: Callable[[], str] = str
 
     def check_names(self, name: str, program: Program) -> None:
         """Check that names in the code are usable.

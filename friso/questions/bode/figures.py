@@ -105,7 +105,8 @@ def _loop(bode: Bode) -> Figure:
     """Draw the open loop in the limit cases."""
     caption = (
         "The loop cut at the actuator: controller, plant and, if the stage file has one, the drive. The phase margin "
-        "is the distance to −180° where the magnitude crosses 0 dB."
+        "is the distance to −180° where the magnitude crosses 0 dB. Points, and numbers beside the names: the last "
+        "crossover and its phase margin."
     )
     panels = loop_panels(_hertz(bode), [_loop_of(name, case) for name, case in bode.cases.items()])
     panels = _with_crossings(panels, _hertz(bode), bode)
@@ -115,20 +116,21 @@ def _loop(bode: Bode) -> Figure:
 def _with_crossings(panels: tuple[Panel, ...], hertz: Array, bode: Bode) -> tuple[Panel, ...]:
     """Mark on panels of magnitude and phase the last crossover of every stable case, and its phase margin.
 
-    The phase margin is a line from the loop to the next odd multiple of 180 degrees.
+    The legend has the numbers. The phase margin is a line from the loop to the next odd multiple of 180 degrees.
     """
     above, below = panels
-    dots, margins = [], []
-    for line, case in zip(below.series, bode.cases.values(), strict=True):
+    lines, dots, margins = [*above.series], [], []
+    for number, (line, case) in enumerate(zip(below.series, bode.cases.values(), strict=True)):
         if not (case.margins.stable and case.margins.crossovers):
             continue
         at = case.margins.crossovers[-1]
         phase = float(np.interp(np.log(at), np.log(hertz), line.y))
         edge = 360.0 * np.round((phase - 180.0) / 360.0) + 180.0
-        name = f"crossover {with_unit(at, 'Hz')}, phase margin {abs(phase - edge):.0f}°"
-        dots.append(Markers(np.array([at]), np.zeros(1), name, line.colour))
+        name = f"{lines[number].label}: {with_unit(at, 'Hz')}, {abs(phase - edge):.0f}°"
+        lines[number] = replace(lines[number], label=name)
+        dots.append(Markers(np.array([at]), np.zeros(1), "", line.colour))
         margins.append(Series(np.full(2, at), np.array([phase, edge]), "", line.colour, width=2.6))
-    return replace(above, markers=tuple(dots)), replace(below, series=(*below.series, *margins))
+    return replace(above, series=tuple(lines), markers=tuple(dots)), replace(below, series=(*below.series, *margins))
 
 
 def _cascade(bode: Bode) -> Iterator[Figure]:

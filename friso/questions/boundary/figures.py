@@ -148,11 +148,12 @@ def _plane(traced: Plane) -> Figure:
     """Draw the curves on which hunting ends, and the verdicts at the nodes of the grid."""
     x, y = (_axis(swept, PLANE_MARGIN) for swept in traced.space.ranges)
     curves = boundary.lines(traced)
+    basin = any(line.shape == "asymmetric" for line in curves)  # without one, the title names the edge
     series = tuple(
         Series(
             line.at[:, 0],
             line.at[:, 1],
-            "edge of the basin" if line.shape == "asymmetric" else "edge of hunting",
+            {True: "edge of the basin", False: "edge of hunting" if basin else ""}[line.shape == "asymmetric"],
             COLOURS[line.shape],
             DASHES[line.kinds[0]],
             2.2,
@@ -165,7 +166,7 @@ def _plane(traced: Plane) -> Figure:
     nodes = Cloud(np.array(across), np.array(up), numbers, "", "", categories=tuple(NODES.values()), codes=codes)
     kinds = dict.fromkeys(line.kinds[0] for line in curves)
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
-    note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
+    note = " ".join([*meanings, BASIN] if basin else meanings)
     lost_ends = [end.at for end in boundary.curve_ends(traced) if end.kind == "lost"]
     meetings = [place for meeting in boundary.curve_meetings(traced) for place in meeting.places]
     marks = (

@@ -57,7 +57,7 @@ def blocks(comparison: Comparison) -> list[AnswerBlock]:
         AnswerBlock(title="What the numbers are", caption=meanings, details=words.details(comparison)),
         AnswerBlock(
             title="Compared with a, machine by machine",
-            columns=axis_shown().named(words.PAIRED),
+            columns=axis_shown().named((*words.PAIRED, *([words.STANDSTILL] if comparison.shaken else []))),
             rows=words.paired_rows(comparison),
         ),
         AnswerBlock(

@@ -26,7 +26,7 @@ BAR_PERCENTILES = (5, 95)
 
 
 def compare_figures(comparison: Comparison) -> list[Figure]:
-    """Draw how many machines keep moving, how fast they settle, and how still they stand.
+    """Draw how many machines keep moving, how fast they settle and, if a floor shakes them, how still they stand.
 
     The one figure has a panel for each, and shows every option of the comparison.
     """
@@ -34,15 +34,17 @@ def compare_figures(comparison: Comparison) -> list[Figure]:
     caption = (
         f"{comparison.machines.count} machines drawn with seed {comparison.seed}, the same in all options; in position "
         f"means within {within}. Bars of probabilities are 95 % intervals. The settling curve of an option ends at the "
-        "share of machines that settle at all. Standstill: thin bars contain 90 % of the machines, thick bars are 95 % "
-        "intervals of the median."
+        "share of machines that settle at all."
     )
-    if not comparison.shaken:
+    panels = (_probabilities(comparison), _settling(comparison, within))
+    if comparison.shaken:
+        caption += " Standstill: thin bars contain 90 % of the machines, thick bars are 95 % intervals of the median."
+        panels += (_standstill(comparison),)
+    else:
         caption += (
             " The stage file has no table [floor], the vibration of the floor: a machine at rest here need not stand "
             "still in a real room."
         )
-    panels = (_probabilities(comparison), _settling(comparison, within), _standstill(comparison))
     return [Figure("compare", "Isolator or firmware?", caption, panels, subject=comparison.stage.name)]
 
 
@@ -124,8 +126,7 @@ def _standstill(comparison: Comparison) -> Panel:
     )
     moves = max((high for _, high in most if high > 0), default=0.0) > 0  # none rests from the start
     y = Axis("In-position RMS", "m", log=moves)
-    title = "Standstill" if comparison.shaken else "At rest or not (no floor vibration)"
-    return Panel(title, _names(comparison), y, series, (Markers(x, middle, "median", BLUE),))
+    return Panel("Standstill", _names(comparison), y, series, (Markers(x, middle, "median", BLUE),))
 
 
 def _most(result: OptionResult) -> tuple[float, float]:

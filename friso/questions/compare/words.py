@@ -52,11 +52,11 @@ PAIRED = (
     "In position sooner",
     "In position later",
     "No difference",
-    "In-position RMS, ratio",
     "RMS of the {effort}, ratio",
 )
 
-UNSHAKEN = "no [floor]"
+STANDSTILL = "In-position RMS, ratio"
+"""Column that is there if a floor shakes the machines."""
 
 PairedRow = tuple[str, list[str]]
 
@@ -134,16 +134,16 @@ def table_rows(comparison: Comparison) -> list[PairedRow]:
 def paired_rows(comparison: Comparison) -> list[PairedRow]:
     """Return one row for each option except a, the first, with its texts under `PAIRED`.
 
-    Each machine is compared with itself under option a.
+    A shaking floor adds the text under `STANDSTILL`. Each machine is compared with itself under option a.
     """
     rows = []
     for result in comparison.results[1:]:
         pair = comparison.paired(result)
         points = [100 * value for value in (pair.swinging.value, pair.swinging.low, pair.swinging.high)]
         more = f"{points[0]:+.1f} points ({points[1]:+.1f} to {points[2]:+.1f})"
-        standstill = _ratio(pair.in_position) if comparison.shaken else UNSHAKEN
+        standstill = [_ratio(pair.in_position)] if comparison.shaken else []
         when = [share_with_interval(share) for share in (pair.sooner, pair.later, pair.alike)]
-        rows.append((label(result), [more, *when, standstill, _ratio(pair.force)]))
+        rows.append((label(result), [more, *when, _ratio(pair.force), *standstill]))
     return rows
 
 

@@ -79,9 +79,13 @@ def controller_blocks(answer: ControllerAnswer) -> list[AnswerBlock]:
         f"and {len(program.memories)} numbers kept a sample, output in {parcel.unit}."
     )
     test = f"Its test compares {len(parcel.vector.output)} samples with friso's own run as built."
-    rows = [(name, [f"{len(text.encode()) / 1e3:.1f} kB"]) for name, text in files.items()]
+    contents = {name: content.encode() if isinstance(content, str) else content for name, content in files.items()}
+    rows = [(name, [f"{len(content) / 1e3:.1f} kB"]) for name, content in contents.items()]
+    remark = TARGETS[answer.to].remark()
     return [
-        AnswerBlock(sentences=[verdict, what, test], numbers=partial(controller_document, answer)),
+        AnswerBlock(
+            sentences=[verdict, what, test, *([remark] if remark else [])], numbers=partial(controller_document, answer)
+        ),
         AnswerBlock(title="Files, with --out", columns=("Size",), rows=rows),
     ]
 

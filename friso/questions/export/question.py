@@ -59,8 +59,8 @@ class ControllerAnswer(Answer):
     to: str
 
     @property
-    def target_files(self) -> Mapping[str, str]:
-        """Return the files of the target by name, which are texts."""
+    def target_files(self) -> Mapping[str, Any]:
+        """Return the files of the target by name: texts, and archives as bytes."""
         return TARGETS[self.to].files(self.result)
 
     @property

@@ -139,9 +139,9 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     """Lay out the panels of a figure, with legends, colour bars and note."""
     plot = _plot_height(prepared, width)
     heads = [_Head.of(panel, width, prepared.columns) for panel in prepared.panels]
-    header = max(head.height for head in heads)
-    row = header + plot + FOOTER_HEIGHT
-    height = row * prepared.rows
+    rows = [heads[k : k + prepared.columns] for k in range(0, len(heads), prepared.columns)]
+    headers = [max(head.height for head in row) for row in rows]
+    height = sum(headers) + (plot + FOOTER_HEIGHT) * len(rows)
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the earlier numbers
     below, legend, note = plotly_maps.footer(prepared, key, width)
     top_margin = TOP_MARGIN + FOOTER_HEIGHT * any(panel.x.second is not None for panel in prepared.panels)
@@ -159,15 +159,16 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     links: dict[Axis, str] = {}
     with_bar, shared_bar = plotly_maps.bar_panels(prepared.panels)
     for number, panel in enumerate(prepared.panels):
-        top = height - (number // prepared.columns) * row
-        y_domain = ((top - header - plot) / height, (top - header) / height)
+        above = number // prepared.columns
+        top = height - sum(headers[: above + 1]) - (plot + FOOTER_HEIGHT) * above
+        y_domain = ((top - plot) / height, top / height)
         x_domain = _columns(number % prepared.columns, prepared.columns)
         bar = None
         if shared_bar and number in with_bar:
             bar = {
                 "x": 1.0,
-                "y": (FOOTER_HEIGHT + height - header) / 2 / height,
-                "len": 1 - (FOOTER_HEIGHT + header) / height,
+                "y": (FOOTER_HEIGHT + height - headers[0]) / 2 / height,
+                "len": 1 - (FOOTER_HEIGHT + headers[0]) / height,
             }
         elif number in with_bar:
             x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR_WIDTH_SHARE)
