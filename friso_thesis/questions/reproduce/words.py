@@ -304,8 +304,8 @@ OTHER_REASON = (
     ),
     Remark(
         "S323C", 1, False,
-        "ode23s serves, but ode15s and ode45 would too: with the thesis's steps they are stable, right and cheaper, "
-        "and without a largest step only dearer.",
+        "ode23s serves, but ode45 would too: with the thesis's steps it is stable, right and cheaper, and without a "
+        "largest step only dearer.",
     ),
 )  # fmt: skip
 """Remarks on statements that are right, but for another reason than the thesis gives."""
