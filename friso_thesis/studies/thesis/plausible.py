@@ -30,7 +30,7 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
-from friso_thesis.studies.thesis.settings import JudgeSettings, settings
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import DRAW_SEED, FORCE_NOISE, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
 
@@ -273,12 +273,11 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
     except _SHOWS_NOTHING as error:
         return {f"{name} {FAILED}": _failure(error) for name in entries}
     findings: Findings = {}
-    with replace(JudgeSettings.current(), rail_count=settings.draw_rails).in_use():
-        for name, entry in entries.items():
-            try:
-                findings[name] = counted(entry, base)
-            except _SHOWS_NOTHING as error:
-                findings[f"{name} {FAILED}"] = _failure(error)
+    for name, entry in entries.items():
+        try:
+            findings[name] = counted(entry, base)
+        except _SHOWS_NOTHING as error:
+            findings[f"{name} {FAILED}"] = _failure(error)
     return findings
 
 
