@@ -43,6 +43,11 @@ class AxisKind:
         return dict(self.exerts).get("A")
 
     @property
+    def finest(self) -> float:
+        """Return the length [m or rad] below which its encoder sees nothing: that of a count; 0 if it is not known."""
+        return dict(self.counted).get("count", 0.0)
+
+    @property
     def described(self) -> str:
         """Return the axis in words, for a message about a unit."""
         return f'[axis] kind = "{self.name}"'

@@ -122,6 +122,11 @@ def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
     if law == "dahl":
         return sigma_0 * z + viscous, v - sigma_0 * abs(v) / flat["friction.coulomb"] * z
     z_rate = v - sigma_0 * abs(v) / stribeck_level(flat, v) * z
+    if law == "load_dependent":
+        corner = 1e-7 * flat["friction.static"]
+        share, load = flat["friction.load_coefficient"], hypot(flat["drive"], corner) - corner
+        z_rate = v - sigma_0 * abs(v) / ((1 - share) * stribeck_level(flat, v) + share * load) * z
+        viscous *= 1 - share
     if law == "elasto_plastic":
         begins, limit = flat["friction.breakaway_deflection"], stribeck_level(flat, v) / sigma_0
         rising = 0.5 * (1 + sin(pi * (abs(z) - (limit + begins) / 2) / (limit - begins)))
@@ -132,6 +137,16 @@ def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
         lacking = 1 - (1 if v > 0 else -1) * sigma_0 * z / stribeck_level(flat, v)
         z_rate = v * lacking * hypot(lacking, 1e-4) ** more / hypot(1, 1e-4) ** more
     return sigma_0 * z + flat["friction.bristle_damping"] * z_rate + viscous, z_rate
+
+
+def aged(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
+    """Return force and rates of bristles whose level follows a Stribeck curve with a delay."""
+    sigma_0, z, lack = flat["friction.bristle_stiffness"], s["bristle_deflection"], s["lack"]
+    z_rate = v - sigma_0 * abs(v) / (flat["friction.static"] - lack) * z
+    force = sigma_0 * z + flat["friction.bristle_damping"] * z_rate + flat["friction.viscous"] * v
+    slides = 1 + abs(v) / flat["friction.stribeck_velocity"]
+    missing = flat["friction.static"] - stribeck_level(flat, v) - lack
+    return force, {"bristle_deflection": z_rate, "lack": slides * missing / flat["friction.dwell_time"]}
 
 
 def elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
@@ -297,7 +312,7 @@ def joint(flat: Flat, deflection: float, rate: float) -> float:
     return force
 
 
-SIDE_BY_SIDE = {"maxwell_slip": elements, "gms": generalised_elements}
+SIDE_BY_SIDE = {"maxwell_slip": elements, "gms": generalised_elements, "dwell": aged}
 
 
 def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]], list[float]]:
@@ -307,9 +322,10 @@ def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]]
         s = dict(zip(names, x, strict=True))
         y, v = s["position"], s["velocity"]
         force, rate = control(flat, s, y, v, *reference(flat, t))
-        force += flat.get("bias.stage", 0.0)
+        driven, force = force, force + flat.get("bias.stage", 0.0)
         rate |= {"position": v}
         cart_velocity, rubbing = s.get("cart_velocity", v), under_conditions(flat, reference(flat, t)[2])
+        rubbing = {**rubbing, "drive": driven}
         if flat["friction.model"] in SIDE_BY_SIDE:
             drag, rates_within = SIDE_BY_SIDE[flat["friction.model"]](rubbing, cart_velocity, s)
             rate |= rates_within

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import friso
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
+from friso.drives.questions import UserAnswers
 from friso.drives.read import stage_from
 from friso.errors import InputError
 
@@ -23,37 +24,57 @@ CYCLES = {"drive.position_sample_time": "1 ms", "drive.sample_time": "125 us"}
 TEXTS = {
     "kflop": "void main()\n{\n ch0->OutputMode=DAC_SERVO_MODE;\n ch0->P=2; /* of now */\n"
     " ch0->I=3e-5;\n ch0->D=10; // D\n ch0->MaxI=150;\n ch0->MaxOutput=2047;\n"
-    " ch0->iir[0].B0=0.5;\n ch0->iir[0].B1=0.5;\n ch0->iir[0].A1=0.25;\n}\n",
+    " ch0->DeadBandRange=3;\n ch0->DeadBandGain=0.4;\n ch0->iir[0].B0=0.5;\n"
+    " ch0->iir[0].B1=0.5;\n ch0->iir[0].A1=0.25;\n}\n",
     "moteus": "# kept\nservo.pid_position.kp 50\nservo.pid_position.ki 400\nservo.pid_position.kd 2\n"
     "servo.pid_position.ilimit 0.3\nservo.pid_position.iratelimit -1.0\nservo.max_position_slip nan\n",
     "icub": '<device name="torso"><group name="POSITION_CONTROL">\n<param name="kp"> 900 1200 </param>\n'
     '<param name="ki"> 0 9000 </param>\n<param name="kd"> 0 5 </param>\n<param name="maxOutput"> 4000 3000 </param>\n'
     '<param name="maxInt"> 700 800 </param>\n<param name="stictionUp"> 0 10 </param></group></device>\n',
-    "ecmc": "# axis\naxis:\n  id: 2\ncontroller:\n  Kp: 12\n  Ki: 0.05\n  Kd: 0\n  deadband:\n    tol: 0.0004\n",
-    "acs": "! gains\nSLPKP(0)=140\nSLVKP(0)=65\nSLVKI(0)=150\nSLDZMIN(0)=0.0008\nSTOP\n",
+    "ecmc": "# axis\naxis:\n  id: 2\ncontroller:\n  Kp: 12\n  Ki: 0.05\n  Kd: 0\n"
+    "  deadband:\n    tol: 0.0004\n    time: 80\n  inner:\n    Kp: 4\n    Ki: 0.2\n    tol: 0.0015\n"
+    "monitoring:\n  target:\n    enabled: true\n    tolerance: 0.0008\n",
+    "twincat": '<TcSmItem ClassName="CNcAxisDef">\n<Axis Id="7">\n<Name>__FILENAME__</Name>\n'
+    '<Encoder Name="Enc"><EncPara ScaleFactorNumerator="5e-05"/></Encoder>\n'
+    '<Controller Name="Ctrl" CtrType="2"><CtrPara PriorControlFactor="0.9">\n'
+    '<PosDiffControl Range="0.8"/><PID DeadBandPosition="0.002"/></CtrPara></Controller></Axis>\n'
+    '<Mappings><Link VarA="Drive^Outputs^Out^nDataOut2[0]" VarB="STM Velocity^Velocity"/></Mappings></TcSmItem>\n',
+    "acs": "! gains\nSLPKP(0)=140\nSLVKP(0)=65\nSLVKI(0)=150\nSLDZMIN(0)=0.0008\nSLDZMAX(0)=0.004\nSLDZTIME(0)=1\n"
+    "SLAFF(0)=1500\nSTOP\n",
     "odrive": '{"axis0.config.motor.torque_constant": 0.06, "axis0.config.motor.current_soft_max": 18.0,\n'
     '"axis0.config.encoder_bandwidth": 1000.0, "axis0.controller.config.pos_gain": 18,\n'
     '"axis0.controller.config.vel_gain": 0.3, "axis0.controller.config.vel_integrator_gain": 1.2,\n'
+    '"axis0.controller.config.enable_gain_scheduling": true,\n'
+    '"axis0.controller.config.gain_scheduling_width": 0.015,\n'
+    '"axis0.controller.config.gain_scheduling_min_ratio": 0.25,\n'
     '"axis0.controller.config.vel_integrator_limit": Infinity}\n',
 }
 ANSWERS: dict[str, dict[str, Any]] = {
-    "kflop": {**MACHINE, "force_per_output": "0.05 N", "length_per_unit": "0.5 um"},
+    "kflop": {
+        **{**MACHINE, "force_per_output": "0.05 N", "length_per_unit": "0.5 um"},
+        "error_beyond_deadband": "reduced",
+    },
     "moteus": {**MACHINE, "travel_per_turn": "10 mm", "drive.sample_time": "50 us"},
     "icub": {**JOINT, "force_per_output": "1 mN*m"},
-    "ecmc": {**MACHINE, **CYCLES, "controller.kp": "5 kN*s/m"},
+    "ecmc": {**MACHINE, **CYCLES, "controller.kp": "5 kN*s/m", "length_per_unit": "1 mm"},
+    "twincat": {
+        **{**MACHINE, **CYCLES, "controller.kp": "5 kN*s/m", "controller.kv": "20 1/s", "length_per_unit": "1 mm"},
+        "error_beyond_deadband": "whole",
+    },
     "acs": {
-        **MACHINE,
+        **{**MACHINE, "length_per_unit": "1 mm", "dead_zone": "error", "dead_zone_time": "1 ms"},
         "drive.sample_time": "50 us",
         "controller.kp": "5 kN*s/m",
         "controller.velocity_integral_time": "5 ms",
     },
-    "odrive": {**MACHINE, "travel_per_turn": "10 mm"},
+    "odrive": {**MACHINE, "travel_per_turn": "10 mm", "gain_schedule": "clipped"},
 }
 TURN = 2 * pi / 0.01  # [N] for 1 N m on a screw with a lead of 10 mm
 BY_HAND: dict[str, dict[str, float]] = {
     "kflop": {
         **{"kp": 2 * 0.05 / 5e-7, "ki": 3e-5 * 0.05 / 5e-7 / 90e-6, "kd": 10 * 0.05 / 5e-7 * 90e-6},
         **{"force_limit": 2047 * 0.05, "integral_limit": 150 * 0.05, "filters.1.denominator.1": -0.25},
+        **{"error_deadband": 3 * 5e-7, "error_deadband_gain": 0.4},
     },
     "moteus": {"kp": 50 * TURN / 0.01, "ki": 400 * TURN / 0.01, "kd": 2 * TURN / 0.01, "integral_limit": 0.3 * TURN},
     "icub": {
@@ -63,15 +84,41 @@ BY_HAND: dict[str, dict[str, float]] = {
         "force_limit": 3.0,
         "integral_limit": 0.8,
     },
-    "ecmc": {"kv": 12.0, "position_integral_time": 12 * 1e-3 / 0.05, "kp": 5e3},
-    "acs": {"kv": 140.0, "kp": 5e3, "velocity_integral_time": 5e-3},
-    "odrive": {"kv": 18.0, "kp": 0.3 * TURN / 0.01, "velocity_integral_time": 0.25, "force_limit": 18 * 0.06 * TURN},
+    "ecmc": {
+        **{"kv": 12.0, "position_integral_time": 12 * 1e-3 / 0.05, "kp": 5e3},
+        **{"freeze_window": 4e-7, "freeze_window_time": 80e-3, "windows_in_position_loop": True},
+        **{"standstill_window": 1.5e-6, "standstill_factor": 4 / 12, "standstill_integral_factor": 0.2 / 0.05},
+    },
+    "twincat": {
+        **{"kv": 20.0, "kp": 5e3, "velocity_feedforward": 0.9},
+        **{"error_deadband": 2e-6, "error_deadband_exit": 2e-6},
+    },
+    "acs": {
+        **{"kv": 140.0, "kp": 5e3, "velocity_integral_time": 5e-3},
+        **{"error_deadband": 8e-7, "error_deadband_exit": 4e-6, "error_deadband_time": 1e-3},
+    },
+    "odrive": {
+        **{"kv": 18.0, "kp": 0.3 * TURN / 0.01, "velocity_integral_time": 0.25, "force_limit": 18 * 0.06 * TURN},
+        **{"schedule_error.1": 0.25 * 0.015 * 0.01, "schedule_error.2": 0.015 * 0.01, "schedule_factor.1": 0.25},
+    },
 }
 """What the formula of each drive makes of its file, in SI; a joint of the second column for iCub."""
 
 
-BACK = {"acs": {"slvkp": 65}, "ecmc": {"travel_per_turn": "10 mm", "mot_trq_const_mnm_p_a": 96}}
+BACK = {"acs": {"slvkp": 65, "sldztime": 1}, "ecmc": {"travel_per_turn": "10 mm", "mot_trq_const_mnm_p_a": 96}}
 """What the way back asks for, beside the way from the file."""
+
+ONLY_THERE = {"error_beyond_deadband", "dead_zone", "dead_zone_time"}
+"""What the way back does not ask for, as the stage says it."""
+
+SAME = {
+    **dict.fromkeys(("kflop", "moteus", "icub"), ("kp", "ki", "kd")),
+    "ecmc": ("kv", "position_integral_time"),
+    "twincat": ("velocity_feedforward",),
+    "acs": ("kv",),
+    "odrive": ("kv", "kp", "velocity_integral_time"),
+}
+"""Keys that a file read again makes as before."""
 
 
 def written(folder: Path, kind: str) -> Path:
@@ -86,18 +133,122 @@ def test_gains_are_those_by_hand_and_lead_back(tmp_path: Path, kind: str) -> Non
     flat = friso.loads(read.text()).flat()
     for key, value in BY_HAND[kind].items():
         assert flat[f"controller.{key}"] == pytest.approx(value, rel=1e-9), key
-    units = {key: value for key, value in ANSWERS[kind].items() if "." not in key}
-    back = gains_of(read.stage, units | BACK.get(kind, {}), kind).parameters
+    units = {key: value for key, value in ANSWERS[kind].items() if "." not in key and key not in ONLY_THERE}
+    gains = gains_of(read.stage, units | BACK.get(kind, {}), kind)
+    back = gains.parameters
     assert back is not None
+    assert not [key for key in gains.not_held if any(part in key for part in CHANGED)]
     numbers = [f"{value:.12g}" for value in back.values()]
     text = FORMATS[kind].text(back)
     assert all(number in text for number in numbers)
-    if kind in ("kflop", "moteus", "icub"):
-        path = tmp_path / f"again{FORMATS[kind].suffix}"
-        path.write_text(text, "utf-8")
-        again = stage_from(path, None, ANSWERS[kind]).stage.flat()
-        for key in ("kp", "ki", "kd"):
-            assert again[f"controller.{key}"] == pytest.approx(flat[f"controller.{key}"], rel=1e-9)
+    if kind == "odrive":
+        text += "odrv0.axis0.motor.config.torque_constant = 0.06\n"
+    if kind == "ecmc":
+        text += "monitoring:\n  target:\n    enabled: true\n"
+    path = tmp_path / f"again{FORMATS[kind].suffix}"
+    path.write_text(text, "utf-8")
+    again = stage_from(path, None, ANSWERS[kind]).stage.flat()
+    windows = [key.removeprefix("controller.") for key in flat if any(part in key for part in CHANGED)]
+    for key in (*SAME[kind], *windows):
+        assert again[f"controller.{key}"] == pytest.approx(flat[f"controller.{key}"], rel=1e-9), key
+
+
+CHANGED = ("window", "deadband", "standstill", "schedule")
+"""Parts of the names of settings against friction."""
+
+
+def test_the_settings_of_a_stage_that_was_changed_are_those_written_back(tmp_path: Path) -> None:
+    """Windows and gains that the user has changed, in the units of the drive."""
+    changes = {
+        "ecmc": ({"freeze_window": "2 um", "standstill_factor": 0.5}, {"deadband.tol": 2e-3, "inner.Kp": 6.0}),
+        "acs": ({"error_deadband_exit": "9 um"}, {"SLDZMAX": 9e-3}),
+        "twincat": (
+            {"error_deadband": "7 um", "error_deadband_exit": "7 um", "kv": "30 1/s"},
+            {"PID.DeadBandPosition": 7e-3, "Kv": 30.0},
+        ),
+        "kflop": ({"error_deadband": "5 um", "error_deadband_gain": 0.1}, {"DeadBandRange": 10, "DeadBandGain": 0.1}),
+        "odrive": (
+            {"schedule_error": ["20 um", "200 um"], "schedule_factor": [0.1, 1]},
+            {"controller.config.gain_scheduling_width": 0.02, "controller.config.gain_scheduling_min_ratio": 0.1},
+        ),
+    }
+    for kind, (keys, parameters) in changes.items():
+        stage = stage_from(written(tmp_path, kind), None, ANSWERS[kind]).stage
+        stage = stage.replace({f"controller.{key}": value for key, value in keys.items()})
+        units = {key: value for key, value in ANSWERS[kind].items() if "." not in key and key not in ONLY_THERE}
+        back = gains_of(stage, units | BACK.get(kind, {}), kind).parameters
+        assert back is not None
+        assert {name: back[name] for name in parameters} == pytest.approx(parameters, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "lost"),
+    [
+        ("ecmc", {"freeze_window_exit": "9 um"}, "freeze_window"),
+        ("acs", {"error_deadband_gain": 0.2}, "error_deadband_gain"),
+        ("twincat", {"error_deadband_exit": "9 um"}, "error_deadband_exit"),
+        ("kflop", {"error_deadband_time": "2 ms"}, "error_deadband"),
+        ("odrive", {"schedule_factor": [0.3, 1.2]}, "schedule_factor.2"),
+    ],
+)
+def test_settings_that_a_drive_cannot_hold_are_named(
+    kind: str, keys: dict[str, Any], lost: str, tmp_path: Path
+) -> None:
+    stage = stage_from(written(tmp_path, kind), None, ANSWERS[kind]).stage
+    stage = stage.replace({f"controller.{key}": value for key, value in keys.items()})
+    units = {key: value for key, value in ANSWERS[kind].items() if "." not in key and key not in ONLY_THERE}
+    asked = {question.key for question in FORMATS[kind].questions_back(stage.flat(), UserAnswers({}))}
+    answers = {key: value for key, value in (units | BACK.get(kind, {})).items() if key in asked}
+    assert f"controller.{lost}" in gains_of(stage, answers, kind).not_held
+
+
+@pytest.mark.parametrize(
+    ("kind", "without", "asked"),
+    [
+        ("kflop", "error_beyond_deadband", "error_beyond_deadband"),
+        ("twincat", "controller.kv", "controller.kv"),
+        ("ecmc", "length_per_unit", "length_per_unit"),
+        ("acs", "dead_zone", "dead_zone"),
+        ("acs", "dead_zone_time", "dead_zone_time"),
+        ("odrive", "gain_schedule", "gain_schedule"),
+    ],
+)
+def test_what_nobody_documents_is_asked_for(kind: str, without: str, asked: str, tmp_path: Path) -> None:
+    answers = {key: value for key, value in ANSWERS[kind].items() if key != without}
+    with pytest.raises(InputError, match=f"--set {asked}="):
+        stage_from(written(tmp_path, kind), None, answers)
+
+
+def test_the_other_answer_makes_the_other_window(tmp_path: Path) -> None:
+    for kind, key, answer, name, value in (
+        ("kflop", "error_beyond_deadband", "whole", "error_deadband_exit", 1.5e-6),
+        ("acs", "dead_zone", "output", "freeze_window_exit", 4e-6),
+        ("odrive", "gain_schedule", "line", "schedule_error.1", 0.0),
+    ):
+        flat = stage_from(written(tmp_path, kind), None, {**ANSWERS[kind], key: answer}).stage.flat()
+        assert flat[f"controller.{name}"] == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("line", "answer", "acts"),
+    [
+        ("enabled: false", {}, False),
+        ("tolerance: 0.0008", {"target_monitoring": "on"}, True),
+        ("enabled: on", {}, True),
+    ],
+)
+def test_a_dead_band_of_ecmc_acts_if_the_target_is_watched(
+    line: str, answer: dict[str, Any], acts: bool, tmp_path: Path
+) -> None:
+    text = TEXTS["ecmc"].replace("    enabled: true\n    tolerance: 0.0008\n", f"    {line}\n")
+    path = tmp_path / "axis.yaml"
+    path.write_text(text, "utf-8")
+    read = stage_from(path, None, {**ANSWERS["ecmc"], **answer})
+    assert ("controller.freeze_window" in read.stage.flat()) == acts
+    assert acts or any("watch" in sentence for sentence in read.left_out)
+    if answer:
+        with pytest.raises(InputError, match="target_monitoring"):
+            stage_from(path, None, ANSWERS["ecmc"])
 
 
 @pytest.mark.parametrize(
@@ -106,13 +257,30 @@ def test_gains_are_those_by_hand_and_lead_back(tmp_path: Path, kind: str) -> Non
         ("kflop", "rest there"),
         ("moteus", "current"),
         ("icub", "stictionUp"),
-        ("ecmc", "deadband.tol"),
-        ("acs", "dead zone"),
+        ("ecmc", "inner.tol"),
+        ("acs", "acceleration"),
     ],
 )
 def test_what_a_stage_does_not_take_over_is_told(tmp_path: Path, kind: str, word: str) -> None:
     read = stage_from(written(tmp_path, kind), "joint_1" if kind == "icub" else None, ANSWERS[kind])
     assert any(word in sentence for sentence in read.left_out)
+
+
+def test_axes_of_a_twincat_nc_are_asked_about_and_those_commanded_by_position_refused(tmp_path: Path) -> None:
+    path = tmp_path / "nc.xti"
+    axis = TEXTS["twincat"].split("<Axis")[1].partition("</Axis>")[0]
+    other = axis.replace("__FILENAME__", "Y axis").replace("0.002", "0.004")
+    path.write_text(f"<Axes><Axis{axis}</Axis><Axis{other}</Axis></Axes>", "utf-8")
+    with pytest.raises(InputError, match="2 axes") as refused:
+        stage_from(path, None, ANSWERS["twincat"])
+    assert "axis 7, Y axis" in refused.value.expected
+    flat = stage_from(path, "Y axis", ANSWERS["twincat"]).stage.flat()
+    assert flat["controller.error_deadband"] == pytest.approx(4e-6)
+    assert flat["drive.encoder_resolution"] == pytest.approx(5e-8)
+    position = TEXTS["twincat"].replace("nDataOut2[0]", "nDataOut1").replace("STM Velocity^Velocity", "MDT^Position")
+    path.write_text(position, "utf-8")
+    with pytest.raises(InputError, match="velocity"):
+        stage_from(path, None, ANSWERS["twincat"])
 
 
 def test_the_velocity_loop_of_an_ecmc_motor_is_in_its_commands(tmp_path: Path) -> None:
@@ -135,7 +303,7 @@ def test_notes_about_an_odrive_are_read_with_their_comments(tmp_path: Path) -> N
         "odrv0.axis0.controller.config.vel_integrator_gain = 0.5 * 10 * 0.21 // half\n",
         "utf-8",
     )
-    flat = stage_from(path, None, ANSWERS["odrive"]).stage.flat()
+    flat = stage_from(path, None, {**MACHINE, "travel_per_turn": "10 mm"}).stage.flat()
     assert flat["controller.kp"] == pytest.approx(0.21 * TURN / 0.01)
     assert flat["controller.velocity_integral_time"] == pytest.approx(0.2)
 

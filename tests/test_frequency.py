@@ -85,9 +85,12 @@ def test_mass_lines(rig: Stage, case: str, frequency: float, mass: float) -> Non
 # --- the equations ---
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", [name for name in VARIANTS if "load-dependent" not in name])
 def test_closed_loop_is_the_jacobian_of_the_whole_model(name: str) -> None:
-    """Plant and controller put together against the Jacobian of the assembled equations, bristles and all."""
+    """Plant and controller put together against the Jacobian of the assembled equations, bristles and all.
+
+    Of friction that follows the drive's force, the linear systems have what it is without another load.
+    """
     flat = VARIANTS[name].flat()
     for one in limit_cases(flat).values():
         whole = np.linalg.eigvals(jacobian(flat, one))
@@ -126,15 +129,17 @@ def jacobian(flat: dict, one: Members) -> np.ndarray:
     modes |= {switch.name: float(not one.stuck[0]) for switch in model.switches}
     here |= {kink.beyond: modes.get(kink.name, 0.0) for kink in model.kinks}
     numbers = {key: flat.get(str(key), np.nan) for key in model.parameters}  # the motion plays no part
-    rates = {state.symbol: state.derivative for state in model.states if state.role == Role.BRISTLE}
-    for z, rate in rates.items() if speed else ():
-        here[z] = steady(rate.subs(numbers).subs({s: v for s, v in here.items() if s != z}), z)
+    bristles = [state for state in model.states if state.role == Role.BRISTLE]
+    for state in reversed(bristles) if speed else ():  # what bends depends on what ages, and not the other way
+        z, rate = state.symbol, state.derivative
+        most = 1e-3 if state.unit == "m" else 1e3
+        here[z] = steady(rate.subs(numbers).subs({s: v for s, v in here.items() if s != z}), z, most)
     return np.array(derivatives(*here.values(), *numbers.values()), dtype=float)
 
 
-def steady(rate: sp.Expr, z: sp.Symbol) -> float:
-    """The deflection at which a bristle's rate is 0 in a motion ahead; 0 where any is."""
-    return brentq(sp.lambdify(z, rate), 1e-9, 1e-3, xtol=1e-20) if rate.has(z) else 0.0
+def steady(rate: sp.Expr, z: sp.Symbol, most: float) -> float:
+    """The value up to `most` at which the rate of a friction state is 0 in a motion ahead; 0 where any is."""
+    return brentq(sp.lambdify(z, rate), 1e-9, most, xtol=1e-20) if rate.has(z) else 0.0
 
 
 @pytest.mark.parametrize("share", [-0.9, 0.0, 0.5, 0.99])

@@ -164,6 +164,10 @@ def test_edges_as_factors_that_look_the_same_are_one_number() -> None:
     assert "edge at 2 times the bandwidth." in laws_sentences(replace(gains, verdicts=(laws.verdicts[0], several)))[0]
 
 
+OTHERS = ("dwell", "elasto_plastic", "gms", "load_dependent", "rolling")
+"""Laws that keep what is measured under LuGre."""
+
+
 def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
     """A law's open parameters are adapted to each machine's friction.
 
@@ -171,7 +175,7 @@ def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
     """
     machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((3.0, 1.0), (1.0, 0.15))]
     frictions = frictions_that_keep(machines).frictions
-    assert {name.split(",")[0] for name in frictions} == {"elasto_plastic", "gms", "rolling"}
+    assert {name.split(",")[0] for name in frictions} == {*OTHERS}
     for friction in frictions.values():
         assert not violations({**RIGID.flat(), **friction})
         assert friction["friction.static"] == pytest.approx([3.0, 1.0])
@@ -192,7 +196,7 @@ def test_ends_that_only_some_machines_have_are_tried_and_laws_that_only_some_los
 
 def test_nothing_hunts_without_an_integrator() -> None:
     laws = verdicts_by_law(PD)
-    assert [verdict.law for verdict in laws.verdicts] == ["lugre", "elasto_plastic", "gms", "rolling"]
+    assert [verdict.law for verdict in laws.verdicts] == ["lugre", *OTHERS]
     assert {*laws.left_out} == {"dahl", "stribeck"}
     assert laws.hunts("given") is False
     assert all(len(verdict.trials) > 1 for verdict in laws.verdicts[1:])
@@ -207,7 +211,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert done.returncode == 0
     laws = json.loads(done.stdout)["laws"]
     assert laws["cases"]["given"]["hunts"] is False
-    assert {*laws["cases"]["given"]["laws"]} == {"lugre", "elasto_plastic", "gms", "rolling"}
+    assert {*laws["cases"]["given"]["laws"]} == {"lugre", *OTHERS}
     shown = friso_inside(tmp_path, "check", file, "--laws")
     assert "settles" in shown.stdout
     assert "Across friction laws" in shown.stdout

@@ -580,11 +580,11 @@ def test_an_odrive_that_controls_no_position(tmp_path: Path, changes: dict[str, 
 
 
 def test_what_is_left_out_is_told(tmp_path: Path) -> None:
-    more = {"gain_scheduling_width": 0.01, "gain_scheduling_min_ratio": 0.2, "load_encoder_axis": 1}
+    more = {"gain_scheduling_width": 0.01, "load_encoder_axis": 1}
     path = backup(tmp_path, enable_gain_scheduling=True, input_mode=1, **more)
     path.write_text(path.read_text().replace('"decel_limit": 20.0', '"decel_limit": 5.0'))
     drawn = stage_from(path, None, SCREW)
-    settings = ("enable_gain_scheduling", "decel_limit = 5", "fall to 0.2 of theirs", "load_encoder_axis = 1")
+    settings = ("fall to 0 with the error", "decel_limit = 5", "load_encoder_axis = 1")
     for setting in settings:
         assert any(setting in text for text in drawn.left_out)
     assert all(f"# Left out: {text}" in drawn.text() for text in drawn.left_out)

@@ -79,6 +79,135 @@ def test_a_drive_against_difference_equations_by_hand(name: str) -> None:
     assert np.abs(ours - theirs).max() < 2e-6
 
 
+IN_LOOP: dict[str, dict[str, Any]] = {
+    "freeze": {"freeze_window": "150 um", "freeze_window_exit": "300 um", "freeze_window_time": "8 ms"},
+    "inner gains": {
+        **{"standstill_window": "600 um", "standstill_factor": 0.4, "standstill_integral_factor": 3.0},
+        "windows_at_rest": True,
+    },
+    "pause": {"integral_deadband": "400 um", "integral_deadband_decay": "30 ms"},
+}
+
+
+def cascade(settings: dict[str, Any], **drive: Any) -> Stage:
+    """A machine under a cascade with integrals in both loops."""
+    controller = """
+kind = "cascade"
+kv = "25 1/s"
+position_integral_time = "0.2 s"
+kp = "60 N*s/m"
+velocity_integral_time = "30 ms"
+"""
+    plain = stage(MOVE, friction=lugre(2), controller=controller)
+    keys = {f"controller.{key}": value for key, value in settings.items()}
+    return plain.replace(keys | {f"drive.{name}": value for name, value in drive.items()})
+
+
+def cascade_by_hand(flat: dict[str, Any], times: np.ndarray, step: float, sample: float = 0.0) -> np.ndarray:
+    """Return positions [m] at times [s], where windows act on the position loop; 0 for `sample` is continuous time."""
+    key = {name.removeprefix("controller."): value for name, value in flat.items() if name.startswith("controller.")}
+    kv, kp, outer, inner = (key[name] for name in ("kv", "kp", "position_integral_time", "velocity_integral_time"))
+    period = flat["drive.position_sample_time"] if sample else step
+    freeze, leave, stay = (key.get(f"freeze_window{end}", 0.0) for end in ("", "_exit", "_time"))
+    reach, pause = key.get("standstill_window", 0.0), key.get("integral_deadband", 0.0)
+    lost = 1 / key["integral_deadband_decay"] if pause else 0.0
+    static, coulomb, slow, viscous = (
+        flat[f"friction.{name}"] for name in ("static", "coulomb", "stribeck_velocity", "viscous")
+    )
+    stiffness, damping = flat["friction.bristle_stiffness"], flat["friction.bristle_damping"]
+    mass = sum(flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
+    x = v = z = p = w = force = command = before = now = clock = 0.0
+    frozen, ticks, out, pieces = False, 0, [0.0], motion.pieces(flat, 1)[0]
+
+    def reference(t: float) -> tuple[float, bool]:
+        begun, r, speed, acceleration = pieces[np.searchsorted(pieces[:, 0], t + 1e-12) - 1][:4]
+        return r + speed * (t - begun) + acceleration / 2 * (t - begun) ** 2, speed == 0 == acceleration
+
+    def commanded(t: float, x: float, p: float) -> tuple[float, float]:
+        """Return the command of the position loop, and what its integral takes in."""
+        r, rests = reference(t)
+        near = abs(r - x) < reach and rests
+        gain, own = (key["standstill_factor"], key["standstill_integral_factor"]) if near else (1.0, 1.0)
+        takes = 0.0 if abs(r - x) < pause or frozen else own * (r - x)
+        return (0.0 if frozen else kv * (gain * (r - x) + p / outer)), takes
+
+    def rates(t: float, x: float, v: float, z: float, p: float, w: float) -> np.ndarray:
+        wanted, takes = (command, 0.0) if sample else commanded(t, x, p)
+        acts = force if sample else kp * (wanted - v + w / inner)
+        bends = v - stiffness * abs(v) / (coulomb + (static - coulomb) * np.exp(-((v / slow) ** 2))) * z
+        drag = stiffness * z + damping * bends + viscous * v
+        decay = lost * p if abs(reference(t)[0] - x) < pause and not sample else 0.0
+        return np.array([v, (acts - drag) / mass, bends, takes - decay, 0.0 if sample else wanted - v])
+
+    def window(t: float, dt: float) -> None:
+        nonlocal frozen, clock
+        r, rests = reference(t)
+        near = abs(r - x) < freeze and rests
+        frozen = (abs(r - x) <= leave and rests) if frozen else near and clock >= stay - 0.5 * dt
+        clock = clock + dt if near else 0.0
+
+    for end in times[1:].tolist():
+        while now < end - 1e-12:
+            if sample and now > (ticks - 1e-9) * sample:
+                if ticks % round(period / sample) == 0:
+                    window(now, period)
+                    p += period * commanded(now, x, p)[1]
+                    p /= 1 + lost * period * (abs(reference(now)[0] - x) < pause)
+                    p = 0.0 if frozen else p
+                    command = commanded(now, x, p)[0]
+                speed, before = (x - before) / sample, x
+                w += sample * (command - speed)
+                force = kp * (command - speed + w / inner)
+                ticks += 1
+            h = min(step, end - now, ticks * sample - now if sample else step)
+            state = np.array([x, v, z, p, w])
+            k1 = rates(now, *state)
+            k2 = rates(now + h / 2, *(state + h / 2 * k1))
+            k3 = rates(now + h / 2, *(state + h / 2 * k2))
+            k4 = rates(now + h - 1e-11, *(state + h * k3))
+            x, v, z, p, w = (state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)).tolist()
+            now += h
+            if not sample:
+                froze = frozen
+                window(now, h)
+                p = p if frozen == froze else 0.0
+        out.append(x)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "drive"])
+@pytest.mark.parametrize("name", IN_LOOP)
+def test_windows_in_the_position_loop_leave_the_velocity_loop_alone(name: str, sampled: bool) -> None:
+    settings = {**IN_LOOP[name], "windows_in_position_loop": True}
+    chosen, everywhere = cascade(settings), cascade(IN_LOOP[name])
+    if sampled:
+        chosen = cascade(settings, sample_time="0.5 ms", position_sample_time="2 ms")
+    flat = chosen.flat()
+    if sampled:
+        (recorded,) = run(chosen, MoveTask(motion.pieces(flat, 1)[0], 0.5), [1], 1e-3)
+        ours = recorded.true["position"][0]
+        theirs = cascade_by_hand(flat, np.arange(len(ours)) * 1e-3, 2e-5, flat["drive.sample_time"])
+    else:
+        simulated = friso.simulate(chosen, 1e-8, 1e-3)
+        ours = simulated["position"].values
+        theirs = cascade_by_hand(flat, simulated["time"].values, 2e-5)
+        assert np.abs(ours - friso.simulate(everywhere, 1e-8, 1e-3)["position"].values).max() > 2e-5
+    assert np.abs(ours - theirs).max() < 2e-6
+
+
+def test_a_position_loop_needs_a_cascade() -> None:
+    with pytest.raises(friso.StageError, match="cascade"):
+        machine({"windows_in_position_loop": True})
+
+
+def test_margins_are_of_the_gains_of_the_position_loop() -> None:
+    states = gain_states(cascade({**IN_LOOP["inner gains"], "windows_in_position_loop": True}).flat())
+    assert [(one["controller.kv"], one["controller.kp"]) for one in states] == [(25.0, 60.0), (10.0, 60.0)]
+    times = [one["controller.position_integral_time"] for one in states]
+    assert times == pytest.approx([0.2, 0.2 * 0.4 / 3.0])
+    assert {one["controller.velocity_integral_time"] for one in states} == {0.03}
+
+
 @pytest.mark.parametrize(
     ("settings", "parts"),
     [

@@ -72,6 +72,16 @@ def rolling(exponent: float = 1.5) -> str:
     return f"{bristles}rolling_exponent = {exponent}\n"
 
 
+def dwell(time: str = "50 ms", exponent: float = 2) -> str:
+    bristles = lugre(exponent).replace('"lugre"', '"dwell"')
+    return f'{bristles}dwell_time = "{time}"\n'
+
+
+def load_dependent(coefficient: float = 0.2, exponent: float = 2) -> str:
+    bristles = lugre(exponent).replace('"lugre"', '"load_dependent"')
+    return f"{bristles}load_coefficient = {coefficient}\n"
+
+
 def gms(exponent: float = 2, damping: str = "", **keys: str) -> str:
     """Three elements as stiff as the bristles of `lugre`."""
     values = {"static": "3 N", "coulomb": "1 N", "attraction": "500 N/s", "viscous": "0.5 N*s/m", **keys}
@@ -209,6 +219,14 @@ VARIANTS: dict[str, Stage] = {
         there_and_back(), friction=elasto_plastic(1), joint=free(), controller=gains(**FULL, tau=1e-3)
     ),
     "rigid, rolling": stage(release(), friction=rolling(), controller=van_dijk()),
+    "rigid, dwell": stage(release(), friction=dwell(), controller=van_dijk()),
+    "free, dwell 1": stage(
+        there_and_back(), friction=dwell(exponent=1), joint=free(), controller=gains(**FULL, tau=1e-3)
+    ),
+    "rigid, load-dependent": stage(release(), friction=load_dependent(), controller=van_dijk()),
+    "free, load-dependent 1": stage(
+        there_and_back(), friction=load_dependent(exponent=1), joint=free(), controller=gains(**FULL, tau=1e-3)
+    ),
     "rigid, conditions": stage(there_and_back(), friction=lugre(2), controller=van_dijk()).replace(CONDITIONS),
     "rigid, GMS": stage(release(), friction=gms(damping=MICRO_DAMPING), controller=van_dijk()),
     "free, parasitic, GMS 1": stage(

@@ -100,12 +100,40 @@ def kind_of_length(answers: UserAnswers) -> tuple[AxisKind, float]:
 
 def open_units(answers: UserAnswers, kind: AxisKind, output: str, position: str = "") -> list[OpenQuestion]:
     """List what is open of the units: what an `output` of 1 exerts, and what a `position` of 1 is, unless it is ""."""
-    asked = []
-    if position and LENGTH not in answers:
-        asked.append(OpenQuestion(LENGTH, f"how far {position} moves the load; an angle on a rotary axis", '"0.5 um"'))
+    asked = open_length(answers, position, '"0.5 um"') if position else []
     if FORCE not in answers:
         asked.append(OpenQuestion(FORCE, f"what {output} exerts at the load", FORCE_FIELD.on(kind).written_example))
     return asked
+
+
+def open_length(answers: UserAnswers, position: str, example: str) -> list[OpenQuestion]:
+    """Ask how far a `position` of 1 is unless it is answered."""
+    what = f"how far {position} moves the load; an angle on a rotary axis"
+    return [] if LENGTH in answers else [OpenQuestion(LENGTH, what, example)]
+
+
+BEYOND, REDUCED, WHOLE = "error_beyond_deadband", "reduced", "whole"
+"""Key of the user's answer on what is left of an error beyond a deadband, and the two answers."""
+
+
+def open_beyond(answers: UserAnswers, band: str) -> list[OpenQuestion]:
+    """Ask what is left of an error beyond the parameter `band` unless it is answered."""
+    what = f"what is left of an error beyond {band}: {REDUCED}, by what is lost within, or {WHOLE}"
+    return [] if BEYOND in answers else [OpenQuestion(BEYOND, what, REDUCED)]
+
+
+def deadband_of(answers: UserAnswers, band: str) -> dict[str, Any]:
+    """Return the keys of [controller] for a deadband, a length with its unit, as the user answers."""
+    whole = answers.choice(BEYOND, (REDUCED, WHOLE)) == WHOLE
+    return {"error_deadband": band, **({"error_deadband_exit": band} if whole else {})}
+
+
+def deadband_back(flat: FlatStage) -> tuple[float, frozenset[str]] | None:
+    """Return the size of a deadband without memory [m], and the names of its keys; None without one."""
+    key = "controller.error_deadband"
+    if key not in flat or f"{key}_time" in flat or flat.get(f"{key}_exit", flat[key]) != flat[key]:
+        return None
+    return float(flat[key]), frozenset({"error_deadband", "error_deadband_exit"})
 
 
 def force_of(answers: UserAnswers, kind: AxisKind) -> float:

@@ -68,5 +68,8 @@ class DriveFileSettings(Settings):
     gains_said: int = setting(6, "")
     """Largest number of what may be gains that is said of a file of another kind. More fill the screen."""
 
+    least_gain_ratio: float = setting(0.01, "")
+    """Least ratio of scheduled gains in a stage whose drive lets them fall to 0: a loop needs some gain."""
+
 
 drive_settings = DriveFileSettings.live()

@@ -60,7 +60,8 @@ class _KernelPrinter(PythonCodePrinter):
         base, exponent = expr.base, expr.exp
         text = f"({self._print(base)})"
         if exponent.is_Integer:
-            return "(" + " * ".join([text] * int(exponent)) + ")"
+            product = "(" + " * ".join([text] * abs(int(exponent))) + ")"
+            return product if exponent > 0 else f"(1.0 / {product})"
         if abs(exponent) == sp.S.Half:
             return f"sqrt({text})" if exponent > 0 else f"(1.0 / sqrt({text}))"
         return f"power({text}, {self._print(exponent)})"

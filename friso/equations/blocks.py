@@ -7,6 +7,7 @@ A controller is declared once, in terms of `Blocks`. Two kinds of blocks give it
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from friso.stage.controllers import (
     ANTI_WINDUP_TIME,
     FILTERS_KEY,
     FORCE_LIMIT,
+    INNER_WINDOWS,
     SCHEDULES,
     ControllerSection,
     FrictionSettings,
@@ -190,10 +192,12 @@ class Blocks(ABC):
 
     def __init__(self, form: ControllerForm | None = None) -> None:
         self.form = form
-        self.winding: Any = sp.S.One
-        """Factor that settings against friction put on what integrals take in."""
-        self.paused: Any = sp.S.Zero
-        """Number that is 1 while a deadband pauses integrals."""
+        self.error = self.nothing
+        """The measured error, at which windows against friction look."""
+        self.winding: dict[sp.Symbol, Any] = defaultdict(lambda: sp.S.One)
+        """Factors that settings against friction put on what integrals take in, by the integrals' settled values."""
+        self.paused: dict[sp.Symbol, Any] = defaultdict(lambda: sp.S.Zero)
+        """Numbers that are 1 while a deadband pauses integrals, by the same."""
 
     nothing = Signal(sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero)
     """A signal that is always 0."""
@@ -270,7 +274,7 @@ class Blocks(ABC):
         """Return the signal clamped to plus and minus a limit; `name` names the clamp."""
 
     @abstractmethod
-    def within(self, window: str, error: Signal, resting: Signal) -> Signal:
+    def within(self, window: str, resting: Signal) -> Signal:
         """Return a signal that is 1 while a window against friction acts, and 0 elsewhere.
 
         `window` is its key. It acts while the error is small, and has been so for its time if it has one, until the
@@ -280,16 +284,16 @@ class Blocks(ABC):
     @property
     @abstractmethod
     def _holding(self) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
-        """Return the symbols of integrals in values and in settled values."""
+        """Return the symbols of the integrals made so far, in values and in settled values."""
 
     def exit_of(self, window: str) -> sp.Symbol:
         """Return the error [m] at which a window ceases to act: its exit, or itself without one."""
         return self.key(f"{window}_exit" if f"{window}_exit" in self.settings else window)
 
-    def _inside(self, window: str, error: Signal, direction: Signal) -> Signal:
+    def _inside(self, window: str, direction: Signal) -> Signal:
         """Return 1 while a window acts, else 0; `direction` is that of the reference: 1, -1 or 0."""
         at_rest = window == "freeze_window" or "windows_at_rest" in self.settings
-        return self.within(window, error, resting(direction) if at_rest else self.whole)
+        return self.within(window, resting(direction) if at_rest else self.whole)
 
     def dead_zone(self, error: Signal, direction: Signal) -> Signal:
         """Return the error behind the dead zone.
@@ -301,7 +305,7 @@ class Blocks(ABC):
         if "error_deadband_gain" in self.settings:
             lost -= self.key("error_deadband_gain")
         if self.settings.remembers("error_deadband"):
-            return error.shared(self.whole - self._inside("error_deadband", error, direction) * lost)
+            return error.shared(self.whole - self._inside("error_deadband", direction) * lost)
         limited = Piecewise((band, error.settled > band), (-band, error.settled < -band), (error.settled, True))
         clipped = replace(self.limiter(error, band, "error_deadband"), settled=limited)
         acts = resting(direction) if "windows_at_rest" in self.settings else self.whole
@@ -311,7 +315,7 @@ class Blocks(ABC):
     def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
         """Return the factor of a schedule of gains for the size of a signal; `name` names it."""
 
-    def factors(self, seen: Measured, error: Signal) -> list[tuple[Signal, sp.Expr]]:
+    def _factors(self, seen: Measured) -> list[tuple[Signal, sp.Expr]]:
         """Return the factors that settings put on the gains, each with that on what integrals take in.
 
         The settings are a window for standstill, a factor in moves, and a schedule over the size of the measured error
@@ -320,7 +324,7 @@ class Blocks(ABC):
         settings, direction = self.settings, seen.reference_direction
         factors: list[tuple[Signal, sp.Expr]] = []
         if "standstill_window" in settings:
-            inside, factor = self._inside("standstill_window", error, direction), self.key("standstill_factor")
+            inside, factor = self._inside("standstill_window", direction), self.key("standstill_factor")
             own = "standstill_integral_factor"
             integral = self.key(own) if own in settings else factor
             factors.append((self.whole + inside * (factor - 1), 1 + (integral - 1) * inside.value))
@@ -329,7 +333,7 @@ class Blocks(ABC):
             factors.append((factor, factor.value))
         for name in SCHEDULES:
             if name in settings:
-                signal = error if name == "schedule_error" else self.derivative(seen.rated, name)
+                signal = self.error if name == "schedule_error" else self.derivative(seen.rated, name)
                 factor = self.scheduled(signal, self._schedule(name), name)
                 factors.append((factor, factor.value))
         return factors
@@ -341,14 +345,23 @@ class Blocks(ABC):
             *(tuple(self.key(f"{array}.{number}") for number in numbers) for array in (name, "schedule_factor"))
         )
 
-    def with_gains(self, total: Signal, factors: list[tuple[Signal, sp.Expr]]) -> Signal:
-        """Return the force with factors on the gains; `total` is that without them.
+    def _wind(self, factor: sp.Expr) -> None:
+        """Multiply by a factor what the integrals made so far take in."""
+        for integral in self._holding[1]:
+            self.winding[integral] *= factor
 
-        The integrals keep the force that they had.
+    def with_gains(self, total: Signal, seen: Measured) -> Signal:
+        """Return a force or command with the factors of settings on its gains, and let its integrals pause.
+
+        `total` is that without them. The integrals keep what they had.
         """
-        gains = self.whole
+        self._pause_integrals(seen.reference_direction)
+        factors, gains = self._factors(seen), self.whole
+        if not factors:
+            return total
         for factor, winding in factors:
-            gains, self.winding = gains.shared(factor), self.winding * winding
+            gains = gains.shared(factor)
+            self._wind(winding)
         held, settled = (
             sum((sp.diff(part, x) * x for x in integrals), start=sp.S.Zero)
             for part, integrals in zip((total.value, total.settled), self._holding, strict=True)
@@ -356,31 +369,37 @@ class Blocks(ABC):
         kept = Signal(held, total.scale, settled, sp.S.Zero)
         return kept + (total - kept).shared(gains)
 
-    def frozen(self, force: Signal, error: Signal, direction: Signal) -> Signal:
-        """Return the force, switched off while the reference rests and the error is within the window.
+    def frozen(self, force: Signal, seen: Measured) -> Signal:
+        """Return a force or command, switched off while the reference rests and the error is within the window.
 
-        Integrals are emptied as the window begins to act. `direction` is that of the reference: 1, -1 or 0.
+        Its integrals are emptied as the window begins to act.
         """
-        engaged = 1 - self._inside("freeze_window", error, direction).value
-        self.winding *= engaged
+        if "freeze_window" not in self.settings:
+            return force
+        engaged = 1 - self._inside("freeze_window", seen.reference_direction).value
+        self._wind(engaged)
         return replace(force, value=engaged * force.value, rate=None, before=None)
 
-    def pause_integrals(self, error: Signal, direction: Signal) -> None:
-        """Let integrals pause as settings against friction say; `direction` is that of the reference: 1, -1 or 0."""
-        if "integral_deadband" in self.settings:
-            self.paused = self._inside("integral_deadband", error, direction).value
-        if "integral_rests_in_moves" in self.settings:
-            self.winding *= resting(direction).value
+    def in_position_loop(self, command: Signal, seen: Measured) -> Signal:
+        """Return the command of a position loop above another loop, with the settings that act on it alone."""
+        return self.frozen(self.with_gains(command, seen), seen) if INNER_WINDOWS in self.settings else command
 
-    @property
-    def _losses(self) -> sp.Expr:
-        """Return the rate [1/s] at which settings against friction let integrals decay."""
+    def _pause_integrals(self, direction: Signal) -> None:
+        """Let integrals pause as settings against friction say; `direction` is that of the reference: 1, -1 or 0."""
+        integrals = self._holding[1]
+        if integrals and "integral_deadband" in self.settings:
+            self.paused |= dict.fromkeys(integrals, self._inside("integral_deadband", direction).value)
+        if "integral_rests_in_moves" in self.settings:
+            self._wind(resting(direction).value)
+
+    def _losses(self, integral: sp.Symbol) -> sp.Expr:
+        """Return the rate [1/s] at which settings against friction let an integral decay."""
         leak = 2 * sp.pi * self.key("integral_leak") if "integral_leak" in self.settings else sp.S.Zero
         decays = "integral_deadband_decay"
-        return leak + (self.paused / self.key(decays) if decays in self.settings else sp.S.Zero)
+        return leak + (self.paused[integral] / self.key(decays) if decays in self.settings else sp.S.Zero)
 
     @abstractmethod
-    def push(self, error: Signal, direction: Signal) -> Signal:
+    def push(self, direction: Signal) -> Signal:
         """Return a constant force towards the reference, which acts while the reference rests.
 
         The force acts only if the error is not small. `direction` is that of the reference: 1, -1 or 0.
@@ -456,25 +475,23 @@ class Demand:
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
     """Return the force that a controller demands for the measured inputs `seen`."""
     error, settings = seen.error, form.settings
+    blocks.error = error
     if form.section.feeds_back == "position":
         position = blocks.fed_back(seen.position)
         rated = position if seen.rated is seen.position else seen.rated
         seen = replace(seen, position=position, rated=rated, error=seen.error + seen.position - position)
     if "error_deadband" in settings:
         seen = replace(seen, error=blocks.dead_zone(seen.error, seen.reference_direction))
+    all_of_it = INNER_WINDOWS not in settings
     shares = form.section.declare(seen, blocks, form.variant)
     total = sum(shares.values(), start=Blocks.nothing)
-    added = total
-    if form.integral:
-        blocks.pause_integrals(error, seen.reference_direction)
-    if factors := blocks.factors(seen, error):
-        added = blocks.with_gains(total, factors)
+    added = blocks.with_gains(total, seen) if all_of_it else total
     if "stiction_push" in settings:
-        added += blocks.push(error, seen.reference_direction)
+        added += blocks.push(seen.reference_direction)
     if "dither_amplitude" in settings:
         added += blocks.dither()
-    if "freeze_window" in settings:
-        added = blocks.frozen(added, error, seen.reference_direction)
+    if all_of_it:
+        added = blocks.frozen(added, seen)
     return Demand(shares, total, blocks.fed_forward(added), error)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.equations.friction.common import friction_alone
 from friso.stage.tables import MOTOR_FRICTION, as_friction, friction_law
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 def _breakaway_of(name: str, variant: Hashable) -> Force | None:
     from friso.equations.component import state
 
-    friction = friction_law(name).declare(state("velocity"), variant)
+    friction = friction_alone(name, state("velocity"), variant)
     return friction and _compiled(friction.breakaway)
 
 
@@ -92,7 +93,7 @@ def _steady_of(name: str, variant: Hashable) -> Force | None:
     from friso.equations.component import state
 
     velocity = state("velocity")
-    friction = friction_law(name).declare(velocity, variant)
+    friction = friction_alone(name, velocity, variant)
     steady = friction and friction.steady(velocity)
     return None if steady is None else _compiled(steady)
 

@@ -221,14 +221,14 @@ class Continuous(Blocks):
         between = 1 - kinks[0].beyond - kinks[1].beyond
         return replace(signal, value=value, rate=None if signal.rate is None else between * signal.rate)
 
-    def within(self, window: str, error: Signal, resting: Signal) -> Signal:
+    def within(self, window: str, resting: Signal) -> Signal:
         """Return 1 while a window against friction acts, and 0 elsewhere.
 
         Each of its ends is a kink, where derivatives jump, or a mode if the window remembers the past. A state counts
         the time to stay. Where `resting` is 0 the error counts as beyond the exit.
         """
-        band, acts, square = self.key(window), 2 * resting.value - 1, error.value**2
-        acting = resting.settled * Piecewise((1, error.settled**2 < band**2), (0, True))
+        band, acts, square = self.key(window), 2 * resting.value - 1, self.error.value**2
+        acting = resting.settled * Piecewise((1, self.error.settled**2 < band**2), (0, True))
         near = acts * band**2 - square
         if not self.settings.remembers(window):
             end = Kink(window, near)
@@ -269,13 +269,13 @@ class Continuous(Blocks):
         symbols = [integral.symbol for integral in self._integrals]
         return symbols, symbols
 
-    def push(self, error: Signal, direction: Signal) -> Signal:
+    def push(self, direction: Signal) -> Signal:
         """Return the force that pushes towards the reference while the error exceeds the window.
 
         It acts while the reference rests, that is while its `direction` is 0. Each end of the window is a kink, where
         derivatives jump.
         """
-        push, window = map(self.key, ("stiction_push", "stiction_push_window"))
+        (push, window), error = map(self.key, ("stiction_push", "stiction_push_window")), self.error
         ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
         self.kinks += [ahead, behind]
         side = Piecewise((1, error.settled > window), (-1, error.settled < -window), (0, True))
@@ -320,11 +320,12 @@ class Continuous(Blocks):
                 far += [*ends, *beyond]
             if share != 1:
                 winding.append(up)
-            derivative = integral.integrand * self.winding * share * (1 - self.paused) - self._losses * integral.symbol
+            share *= self.winding[integral.symbol] * (1 - self.paused[integral.symbol])
+            derivative = integral.integrand * share - self._losses(integral.symbol) * integral.symbol
             if integral.leak is not None:
                 derivative -= integral.leak * integral.symbol
             if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
-                gain = len(self._integrals) * sp.diff(demand.total.value, integral.symbol)
+                gain = len(self._integrals) * sp.diff(demand.total.settled, integral.symbol)
                 derivative += bound.cut / (gain * unwinding_time())
             states.append(
                 State(integral.symbol, derivative, "m*s", integral.scale, Role.INTEGRAL, steady[integral.symbol])

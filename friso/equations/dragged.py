@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from friso.equations.imposed import Imposed
-from friso.stage.tables import friction_law
 
 if TYPE_CHECKING:
-    from friso.equations.friction.common import Friction
     from friso.equations.model import Model
 
 IMPULSE = "impulse"
@@ -34,11 +32,12 @@ def dragged(form: Dragged) -> Model:
     import sympy as sp
 
     from friso.equations.component import Output, Role, State, key, state
+    from friso.equations.friction.common import friction_alone
     from friso.equations.masses import Body
     from friso.equations.model import MOTION_SIZE, REFERENCE, Model, resets
 
     body, rate = Body.named("", sp.oo), 1 / key("motion.duration")
-    friction: Friction = friction_law(form.friction).declare(body.velocity, form.friction_variant)
+    friction = friction_alone(form.friction, body.velocity, form.friction_variant)
     component, size = friction.component, friction.breakaway
     states = (
         State(body.position, body.velocity, "m", MOTION_SIZE, Role.POSITION),

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from friso.equations.component import State
-    from friso.equations.friction.common import Friction
     from friso.equations.model import Model
 
 FREQUENCY = "imposed.frequency"
@@ -60,12 +59,13 @@ def imposed(form: Imposed) -> Model:
     import sympy as sp
 
     from friso.equations.component import Output, Role, State, key, state
+    from friso.equations.friction.common import friction_alone
     from friso.equations.masses import Body
     from friso.equations.model import MOTION_SIZE, Model, resets
 
     body, period = Body.named("", sp.oo), 1 / key(FREQUENCY)  # no force acts back on the imposed motion
     position, velocity = body.position, body.velocity
-    friction: Friction = friction_law(form.friction).declare(velocity, form.friction_variant)
+    friction = friction_alone(form.friction, velocity, form.friction_variant)
     omega, size = 2 * sp.pi / period, friction.breakaway
     shares = (2 * friction.force * position / MOTION_SIZE, 2 * friction.force * velocity / (omega * MOTION_SIZE))
     states = (

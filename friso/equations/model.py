@@ -136,15 +136,17 @@ External = Callable[[Body], sp.Expr]
 """Function that gives an external force [N] on the stage, which may depend on its motion."""
 
 
-def assemble(structure: Structure, external: External | None = None, control: Control | None = None) -> Model:
+def assemble(
+    structure: Structure, external: External | None = None, control: Control | None = None, alone: bool = False
+) -> Model:
     """Return the equations of every stage with this structure.
 
     An `external` force may act besides the actuator's, and another controller may replace the structure's in
-    continuous time.
+    continuous time. Friction that follows the drive's force is as if nothing else resisted the drive, if it is `alone`.
     """
     chain, course = _bodies(structure), declared(structure.reference)
     friction = friction_law(structure.friction).declare(chain.cart.velocity, structure.friction_variant)
-    unaccelerated = friction
+    unaccelerated = friction and friction.driven_by(None)
     if friction and structure.load_follows:
         friction = friction.with_values(under_acceleration(course.acceleration_size))
     motor_friction = _motor_friction(structure, chain)
@@ -169,6 +171,8 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     driven = chain.motor or chain.stage
     braking = key(BRAKING) * driven.velocity if structure.braked else sp.S.Zero
     pushed = acting.force if acting else sp.S.Zero
+    felt = None if alone else pushed - braking
+    friction, motor_friction = (law and law.driven_by(felt) for law in (friction, motor_friction))
     forces = Pushes(pushed - braking, external(chain.stage) if external else sp.S.Zero)
     bodies, parts = _mechanics(structure, chain, (friction, motor_friction), forces, (length, rate))
     if acting:
@@ -304,7 +308,7 @@ def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction |
     if total is not None and braked:
         total += key(BRAKING) * chain.cart.velocity
     if motor_friction and chain.motor and total is not None:
-        part = motor_friction.steady(chain.motor.velocity)
+        part = motor_friction.driven_by(None).steady(chain.motor.velocity)
         total = None if part is None else total + part.subs(chain.motor.velocity, chain.cart.velocity)
     return total
 

@@ -140,7 +140,8 @@ class Sampled(Blocks):
         super().__init__(form)
         self.velocity_samples = velocity_samples
         self.held: list[Held] = []
-        self.restarts: Any = sp.false  # condition under which settings against friction empty integrals
+        self.restarts: dict[sp.Symbol, Any] = {}
+        """Conditions under which settings against friction empty integrals, by the integrals' settled values."""
         self.period: sp.Expr = SAMPLE_TIME
         self.due: Any = None  # condition under which the present loop runs at a sample; None: always
         self._integrals: list[_Integral] = []
@@ -273,31 +274,32 @@ class Sampled(Blocks):
         """Clip a signal to plus or minus `limit` at every sample."""
         return replace(signal, value=clipped(signal.value, limit), rate=None, before=None)
 
-    def within(self, window: str, error: Signal, resting: Signal) -> Signal:
+    def within(self, window: str, resting: Signal) -> Signal:
         """Return 1 at samples at which a window against friction acts, and 0 at others.
 
         Held numbers remember whether it acted at the last sample, and for how long the error has been small. At samples
         where `resting` is 0 the window does not act.
         """
-        band, size = self.key(window), sp.Abs(error.value)
+        band, size = self.key(window), sp.Abs(self.error.value)
         near: Any = size < band
         far: Any = size > self.exit_of(window)
         if resting is not self.whole:
             moves = resting.value < sp.Rational(1, 2)
             near, far = sp.And(near, sp.Not(moves)), sp.Or(far, moves)
-        acting = resting.settled * Piecewise((1, error.settled**2 < band**2), (0, True))
+        acting = resting.settled * Piecewise((1, self.error.settled**2 < band**2), (0, True))
         acts: Any = Piecewise((1, near), (0, True))
         if self.settings.remembers(window):
             inside, enters = state(f"{window}_acts"), near
             if f"{window}_time" in self.settings:
                 clock, time = state(f"{window}_clock"), self.key(f"{window}_time")
-                counted = Piecewise((0, sp.Not(near)), (clock + SAMPLE_TIME, clock < time), (clock, True))
+                counted = Piecewise((0, sp.Not(near)), (clock + self.period, clock < time), (clock, True))
                 self.held.append(Held(clock, counted, acting * time))
-                enters = sp.And(near, clock > time - SAMPLE_TIME / 2)
+                enters = sp.And(near, clock > time - self.period / 2)
             acts = Piecewise((1, enters), (0, far), (inside, True))
             self.held.append(Held(inside, acts, acting))
         if window == "freeze_window":
-            self.restarts = acts > 0
+            begins: Any = acts > 0 if self.due is None else sp.And(acts > 0, self.due)
+            self.restarts |= dict.fromkeys(self._holding[1], begins)
         return replace(self.whole, value=acts, settled=acting)
 
     def scheduled(self, signal: Signal, schedule: Schedule, name: str) -> Signal:
@@ -310,14 +312,15 @@ class Sampled(Blocks):
         """Return the symbols of integrals in values, which are the next, and in settled values."""
         return [integral.next for integral in self._integrals], [integral.symbol for integral in self._integrals]
 
-    def push(self, error: Signal, direction: Signal) -> Signal:
+    def push(self, direction: Signal) -> Signal:
         """Return the force that pushes towards the reference, by the error at a sample.
 
         It acts while the reference rests, that is while its `direction` is 0.
         """
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         way, settled = (
-            Piecewise((1, part > window), (-1, part < -window), (0, True)) for part in (error.value, error.settled)
+            Piecewise((1, part > window), (-1, part < -window), (0, True))
+            for part in (self.error.value, self.error.settled)
         )
         return Signal(push * way * (1 - direction.value**2), push, push * settled, sp.S.Zero)
 
@@ -332,14 +335,13 @@ class Sampled(Blocks):
         self.held.append(Held(turn, Piecewise((following - 1, following > 1), (following, True))))
         return Signal(amplitude * sine(turn), amplitude, sp.S.Zero, sp.S.Zero)
 
-    def _standstill(self, error: sp.Expr) -> Rest:
-        """Return the conditions by which settings against friction pause or restart integrals."""
-        restarts = self.restarts
-        if "integral_reset" in self.settings:
-            before = state("error_at_change")
-            self.held.append(Held(before, Piecewise((error, error**2 > 0), (before, True)), STEADY.error))
-            restarts = sp.Or(restarts, error * before < 0)
-        return Rest(self.paused > 0, restarts)
+    def _begun_anew(self, error: sp.Expr) -> Any:
+        """Return the condition under which the error has changed its sign, at which integrals restart."""
+        if "integral_reset" not in self.settings or not self._integrals:
+            return sp.false
+        before = state("error_at_change")
+        self.held.append(Held(before, Piecewise((error, error**2 > 0), (before, True)), STEADY.error))
+        return error * before < 0
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
         """Return the force before its limit, and all held numbers.
@@ -348,16 +350,16 @@ class Sampled(Blocks):
         Integrators follow the anti-windup where the force would exceed its limit. They stop where their output would
         exceed a limit of its own.
         """
-        settings = self._standstill(demand.error.value) if self._integrals else Rest()
-        rest = Rest(sp.Or(rest.rests, settings.rests), sp.Or(rest.restarts, settings.restarts))
+        anew = sp.Or(rest.restarts, self._begun_anew(demand.error.value))
         new: dict[Any, Any] = {}
         for integral in self._integrals:
-            new[integral.next] = integral.symbol + self.winding * integral.share.xreplace(new)
+            new[integral.next] = integral.symbol + self.winding[integral.symbol] * integral.share.xreplace(new)
         unlimited = demand.force.value.xreplace(new)
         updates: dict[Any, Any] = {}
         for integral in self._integrals:
-            share: Any = self.winding * integral.share.xreplace(updates)
-            rests = rest.rests
+            share: Any = self.winding[integral.symbol] * integral.share.xreplace(updates)
+            rests = sp.Or(rest.rests, self.paused[integral.symbol] > 0)
+            restarts = sp.Or(anew, self.restarts.get(integral.symbol, sp.false))
             clamp = force_limit() if anti_windup == "clamp" else None
             limits = [(unlimited, clamp), (integral.gain * new[integral.next], integral.limit)]
             if "integral_limit" in self.settings:
@@ -371,10 +373,10 @@ class Sampled(Blocks):
             if anti_windup == BACK_CALCULATION:
                 within: Any = clipped(unlimited, force_limit())
                 cut = within - unlimited
-                gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
+                gain = len(self._integrals) * sp.diff(demand.total.settled, integral.symbol)
                 following += integral.when_due(integral.period * cut / (gain * unwinding_time()))
-            kept = Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
-            leak = self._losses + (integral.leak or 0)
+            kept = Piecewise((share, restarts), (integral.symbol, rests), (following, True))
+            leak = self._losses(integral.symbol) + (integral.leak or 0)
             left = 1 + integral.when_due(leak * integral.period) if leak else 1  # leak by backward Euler
             updates[integral.next] = kept / left
         steady: dict[Any, Any] = {**wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])}

@@ -18,7 +18,7 @@ from friso.equations.breakaway import breakaway, sliding
 from friso.equations.continuous import slow_gains
 from friso.errors import InputError
 from friso.quantities import quoted
-from friso.stage.controllers import SCHEDULES, ControllerSection, controller_of
+from friso.stage.controllers import INNER_WINDOWS, SCHEDULES, ControllerSection, controller_of, settings_of
 from friso.stage.lists import element_keys
 from friso.stage.tables import moving_mass
 
@@ -85,6 +85,9 @@ def gain_states(flat: FlatMachine) -> list[FlatMachine]:
     in moves and the points of a schedule add sets.
     """
     controller, schedules = controller_of(flat), tuple(map(ControllerSection.key, (*SCHEDULES, "schedule_factor")))
+    in_loop = INNER_WINDOWS in settings_of(flat)
+    slow = controller.position_loop
+    gain = [name for name in slow if name not in controller.integral_gain] if in_loop else controller.loop_gain
     plain = {key: value for key, value in flat.items() if not key.startswith(schedules)}
     far, *nearer = [flat[key] for key in element_keys(flat, schedules[-1])][::-1] or [1.0]
     moving = flat.get(ControllerSection.key("moving_factor"), 1.0)
@@ -92,13 +95,13 @@ def gain_states(flat: FlatMachine) -> list[FlatMachine]:
     inner = flat.get(ControllerSection.key("standstill_factor"))
     near = [] if inner is None else [inner * (far, *nearer)[-1]]
     states = [
-        {**plain, **{key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}}
+        {**plain, **{key: factor * flat[key] for key in map(controller.key, gain)}}
         for factor in (far, *in_moves, *nearer, *near)
     ]
     if inner is not None:
         own = flat.get(ControllerSection.key("standstill_integral_factor"), inner) / inner
         for name, power in controller.integral_gain.items():
-            if (key := controller.key(name)) in flat:
+            if (key := controller.key(name)) in flat and (name in slow or not in_loop):
                 states[-1][key] = states[-1][key] * np.power(own, float(power))
     return [*states]
 

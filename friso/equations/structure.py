@@ -118,6 +118,12 @@ class Structure:
         return replace(self, reference=QUADRATIC)
 
     @property
+    def follows_drive(self) -> bool:
+        """Tell whether friction at guide or motor grows with the force of the drive."""
+        laws = (self.friction, self.transmission.friction if self.transmission else "none")
+        return any(friction_law(law).follows_drive for law in laws)
+
+    @property
     def plays(self) -> bool:
         """Tell whether there is backlash."""
         return self.transmission is not None and self.transmission.backlash

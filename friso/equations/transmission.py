@@ -86,7 +86,8 @@ def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol)
     }
     outputs["motor_friction_force"] = Output(put(friction.force), "N", "friction force at the motor")
     sliding: Any = friction.sliding and {put(x): put(expression) for x, expression in friction.sliding.items()}
-    return Friction(put(friction.force), put(friction.breakaway), Component(states, kinks, outputs), sliding)
+    alone = None if friction.alone is None else put(friction.alone)
+    return Friction(put(friction.force), put(friction.breakaway), Component(states, kinks, outputs), sliding, alone)
 
 
 def _renamed(name: str, before: str = "") -> str:
@@ -96,7 +97,7 @@ def _renamed(name: str, before: str = "") -> str:
 def _expressions(friction: Friction) -> list[sp.Expr]:
     """Return all expressions that a law declares."""
     component = friction.component
-    expressions = [friction.force, friction.breakaway]
+    expressions = [friction.force, friction.breakaway, *([] if friction.alone is None else [friction.alone])]
     expressions += [e for part in component.states for e in (part.derivative, part.scale, part.settled)]
     expressions += [output.expression for output in component.outputs.values()]
     expressions += map(sp.sympify, (friction.sliding or {}).values())

@@ -16,14 +16,14 @@ import sympy as sp
 
 from friso.engine.arrays import ArrayColumns
 from friso.equations.component import Switch, state
-from friso.equations.friction.common import direction, solve_linear
+from friso.equations.friction.common import direction, friction_alone, solve_linear
 from friso.equations.structure import shared_structure, structure
 from friso.errors import InputError
 from friso.frequency.settings import settings
 from friso.frequency.system import Declared, sine
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import declared_keys
-from friso.stage.tables import STATE_PREFIX, friction_law, leading_friction
+from friso.stage.tables import STATE_PREFIX, leading_friction
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -77,7 +77,7 @@ def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
 
 @cache
 def _law(name: str, variant: Hashable) -> LinearFriction | None:
-    friction = friction_law(name).declare(VELOCITY, variant)
+    friction = friction_alone(name, VELOCITY, variant)
     if friction is None:
         return None
     component = friction.component

@@ -173,7 +173,7 @@ def _plant(form: Structure) -> _Plant:
         return Controller(push, Component())
 
     at_rest = replace(form, controller=None, biased=("cart",), limiter_pulls=True)  # a touched limiter stays touched
-    model = assemble(at_rest, control=control)
+    model = assemble(at_rest, control=control, alone=True)
     (loop,) = seen
     expressions = {name: output.expression for name, output in model.outputs.items()}
     rated = loop.position if loop.rated is None else loop.rated

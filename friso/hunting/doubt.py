@@ -14,4 +14,5 @@ class HuntingDoubt(StrEnum):
     BEYOND = "swings smaller or larger than those searched may last"
     GROWTH = "without anti-windup swings may grow or die out beyond the force limit: a size is where a run was stopped"
     LOOP = "its loop is unstable, or its controller pushes ever harder at standstill as an integral does"
+    LOAD = "friction grows with the drive's force, and no proof about its loop covers that"
     SWITCHES = "its controller switches the force by windows that remember, which feeds swings without an integral too"

@@ -131,7 +131,8 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     """Return which stages that cannot hunt have no other lasting swing either, shape (count,).
 
     Their loops are stable, also with the limiter of a free joint touched, and beyond a force limit without anti-windup.
-    They have no backlash, no dither, and no window with a memory that switches the force. Without friction, the
+    They have no backlash, no dither, no friction that follows the drive's force, and no window with a memory that
+    switches the force. Without friction, the
     controller must also act alike near the reference and far from it.
     """
     least_rate = check_settings.least_growth_rate
@@ -141,7 +142,7 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     rubs = form.friction != "none" or (drive is not None and drive.friction != "none")
     winds = controller is not None and controller.integral and "integral_reset" in settings
     bent = settings.swings_alone or (not rubs and (settings.bends or winds))
-    if form.plays or "dither_amplitude" in settings or bent:
+    if form.plays or "dither_amplitude" in settings or bent or form.follows_drive:
         return np.zeros(stages.count, bool)
     limit = least_rate * stages.number("rate")
     growths = [_growths(stages, touched).values() for touched in {False, form.joint == "free"}]

@@ -69,6 +69,8 @@ class AgainstFriction(UncertainSection):
     """Time that the error has to stay within the window before the force is switched off."""
     windows_at_rest: bool | None = None
     """Whether deadbands and windows act only while the reference rests."""
+    windows_in_position_loop: bool | None = None
+    """Whether windows, factors and pauses act on what a cascade's position loop commands, and on its integral alone."""
     moving_factor: Annotated[float | None, Number(positive, "1.5")] = None
     """Factor on the gains while the reference moves; integrals keep their force."""
     schedule_error: Annotated[Values | None, Several(Quantity("m", non_negative, "0 um"), ("2 um", "20 um"), 2, 12)] = (
@@ -134,6 +136,9 @@ WINDOW_OF: Mapping[str, str] = {
     "standstill_integral_factor": "standstill_window",
 }
 """The key of the window to which another key belongs."""
+
+INNER_WINDOWS = "windows_in_position_loop"
+"""Key that lets settings act on the position loop of a cascade alone."""
 
 SCHEDULES = ("schedule_error", "schedule_speed")
 """Keys of what a schedule of the gains may depend on."""
@@ -277,6 +282,8 @@ class ControllerSection(AgainstFriction):
     """Tuning ranges of the keys that shape a controller without making it faster."""
     loop_gain: ClassVar[tuple[str, ...]] = ()
     """Names of the keys to whose product the loop gain is proportional."""
+    position_loop: ClassVar[tuple[str, ...]] = ()
+    """Names of the keys of a position loop above another loop, if the controller has one."""
     integral_gain: ClassVar[Mapping[str, int]] = MappingProxyType({})
     """Exponents by key, for a controller whose integral gains alone grow by a factor; none if no keys set them."""
     decisive: ClassVar[tuple[str, ...]] = ()
@@ -313,6 +320,9 @@ class ControllerSection(AgainstFriction):
         if self.standstill_integral_factor is not None and not self.integral_gain:
             key, expected = "standstill_integral_factor", "a controller with keys for its integral gains, or nothing"
             raise StageError(key, f'kind = "{self.kind}" as it is written here', expected, "standstill_factor = 0.5")
+        if self.windows_in_position_loop and not self.position_loop:
+            expected = 'a position loop above a velocity loop, kind = "cascade"'
+            raise StageError(INNER_WINDOWS, f'kind = "{self.kind}"', expected, f"{INNER_WINDOWS} = false")
         return self
 
     @classmethod

@@ -128,6 +128,8 @@ class FrictionSection(UncertainSection):
     decided_by: ClassVar[Mapping[str, str]] = {}
     """Experiments that would determine keys that other measurements leave open, by key. Under the key "" stands the
     experiment that distinguishes the law from LuGre."""
+    follows_drive: ClassVar[bool] = False
+    """Whether friction grows with the force of the drive."""
     fitted: ClassVar[bool] = False
     """Whether `friso identify` fits the law's parameters to logs of moves."""
     words: ClassVar[Mapping[str, str]] = {}

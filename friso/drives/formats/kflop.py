@@ -1,8 +1,8 @@
 """KFLOP initialisation program in C (Dynomotion KMotion)
 
 Every 90 us: output = P e + I sum(e) + D (e - e before), in counts of the output per count of the encoder; the integral
-is limited to MaxI and the output to MaxOutput. Inside DeadBandRange counts the error counts DeadBandGain times. Then up
-to three sampled biquads follow.
+is limited to MaxI and the output to MaxOutput. Inside DeadBandRange counts the error counts DeadBandGain times; what is
+left of a larger one is asked for. Then up to three sampled biquads follow.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from friso.axis import LINEAR, axis_of
-from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters
+from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, si
 from friso.drives.pid_units import (
     LENGTH,
     PidUnits,
+    deadband_back,
+    deadband_of,
     force_of,
     kind_of_length,
+    open_beyond,
     open_units,
 )
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
@@ -28,6 +31,7 @@ SERVO_PERIOD = "90 us"
 """Period of the servo loop of KFLOP and KOGNA."""
 
 NAMES = {"kp": "P", "ki": "I", "kd": "D", "force_limit": "MaxOutput", "integral_limit": "MaxI"}
+BAND, SHARE = "DeadBandRange", "DeadBandGain"
 OUTPUT, COUNT = "an output of 1", "one count of the encoder"
 NO_SERVO = ("STEP", "NO_OUTPUT")
 """Parts of the names of output modes without a servo loop of the program's own."""
@@ -62,7 +66,15 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
     if any(part in mode for part in NO_SERVO):
         raise InputError("OutputMode", quoted(mode), "a servo axis, whose loop can hunt", "DAC_SERVO_MODE")
     kind = kind_of_length(answers)[0] if LENGTH in answers else LINEAR
-    return (*open_units(answers, kind, OUTPUT, COUNT), *of_the_machine(answers, kind))
+    asked = open_units(answers, kind, OUTPUT, COUNT)
+    if _has_deadband(axis):
+        asked += open_beyond(answers, BAND)
+    return (*asked, *of_the_machine(answers, kind))
+
+
+def _has_deadband(axis: AxisParameters) -> bool:
+    """Tell whether the error counts otherwise within a deadband."""
+    return axis.is_set(BAND) and axis.number(SHARE, 1.0) != 1
 
 
 def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
@@ -74,12 +86,10 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
         table["filters"] = filters
     left = [f"{name} = {axis.number(name):g}: {what}, in units that nobody documents" for name, what in _SIDE.items()
             if axis.is_set(name)]  # fmt: skip
-    width, share = axis.number("DeadBandRange", 0.0), axis.number("DeadBandGain", 1.0)
-    if width and share != 1:
-        left.append(
-            f"DeadBandRange = {width:g}: within so many counts the error counts {share:g} times, and friso's results "
-            "for swings that small do not hold for this axis"
-        )
+    if _has_deadband(axis):
+        table |= deadband_of(answers, si(axis.number(BAND) * units.length, kind.unit("m")))
+        table["error_deadband_gain"] = axis.number(SHARE)
+        left.append(f"whether {SHARE} counts for D too: here D acts on the whole error")
     tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": {"sample_time": SERVO_PERIOD}}
     if kind != LINEAR:
         tables["axis"] = {"kind": kind.name}
@@ -112,7 +122,12 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the parameters of an axis. Raises InputError for a controller other than a PID by its gains."""
     kind = axis_of(flat)
-    return PidUnits(kind, force_of(answers, kind), kind_of_length(answers)[1], _period()).parameters(flat, NAMES)
+    units = PidUnits(kind, force_of(answers, kind), kind_of_length(answers)[1], _period())
+    of_loop = units.parameters(flat, NAMES)
+    if (deadband := deadband_back(flat)) is None:
+        return of_loop
+    band = {BAND: deadband[0] / units.length, SHARE: flat.get("controller.error_deadband_gain", 0.0)}
+    return Parameters({**of_loop.values, **band}, of_loop.held | deadband[1] | {"error_deadband_gain"})
 
 
 def text(settings: Mapping[str, float]) -> str:

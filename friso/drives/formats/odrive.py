@@ -2,8 +2,10 @@
 
 Firmware 0.5.1 to 0.6, control in position: w = v_ff + pos_gain e; torque = inertia a_ff + vel_gain (w - v) +
 vel_integrator_gain sum(w - v) T, turns for positions, 8000 times a second. v is the estimate of the encoder's
-phase-locked loop, which has a double pole at its bandwidth. Firmware 0.6 has other names for the motor, the encoder and
-the limit of the torque, and is read under those of 0.5. Firmware up to 0.4 counts in encoder counts and amperes.
+phase-locked loop, which has a double pole at its bandwidth. Gain scheduling multiplies vel_gain and vel_integrator_gain
+by the error over its width, within it; how a least ratio (0.6) bounds that is asked for. Firmware 0.6 has other names
+for the motor, the encoder and the limit of the torque, and is read under those of 0.5. Firmware up to 0.4 counts in
+encoder counts and amperes.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from math import inf, pi
+from math import inf, isclose, pi
 from typing import Any
 
 from friso.axis import LINEAR, AxisKind
@@ -28,11 +30,12 @@ from friso.drives.format import (
     there_and_back,
 )
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
+from friso.drives.settings import drive_settings
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage.controllers import FILTERS_KEY
 from friso.stage.filters import FEEDBACK
-from friso.stage.lists import row_keys
+from friso.stage.lists import element_keys, row_keys
 
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
 LIMITS_OF_MOVES = f"{MOVE}.vel_limit", f"{MOVE}.accel_limit"
@@ -40,6 +43,14 @@ GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
 TURN = "what one turn of the motor moves"
 SAMPLE_RATE = 8000.0
 """Samples of the controller per second, in ODrive 3."""
+
+SCHEDULED = f"{CONFIG}.enable_gain_scheduling"
+SCHEDULE_WIDTH, LEAST_RATIO = f"{CONFIG}.gain_scheduling_width", f"{CONFIG}.gain_scheduling_min_ratio"
+GAIN_SCHEDULE, CLIPPED, LINE = "gain_schedule", "clipped", "line"
+"""Key of the user's answer on how gains fall to their least ratio, and the two answers."""
+
+SCHEDULE = ("schedule_error", "schedule_factor")
+"""Keys of [controller] that hold a schedule of gains."""
 
 CONTROL_MODES = ("VOLTAGE_CONTROL", "TORQUE_CONTROL", "VELOCITY_CONTROL", "POSITION_CONTROL")
 POSITION_CONTROL = CONTROL_MODES.index("POSITION_CONTROL")
@@ -265,8 +276,33 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         elif answers.choice(GAINS_IN, (TURNS, COUNTS)) == COUNTS:
             raise _in_counts(GAINS_IN, COUNTS)
     asked += open_turn(answers, f'{TURN}; an angle on a rotary axis, "360 deg" without a gear', '"10 mm"')
+    if axis.flag(SCHEDULED) and axis.is_set(SCHEDULE_WIDTH) and axis.is_set(LEAST_RATIO):
+        asked += _open_schedule(answers)
     moved = all(map(axis.is_set, LIMITS_OF_MOVES))
     return (*asked, *of_the_machine(answers, kind_of_turn(answers), moved))
+
+
+def _open_schedule(answers: UserAnswers) -> list[OpenQuestion]:
+    """Ask how gains fall to their least ratio unless it is answered."""
+    what = f"gains within the width: {CLIPPED}, as the error down to min_ratio, or {LINE}, to min_ratio at no error"
+    return [] if GAIN_SCHEDULE in answers else [OpenQuestion(GAIN_SCHEDULE, what, CLIPPED)]
+
+
+def _scheduled(axis: AxisParameters, answers: UserAnswers, unit: float, kind: AxisKind) -> dict[str, Any]:
+    """Return the schedule of gains over the error; empty without one.
+
+    `unit` is how far a turn moves the load [m or rad]. Raises InputError for a least ratio that is not below 1.
+    """
+    if not axis.flag(SCHEDULED) or not axis.is_set(SCHEDULE_WIDTH):
+        return {}
+    width, least = axis.number(SCHEDULE_WIDTH) * unit, axis.number(LEAST_RATIO, 0.0)
+    if width <= 0 or not 0 <= least < 1:
+        actual = f"{axis.number(SCHEDULE_WIDTH):g} turns and a least ratio of {least:g}"
+        raise InputError(SCHEDULE_WIDTH, actual, "a width above 0, and a ratio from 0 to below 1", "0.01")
+    line = least > 0 and answers.choice(GAIN_SCHEDULE, (CLIPPED, LINE)) == LINE
+    least = least or drive_settings.least_gain_ratio
+    places = [si(0.0 if line else least * width, kind.unit("m")), si(width, kind.unit("m"))]
+    return {"schedule_error": places, "schedule_factor": [least, 1.0]}
 
 
 def _mode(axis: AxisParameters, name: str, default: float) -> float:
@@ -309,6 +345,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     if axis.is_set(f"{CONFIG}.vel_integrator_limit") and ki > 0:
         table["integral_limit"] = si(number("vel_integrator_limit") * force, kind.unit("N"))
     bandwidth = axis.number(f"{ENCODER}.bandwidth", 1000.0) / (2 * pi)
+    table |= _scheduled(axis, answers, travel, kind)
     low_pass = {"kind": "low_pass", "path": "feedback", "order": 2, "damping_ratio": 1.0}
     table["filters"] = [{**low_pass, "frequency": si(bandwidth, "Hz")}]
     drive = {"sample_time": si(1 / SAMPLE_RATE, "s")}
@@ -348,13 +385,9 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     if IN_TURNS not in axis.values:
         unknown = f"the firmware, which no {IN_TURNS} tells"
         left.append(f"{unknown}: gains in turns and N m are assumed, as 0.5.1 and later have")
-    if axis.flag(f"{CONFIG}.enable_gain_scheduling"):
-        width = axis.number(f"{CONFIG}.gain_scheduling_width", 0.0)
-        least = axis.number(f"{CONFIG}.gain_scheduling_min_ratio", 0.0)
-        left.append(
-            f"enable_gain_scheduling: within {width:g} turns the gains fall to {least:g} of theirs with the error, and "
-            "friso's results for swings that small do not hold for this axis"
-        )
+    if axis.flag(SCHEDULED) and axis.is_set(SCHEDULE_WIDTH) and not axis.is_set(LEAST_RATIO):
+        least = f"{drive_settings.least_gain_ratio:g}"
+        left.append(f"gains that fall to 0 with the error: here they stay at {least} of theirs, or more")
     if axis.flag(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
     if mode == PASSTHROUGH:
@@ -385,8 +418,26 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
 
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """Ask how far a turn moves the load; () if a transmission or an answer tells."""
-    return tuple(open_turn_back(flat, answers, TURN))
+    """Ask how far a turn moves the load, and how gains are scheduled; () if answers or the stage tell."""
+    schedule = _open_schedule(answers) if "controller.schedule_error.1" in flat else []
+    return (*open_turn_back(flat, answers, TURN), *schedule)
+
+
+def _schedule_back(flat: FlatStage, answers: UserAnswers, unit: float) -> dict[str, float]:
+    """Return the parameters of a schedule of gains; empty if the drive cannot hold that of the stage.
+
+    `unit` is how far a turn moves the load [m or rad].
+    """
+    if "controller.schedule_error.1" not in flat:
+        return {}
+    line = answers.choice(GAIN_SCHEDULE, (CLIPPED, LINE)) == LINE
+    places, factors = (
+        [flat[at] for at in element_keys(flat, f"controller.schedule_{of}")] for of in ("error", "factor")
+    )
+    begins = 0.0 if line else factors[0] * places[-1]
+    if len(places) != 2 or factors[1] != 1 or not isclose(places[0], begins, rel_tol=1e-6):
+        return {}
+    return {SCHEDULED: 1.0, SCHEDULE_WIDTH: places[1] / unit, LEAST_RATIO: factors[0]}
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
@@ -420,6 +471,9 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
         settings[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
     if (bandwidth := flat.get("drive.current_bandwidth")) is not None:
         settings[f"{MOTOR}.current_control_bandwidth"] = 2 * pi * bandwidth
+    if schedule := _schedule_back(flat, answers, travel):
+        settings |= schedule
+        held |= {f"{name}.{number}" for name in SCHEDULE for number in (1, 2)}
     if place := _loop_of_velocity(flat):
         settings[f"{ENCODER}.bandwidth"] = 2 * pi * flat[f"{place}.frequency"]
         held |= {place.removeprefix(name)}

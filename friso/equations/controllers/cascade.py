@@ -89,6 +89,7 @@ class Cascade(ControllerSection):
         {"kv": 1, "kp": 1, "position_integral_time": -1, "velocity_integral_time": -1, "velocity_filter": -1}
     )
     loop_gain = ("kp",)
+    position_loop = ("kv", "position_integral_time")
     integral_gain: ClassVar[Mapping[str, int]] = MappingProxyType(
         {"position_integral_time": -1, "velocity_integral_time": -1}
     )
@@ -222,6 +223,7 @@ class Cascade(ControllerSection):
             if variant.position_integral:
                 gain = kv / blocks.key("position_integral_time")
                 command += blocks.integral(measured.error, gain, "position_integral", "backward_euler")
+            command = blocks.in_position_loop(command, measured)
             command += measured.reference_velocity * ahead.get("velocity_feedforward", 0)
             command = blocks.handed_on(command, "command")
         integral = blocks.nothing

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, cast
 from friso.equations.conditions import LEVELS, friction_level, has_conditions
 from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
 from friso.stage import FrictionSection, Rule
-from friso.stage.tables import STATE_PREFIX
+from friso.stage.tables import STATE_PREFIX, friction_law
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from friso.equations.component import Component, Kink
+    from friso.equations.component import Component, Kink, Output, State
 
 COULOMB_BELOW_STATIC = Rule(
     ("friction.coulomb", "friction.static"),
@@ -41,7 +41,9 @@ class Friction:
     `component` has states, outputs, and kinks (where derivatives jump). `breakaway` [N] is the largest force at rest,
     from which the solver takes its length scale. `sliding` maps symbols to their values in a steady motion at the
     velocity: the law's own states, its modes with memory, and the sides of its kinks other than the direction. Without
-    `sliding`, these are the values at which the states do not change. At rest all modes with memory have been left.
+    `sliding`, these are the values at which the states do not change. At rest all modes with memory have been left. Of
+    a law that follows the drive's force, `transmitted_force()` stands for that, and `alone` [N] for what it is where
+    nothing but friction resists the drive.
     """
 
     def __init__(
@@ -50,8 +52,16 @@ class Friction:
         breakaway: sp.Expr,
         component: Component,
         sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
+        alone: sp.Expr | None = None,
     ) -> None:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
+        self.alone = alone
+
+    def driven_by(self, force: sp.Expr | None) -> Friction:
+        """Return the law under a force [N] of the drive; None stands for what moves the body steadily."""
+        if self.alone is None:
+            return self
+        return self.with_values({transmitted_force(): self.alone if force is None else force})
 
     def with_values(self, values: Mapping[Any, Any]) -> Friction:
         """Return the law with expressions replaced by others, except in scales and steady motion."""
@@ -61,7 +71,13 @@ class Friction:
         component = replace(
             part, states=states, kinks=tuple(k.with_values(values) for k in part.kinks), outputs=outputs
         )
-        return Friction(force, self.breakaway, component, self.sliding)
+        return Friction(force, self.breakaway, component, self.sliding, self.alone)
+
+    def joined(self, states: tuple[State, ...], outputs: Mapping[str, Output]) -> Friction:
+        """Return the law with further states and outputs."""
+        part = self.component
+        joined = replace(part, states=(*part.states, *states), outputs={**part.outputs, **outputs})
+        return Friction(self.force, self.breakaway, joined, self.sliding, self.alone)
 
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
         """Return the law's states, and the sides of its kinks, in steady motion at the velocity.
@@ -107,6 +123,19 @@ class Friction:
 
         kinks = [k for k in self.component.kinks if not isinstance(k, Switch) and not _is_direction(k)]
         return {kink.beyond: Piecewise((1, kink.surface.subs({**states}) >= 0), (0, True)) for kink in kinks}
+
+
+def transmitted_force() -> sp.Symbol:
+    """Return the symbol of the drive's force [N], which a law of friction may follow."""
+    from friso.equations.component import state
+
+    return state("transmitted_force")
+
+
+def friction_alone(name: str, velocity: sp.Symbol, variant: Any) -> Any:
+    """Return the equations of a law by its name, where nothing but friction resists the drive; None for no force."""
+    friction = friction_law(name).declare(velocity, variant)
+    return friction and friction.driven_by(None)
 
 
 def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:

@@ -25,12 +25,11 @@ import sympy as sp
 from scipy.linalg import solve_banded
 
 from friso.equations.component import Switch, state
-from friso.equations.friction.common import DIRECTION, direction
+from friso.equations.friction.common import DIRECTION, direction, friction_alone
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
 from friso.frequency.describing.balance import TOUCHES, beyond_stroke, receptance
 from friso.frequency.settings import settings
-from friso.stage.tables import friction_law
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class OneStateLaw:
 @cache
 def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...], bool]:
     velocity, none = state("velocity"), state("no_state")
-    friction = friction_law(form.friction).declare(velocity, form.friction_variant)
+    friction = friction_alone(form.friction, velocity, form.friction_variant)
     inner = friction.component.states
     if any(isinstance(kink, Switch) for kink in friction.component.kinks):
         actual = f'"{form.friction}", with modes that remember'

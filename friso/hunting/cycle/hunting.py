@@ -182,7 +182,8 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
         if not calm and reason != DITHERS:
             form = held.structure.controller
             switches = form is not None and form.settings.swings_alone and not unstable(stage)
-            reason = HuntingDoubt.SWITCHES if switches else HuntingDoubt.LOOP
+            follows = held.structure.follows_drive and not unstable(stage)
+            reason = HuntingDoubt.SWITCHES if switches else HuntingDoubt.LOAD if follows else HuntingDoubt.LOOP
         return Hunting((), reason, calm, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat).standing, variational) for variational in (False, True)])

@@ -176,7 +176,12 @@ def _reserve(case: Case) -> str:
 
 def at_the_end(case: Case) -> str:
     """Write the peak-to-peak motion in the last quarter of a run."""
-    return length_at_rest(case.peak_to_peak, encoder_step(case))
+    return length_at_rest(case.peak_to_peak, _tolerance(case))
+
+
+def _tolerance(case: Case) -> float:
+    """Return the tolerance that the stage states [m]; 0 if it states none."""
+    return float(case.stage.flat().get("tolerance.within", 0.0))
 
 
 def encoder_step(case: Case) -> float:
@@ -282,7 +287,7 @@ def _held_by_a_leak(case: Case) -> str:
     """Say how far off its reference the leak of the integral holds a stage; empty without a leak, or at a limit."""
     if not integral_leak(case.stage.flat()) or case.force_limit is not None:
         return ""
-    off = length_at_rest(abs(case.offset), encoder_step(case))
+    off = length_at_rest(abs(case.offset), _tolerance(case))
     return f"rests {off} off its reference: the leak of its integral holds it there"
 
 
@@ -606,8 +611,7 @@ def _swing(case: Case) -> str:
     """Write the size and period of the hunting cycle, such as "±0.52 mm every 1.63 s"."""
     swing = case.judgement.swing
     assert swing  # the verdict implies an attracting cycle
-    turns, step = swing.swings / 2, encoder_step(case)
-    size = plus_minus(swing.amplitude, "m") if swing.amplitude > step else f"by less than ± {with_unit(step, 'm')}"
+    turns, size = swing.swings / 2, plus_minus(swing.amplitude, "m")
     often = f"{size} every {with_unit(swing.period / turns, 's')}"
     if turns == 1:
         return often
@@ -617,7 +621,7 @@ def _swing(case: Case) -> str:
 def _end(case: Case) -> str:
     """Write the residual motion in the last quarter of the run."""
     if case.peak_to_peak < case.bands[1]:
-        return f"at rest, but {length_at_rest(abs(case.offset), encoder_step(case))} off its reference"
+        return f"at rest, but {length_at_rest(abs(case.offset), _tolerance(case))} off its reference"
     if not case.period:
         return f"in its last quarter it still moves by {at_the_end(case)}"
     return f"still {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"

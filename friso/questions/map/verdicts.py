@@ -12,7 +12,7 @@ from friso.hunting.criteria import ATTRACTED
 from friso.questions.map.cells import CellAxis, Look
 from friso.questions.map.settings import map_settings
 from friso.shown.drawing.figure import Area, Array, Arrow, Lettering, Map, Markers, Panel, Series
-from friso.shown.drawing.palette import BLACK, INK, WHITE
+from friso.shown.drawing.palette import BLACK, INK, VERMILLION, WHITE
 from friso.studies.edges import HUNTS_LEVEL, SETTLES_LEVEL, SLOW_LEVEL, MapEdges, OwnLine, coarse_edges, verdict_levels
 
 HUNTS, KICKED, SLOW, SETTLES = "hunts", "bistable", "transient", "settles"
@@ -28,6 +28,9 @@ WRITTEN = {
     SETTLES: ("SETTLES", INK),
 }
 """Words in the regions, and their colours."""
+
+BEHIND_WORDS = {WHITE: VERMILLION}
+"""Colours that cover the hatching behind words, by the colour of the words."""
 
 MapPoint = tuple[float, float]
 """Values [SI] along both axes."""
@@ -154,10 +157,11 @@ def _way(here: MapPoint, ways: tuple[OwnLine, ...], key: str) -> tuple[tuple[Arr
     across = way.key == key
     end = (here[0] * factor, here[1]) if across else (here[0], here[1] * factor)
     colour = WHITE if way.attracts else INK
+    ground = BEHIND_WORDS.get(colour, "")
     half = factor**0.5
     middle = (here[0] * half, here[1]) if across else (here[0], here[1] * half)
-    words = Lettering(*middle, f"× {factor:.3g}", colour, "above" if across else "right")
-    yours = Lettering(*here, "YOURS", colour, "below" if across or factor > 1 else "above")
+    words = Lettering(*middle, f"× {factor:.3g}", colour, "above" if across else "right", ground=ground)
+    yours = Lettering(*here, "YOURS", colour, "below" if across or factor > 1 else "above", ground=ground)
     return (Arrow(here, end, colour),), (words, yours)
 
 
@@ -200,7 +204,8 @@ def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list
     if room.max() < map_settings.room_of_words:
         return None
     at = np.unravel_index(room.argmax(), room.shape)
-    return Lettering(float(x.positions[at[0]]), float(y.positions[at[1]]), text, colour)
+    place = float(x.positions[at[0]]), float(y.positions[at[1]])
+    return Lettering(*place, text, colour, ground=BEHIND_WORDS.get(colour, ""))
 
 
 def _nearest_cell(axis: CellAxis, value: float) -> int:

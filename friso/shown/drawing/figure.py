@@ -143,13 +143,17 @@ class Area:
 
 @dataclass(frozen=True)
 class Lettering:
-    """Words centred at the point x, y, or beside it at the `side` on which the point does not lie."""
+    """Words centred at the point x, y, or beside it at the `side` on which the point does not lie.
+
+    Their `ground` covers what is drawn behind them; without one, it shows.
+    """
 
     x: float
     y: float
     text: str
     colour: str
     side: Literal["", "left", "right", "below", "above"] = ""
+    ground: str = ""
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 
 from friso.errors import InputError
@@ -297,7 +298,9 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
         axes.annotate("", arrow.end, arrow.start, arrowprops=shape)
     for item in panel.words:
         across, up, *shift = SIDES[item.side]
-        place = {"ha": across, "va": up, "xytext": shift, "textcoords": "offset points"}
+        place: dict[str, Any] = {"ha": across, "va": up, "xytext": shift, "textcoords": "offset points"}
+        if item.ground:
+            place["path_effects"] = [withStroke(linewidth=4, foreground=item.ground)]
         axes.annotate(item.text, (item.x, item.y), color=item.colour, weight="bold", parse_math=False, **place)
     if panel.equal:
         axes.set_aspect("equal")

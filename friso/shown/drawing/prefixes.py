@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.axis import unit_shown
+from friso.axis import axis_shown, unit_shown
 from friso.quantities import NOTHING, percent
 from friso.shown.drawing.figure import Array
 
@@ -61,9 +61,14 @@ def pretty(unit: str) -> str:
 
 
 def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
-    """Write a value [unit] with significant `digits`, e.g. "0.52 mm"; a dash without a value."""
+    """Write a value [unit] with significant `digits`, e.g. "0.52 mm"; a dash without a value.
+
+    A length that the encoder of the axis does not see, or that no run resolves, is only said to be shorter than that.
+    """
     if value is None or not math.isfinite(value):
         return NOTHING
+    if unseen(value, unit):
+        return f"< {with_unit(finest_length(), unit)}"
     factor, text = choose(np.array([value]), unit)
     number = value * factor
     if number == 0 or 1e-3 <= abs(number) < 1e5:
@@ -71,13 +76,24 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     return f"{number:.{digits - 1}e} {text}"
 
 
-def length_at_rest(value: float, step: float = 0.0) -> str:
+def finest_length() -> float:
+    """Return the length [m] below which no number is written: a step of the encoder, or a thousandth of a nanometre."""
+    return axis_shown().finest or SOLVED_LENGTH / 1000
+
+
+def unseen(value: float, unit: str) -> bool:
+    """Tell whether a value [unit] is a length that is finer than what is written, but not 0."""
+    return unit == "m" and 0 < abs(value) < finest_length() * (1 - 1e-9)
+
+
+def length_at_rest(value: float, within: float = 0.0) -> str:
     """Write how far [m] a stage still moves.
 
-    Below a nanometre, digits would only show the solver's error, and below a `step` of the encoder [m] nobody sees it.
+    Below a nanometre, digits would only show the solver's error. Nobody sees what is below a step of the encoder, and
+    nobody asks for what is below the tolerance that the stage states, `within` [m].
     """
-    if value < max(step, SOLVED_LENGTH):
-        return f"< {with_unit(step, 'm')}" if step > SOLVED_LENGTH else f"< 1 {unit_shown('nm')}"
+    if value < (least := max(finest_length(), within, SOLVED_LENGTH)):
+        return f"< {with_unit(least, 'm')}"
     return with_unit(value, "m")
 
 
@@ -103,6 +119,8 @@ def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
 
     A wide range has two prefixes. A range whose ends have equal digits is a single number.
     """
+    if unseen(low, unit):
+        return with_unit(high, unit) if unseen(high, unit) else f"{with_unit(low, unit)} to {with_unit(high, unit)}"
     factor, text = choose(np.array([low, high]), unit)
     if 0 < low * factor < 0.01:
         return f"{with_unit(low, unit, digits)} to {with_unit(high, unit, digits)}"
@@ -124,6 +142,8 @@ def window_with_unit(low: float, high: float, searched: tuple[float, float], uni
 
 def plus_minus(half: float, unit: str, digits: int = 3) -> str:
     """Write half a range [unit] with the prefix that suits it, e.g. "±0.52 mm"."""
+    if unseen(half, unit):
+        return f"less than ±{with_unit(finest_length(), unit)}"
     factor, text = choose(np.array([2 * half]), unit)
     return f"±{half * factor:.{digits}g} {text}"
 
