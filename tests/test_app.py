@@ -930,6 +930,14 @@ def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Serv
     assert served.ask("verdict", RIG, UNSTABLE)[-1]["notes"] == [first["text"]]
 
 
+@pytest.mark.parametrize("question", ["verdict", "check"])
+def test_a_verdict_that_leaves_out_an_unstable_drive_is_not_certain(served: Served, question: str) -> None:
+    """The wrist of the examples settles without its delays, with which it buzzes."""
+    answer = served.ask(question, Path(friso.example("robot_wrist")))[-1]
+    assert (answer["verdict"], answer["certain"]) == ("settles", False)
+    assert served.ask(question, RIG)[-1]["certain"]
+
+
 def test_the_cures_of_a_machine_are_those_of_its_check_and_stop_its_hunting(served: Served) -> None:
     """A machine that does not hunt has none."""
     check = served.ask("check", RIG, {"joint.locked": True})[-1]

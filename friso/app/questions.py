@@ -31,6 +31,7 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
+from friso.questions.check.question import lost_as_built
 from friso.questions.logs.question import options_of
 from friso.questions.map.places import SHOWN, with_places
 from friso.shown.cases import COLOURS, case_labels
@@ -211,6 +212,7 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict on the machine in one word, for the joint locked and free if it has one.
 
+    It is not certain of a stage with unknown values, or with a drive whose samples and delays make the loop unstable.
     It is computed as a map of one or two cells, by a search for attractors. The word is "none" for a stage that may
     hunt while its reference keeps moving.
     """
@@ -221,7 +223,8 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
         words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
     work.notes += [*work.meanwhile, *filter(None, [unknown_condition(stage).removesuffix(": ")])]
-    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)]}
+    certain = not stage.doubt and not lost_as_built(stage)
+    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)], "certain": certain}
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -233,6 +236,7 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     stage = asked.machine.stage
     more = {"cases": _labelled(stage, cases), "verdict": cases[_given(stage)], **_lines("check", asked, options)}
     more["cures"] = cures_of(answer.result, _given(stage))
+    more["certain"] = answer.result[_given(stage)].judgement.hunting.certain
     yield parts_of(answer, ghosts, **more)
 
 
