@@ -3,7 +3,8 @@
 Run by `python -m benchmarks.app`. A slider of the thesis rig is moved step by step; each step waits for the picture.
 The benchmark prints medians and 95th percentiles [ms] for the picture, and for the first picture of a map and of the
 Bode plots after the click on their tabs. Then the slider is dragged, a step with every frame that the browser paints.
-It prints the time between frames, and the memory of page and server before and after the drags.
+It prints the time between frames, and the memory of page and server before and after the drags. First comes how much
+of the server's processor time [ms] passes from a value to its verdict, and to its whole answer, on the map.
 """
 
 from __future__ import annotations
@@ -35,6 +36,12 @@ STEP = """async ([place, value]) => {
   slider.dispatchEvent(new Event("input"));
   return painted;
 }"""
+
+
+IS_THERE = {
+    "verdict": "() => !document.querySelector('#verdict .word').inert",
+    "whole answer": "() => window.now().answers.has('check')",
+}
 
 
 SET = """(value) => {
@@ -86,6 +93,10 @@ def main() -> None:
         page.goto(address[0])
         page.wait_for_selector(".js-plotly-plot .main-svg", timeout=120_000)
         page.wait_for_selector("#answer .rest .note", timeout=120_000)
+        page.wait_for_selector("#picture .note", timeout=600_000)  # the map is whole, and nothing is at work
+        _spent(page, psutil.Process(server.pid), 5)
+        page.click("#tab-run")
+        page.wait_for_selector(".plot .main-svg")
         page.evaluate(WATCH)
         _report("picture of a dragged slider", _steps(page, ".plots", chosen.steps))
         page.evaluate("""document.querySelector('[data-path="controller.crossover"] input[type=range]')
@@ -103,6 +114,21 @@ def main() -> None:
 def _steps(page: Any, place: str, count: int) -> list[float]:
     """Return the times [ms] from an input event of the slider to the picture."""
     return [page.evaluate(STEP, [place, 480 + k % 80]) for k in range(count)]
+
+
+def _spent(page: Any, server: psutil.Process, count: int) -> None:
+    """Print the processor time [ms] of the server from a value to what is said of it."""
+    page.evaluate("async () => { window.now = (await import('/shown.js')).now; }")
+    times: dict[str, list[float]] = {what: [] for what in IS_THERE}
+    for k in range(count):
+        begun = sum(server.cpu_times()[:2])
+        page.evaluate(SET, 520 + k)
+        for what, is_there in IS_THERE.items():
+            page.wait_for_function(is_there, timeout=120_000)
+            times[what].append(1000 * (sum(server.cpu_times()[:2]) - begun))
+        page.wait_for_timeout(5000)  # tracks and map
+    for what, spent in times.items():
+        _report(f"processor time to the {what}", spent)
 
 
 def _times(page: Any, tab: str, painted: str, count: int) -> list[float]:

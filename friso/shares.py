@@ -12,7 +12,7 @@ DOUBT_PROBABILITY = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """The probability of an outcome, estimated from runs, with its 95 % interval.
+    """The probability of an outcome, estimated from runs, with its interval, usually of 95 %.
 
     The interval, from `low` to `high` (Clopper, Pearson), holds whatever the outcome of failed runs would have been.
     The probability is NaN if no run succeeded.
@@ -23,16 +23,17 @@ class Share:
     high: float
 
 
-def share(flags: np.ndarray, decided: np.ndarray) -> Share:
+def share(flags: np.ndarray, decided: np.ndarray, doubt: float = DOUBT_PROBABILITY) -> Share:
     """Return the fraction of runs with `flags` set, among those that are `decided`.
 
-    Both arrays have any one shape. The interval allows for either outcome of undecided runs.
+    Both arrays have any one shape. The interval allows for either outcome of undecided runs. It misses the probability
+    with a probability of at most `doubt`.
     """
     count, unknown = np.size(flags), int(np.count_nonzero(~decided))
     hits = int(np.count_nonzero(flags & decided))
     if not count:
         return Share(np.nan, 0.0, 1.0)
-    (low, _), (_, high) = share_interval(hits, count), share_interval(hits + unknown, count)
+    (low, _), (_, high) = share_interval(hits, count, doubt), share_interval(hits + unknown, count, doubt)
     return Share(hits / (count - unknown) if unknown < count else np.nan, low, high)
 
 
@@ -49,14 +50,14 @@ def separation(values: np.ndarray, flags: np.ndarray) -> tuple[float, float]:
     return 2 * float(test.statistic) / (flags.sum() * (~flags).sum()) - 1, float(test.pvalue)
 
 
-def share_interval(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a probability: `hits` of `count` independent trials.
+def share_interval(hits: int, count: int, doubt: float = DOUBT_PROBABILITY) -> tuple[float, float]:
+    """Return the interval of a probability that misses it with a probability of at most `doubt`.
 
-    Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404. SciPy's special functions serve, because its statistics take
-    0.7 s to import.
+    `hits` of `count` independent trials were seen. Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404. SciPy's
+    special functions serve, because its statistics take 0.7 s to import.
     """
     from scipy.special import betaincinv
 
-    low = betaincinv(hits, count - hits + 1, DOUBT_PROBABILITY / 2) if hits else 0.0
-    high = betaincinv(hits + 1, count - hits, 1 - DOUBT_PROBABILITY / 2) if hits < count else 1.0
+    low = betaincinv(hits, count - hits + 1, doubt / 2) if hits else 0.0
+    high = betaincinv(hits + 1, count - hits, 1 - doubt / 2) if hits < count else 1.0
     return float(low), float(high)

@@ -8,6 +8,7 @@ import contextlib
 import errno
 import functools
 import gc
+import hmac
 import http.client
 import io
 import json
@@ -36,7 +37,7 @@ import uvicorn
 from patience import LIMIT, wait_until
 
 import friso
-from friso.app import connections, gate, uploads
+from friso.app import connections, gate, questions, uploads
 from friso.app import machine as machines
 from friso.app.connections import Connection
 from friso.app.gate import Access
@@ -125,7 +126,7 @@ def parts(content: bytes) -> Iterator[Any]:
 def unpacked(value: Any, numbers: bytes) -> Any:
     if isinstance(value, list):
         return [unpacked(item, numbers) for item in value]
-    if isinstance(value, dict) and "shape" in value:
+    if isinstance(value, dict) and isinstance(value.get("shape"), list):
         count = int(np.prod(value["shape"]))
         return np.frombuffer(numbers, "<f4", count, value["array"]).reshape(value["shape"])
     return {key: unpacked(item, numbers) for key, item in value.items()} if isinstance(value, dict) else value
@@ -218,6 +219,55 @@ def test_whoever_has_no_key_and_reads_slowly_is_cut_off_and_a_question_is_not(
         assert answer.result(LIMIT)[-1]["kind"] == "answer"
 
 
+def test_the_large_file_needs_the_key(served: Served) -> None:
+    """Small files are sent at once, however slowly they are read."""
+    assert served.request("GET", "/plotly.js", Authorization=None)[0] == 403
+    public = [served.request("GET", path, Authorization=None) for path in ("/", "/main.js", "/style.css")]
+    assert [status for status, _, _ in public] == [200] * 3
+    assert max(len(content) for _, _, content in public) < 65536
+
+
+def test_a_later_server_lets_in_who_proves_the_secret_and_nobody_else(tmp_path: Path) -> None:
+    store = tmp_path / "secret"
+    first = Access.at("127.0.0.1", 8000, store)
+    later = Access.at("127.0.0.1", 8000, store)
+
+    def proof(secret: str, challenge: str) -> str:
+        return hmac.new(secret.encode(), challenge.encode(), "sha256").hexdigest()
+
+    assert later.is_proven(proof(first.secret, later.challenge))
+    assert not later.is_proven(proof(first.secret, first.challenge))
+    assert not later.is_proven(proof("", later.challenge))
+    token = later.token_for_once()
+    later.session_of(token)
+    later.session_of(token)  # somebody else has seen it, and perhaps the secret
+    assert not later.is_proven(proof(first.secret, later.challenge))
+    assert Access.at("127.0.0.1", 8000, store).secret == later.secret != first.secret
+
+
+def test_what_the_secret_let_in_is_out_once_two_have_seen_a_token(tmp_path: Path) -> None:
+    """Who takes the token of another user also learns the secret: both end as the owner comes."""
+    access = Access.at("127.0.0.1", 8000, tmp_path / "secret")
+    token = access.token_for_once()
+    thief, again = access.session_of(token), access.entered_again
+    assert access.has(thief)
+    assert access.has(again)
+    assert again != access.session
+    access.session_of(token)
+    assert not access.has(thief)
+    assert not access.has(again)
+    assert access.has(access.session)
+
+
+def test_a_page_with_a_key_is_told_the_secret_again(served: Served) -> None:
+    """No browser stores it: a page that is loaded again asks for it."""
+    status, _, content = served.request("POST", "/enter")
+    assert (status, json.loads(content)["secret"]) == (200, served.access.secret)
+    proof = hmac.new(served.access.secret.encode(), served.access.challenge.encode(), "sha256").hexdigest()
+    status, _, content = served.request("POST", "/enter", Authorization=None, Friso_Proof=proof)
+    assert (status, json.loads(content)["key"]) == (200, served.access.entered_again)
+
+
 def test_a_websocket_is_refused_without_advice_on_the_terminal(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -257,7 +307,11 @@ def test_a_browser_that_has_a_file_is_sent_it_again_only_when_it_is_another(serv
 def test_the_token_is_exchanged_for_a_key_and_for_no_cookie(served: Served) -> None:
     """A cookie would go to every server of this name, whatever its port."""
     status, headers, content = served.request("POST", "/enter", Authorization=None, Friso_Token=served.access.token)
-    assert (status, headers["Set-Cookie"], json.loads(content)) == (200, None, {"key": served.access.session})
+    assert (status, headers["Set-Cookie"], json.loads(content)) == (
+        200,
+        None,
+        {"key": served.access.session, "secret": served.access.secret},
+    )
     for token in ("", "wrong", "\xe4", None):
         assert served.request("POST", "/enter", Authorization=None, Friso_Token=token)[0] == 403
 
@@ -352,7 +406,7 @@ def test_a_foreign_page_is_refused_and_one_of_its_own_let_in(served: Served, ori
 def test_every_response_says_what_a_page_may_load(served: Served, path: str, more: dict[str, Any]) -> None:
     headers = served.request("GET", path, **more)[1]
     rules = dict(rule.split(" ", 1) for rule in headers["Content-Security-Policy"].split("; "))
-    assert (rules["default-src"], rules["script-src"], rules["connect-src"]) == ("'none'", "'self'", "'self'")
+    assert (rules["default-src"], rules["script-src"], rules["connect-src"]) == ("'none'", "'self' blob:", "'self'")
     assert headers["X-Content-Type-Options"] == "nosniff"
 
 
@@ -627,7 +681,7 @@ def test_a_run_is_that_of_friso(served: Served) -> None:
     assert part["command"] == words["command"] == "friso simulate lugre_stick_slip.toml"
     lines = [trace for trace in part["figures"][0]["data"] if trace["name"] == "position"]
     assert lines[0]["y"].dtype == np.float32
-    expected = drawable(answer.figures()[0]).panels[0].series[1].y
+    expected = drawable(answer.figures()[0]).panels[1].series[1].y
     assert np.array_equal(lines[0]["y"], expected.astype(np.float32))
 
 
@@ -679,6 +733,27 @@ def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: py
     assert answers[-1]["command"].endswith("--metric outcome --log")
     layout = answers[-1]["figures"][0]["layout"]
     assert layout["xaxis"]["type"] == layout["yaxis"]["type"] == "log"
+
+
+def test_a_map_comes_from_coarse_to_fine_and_ends_as_that_of_friso(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a page shows before its check has ended is the first picture alone, unless the whole map is there."""
+    monkeypatch.setattr(questions, "COARSE_TO_FINE", (2, 4))
+    axes = {"x": "controller.crossover=7 Hz..12 Hz", "y": "friction.static=2.5 N..3.5 N"}
+    given, locked = {**axes, "metric": "sketch"}, {"joint.locked": True}
+
+    def rows(coarse: bool) -> list[int]:
+        """Return the number of rows of each picture that is shown."""
+        shown = [part for part in served.ask("map", RIG, locked, **given, coarse=coarse) if "figures" in part]
+        return [len(part["places"]["y"]) for part in shown]
+
+    assert rows(coarse=True) == [2]
+    whole = served.ask("map", RIG, locked, **given)[-1]
+    expected = friso.sweep(RIG, set=locked, metric="sketch", **{name: f"{text}:4" for name, text in axes.items()})
+    assert whole["sentences"] == [*expected.sentences()]
+    assert whole["figures"][0]["title"] == expected.figures()[0].title
+    assert rows(coarse=True) == [4]
 
 
 def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -853,6 +928,32 @@ def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Serv
     assert "unstable while" in last["sentences"][0]
     assert last["notes"] == []
     assert served.ask("verdict", RIG, UNSTABLE)[-1]["notes"] == [first["text"]]
+
+
+@pytest.mark.parametrize("question", ["verdict", "check"])
+def test_a_verdict_that_leaves_out_an_unstable_drive_is_not_certain(served: Served, question: str) -> None:
+    """The wrist of the examples settles without its delays, with which it buzzes."""
+    answer = served.ask(question, Path(friso.example("robot_wrist")))[-1]
+    assert (answer["verdict"], answer["certain"]) == ("settles", False)
+    assert served.ask(question, RIG)[-1]["certain"]
+
+
+def test_the_cures_of_a_machine_are_those_of_its_check_and_stop_its_hunting(served: Served) -> None:
+    """A machine that does not hunt has none."""
+    check = served.ask("check", RIG, {"joint.locked": True})[-1]
+    faster, free = check["cures"]
+    assert faster["label"].removeprefix("Raise to ") in " ".join(check["sentences"])
+    assert free["values"] == {"joint.locked": False}
+    raised = {"joint.locked": True, "controller.crossover": f"{faster['values']['controller.crossover']} Hz"}
+    assert served.ask("verdict", RIG, raised)[-1]["verdict"] == "settles"
+    assert served.ask("check", RIG)[-1]["cures"] == []
+
+
+def test_tracks_have_the_verdicts_at_their_values_and_other_values_are_refused(served: Served) -> None:
+    tracks = served.ask("tracks", RIG, {"joint.locked": True}, values={"controller.crossover": [8.0, 12.0]})
+    assert tracks[-1]["tracks"] == {"controller.crossover": ["hunts", "settles"]}
+    for values in ({"controller.crossover": ["8 Hz"]}, [1.0], {"controller.crossover": [1.0] * 100}):
+        assert served.ask("tracks", RIG, {}, values=values)[-1]["kind"] == "refused"
 
 
 def test_a_reference_that_keeps_moving_has_no_verdict(served: Served, tmp_path: Path) -> None:

@@ -246,7 +246,7 @@ def test_what_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None
     page.route("**/ask/run", lambda route: runs.append(route))
     with page.expect_request("**/ask/verdict"):
         with page.expect_request("**/ask/run"):
-            browsed.type("controller.crossover", "11 Hz")
+            browsed.type("controller.crossover", "9 Hz")
         page.wait_for_selector("#picture .figure.old[inert]")
         runs[0].continue_()
         page.wait_for_selector("#picture .figure:not(.old, [inert])")
@@ -273,7 +273,7 @@ document.body.append(place);
 
 def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
     """Plots below the visible part are drawn later, when the machine may have changed."""
-    old = browsed.page.evaluate(
+    other = browsed.page.evaluate(
         """async () => {
             const { look, mark, now } = await import('/shown.js');
             PLACE
@@ -284,10 +284,10 @@ def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(b
             while (due()) await new Promise((then) => setTimeout(then, 10));
             const boxes = [...place.querySelectorAll('.figure')];
             place.remove();
-            return boxes.map((box) => box.classList.contains('old'));
+            return boxes.map((box) => box.classList.contains('other'));
         }""".replace("PLACE", PLACE)
     )
-    assert old == [True, True]
+    assert other == [True, True]
 
 
 def test_plots_that_come_in_parts_stay_in_order_and_go_once_it_is_known_that_they_do(browsed: Browsed) -> None:
@@ -532,7 +532,7 @@ def test_what_was_typed_for_one_machine_is_not_set_in_another(browsed: Browsed, 
 
 def test_the_picture_follows_a_slider_which_goes_on_after_a_wrong_value(browsed: Browsed) -> None:
     """A corrected value does not take the slider from under the hand, and one pull is one step."""
-    page, drawn = browsed.page, "document.querySelector('.plot').data.find((line) => line.name === 'position')"
+    page, drawn = browsed.page, "document.querySelector('.plot').data.find((line) => line.name === 'Free (as given)')"
     last = f"JSON.stringify(Array.from({drawn}.y.slice(-40)))"
     browsed.type("controller.crossover", "3 kg")
     page.wait_for_selector(f"{ROW} .wrong")
@@ -601,7 +601,7 @@ def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Brows
 def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_there(browsed: Browsed) -> None:
     page = browsed.page
     page.click("#tab-map")
-    finest = "() => document.querySelector('.plot')?.data?.some((one) => one.z?.length === 41)"
+    finest = "() => document.querySelector('.plot')?.data?.some((one) => one.z?.length === 21)"
     page.wait_for_function(finest)  # a finer map under the pointer takes its run away
     page.wait_for_selector(".plot .heatmaplayer image")
     place = page.locator(".plot .nsewdrag").first.bounding_box()
@@ -799,13 +799,12 @@ def test_the_drawing_of_another_machine_switches_nothing(browsed: Browsed) -> No
     page.route("**/ask/machine", lambda route: held.append(route))
     with page.expect_request(re.compile("ask/machine")):
         browsed.add("b.toml", RIG.read_text() + "\n")
-    assert "thesis_rig" in page.inner_text("#left .older")
+    assert page.locator("#drawing svg, #keys input").filter(visible=True).count() == 0
     page.eval_on_selector("#part-lock", "one => one.dispatchEvent(new MouseEvent('click', { bubbles: true }))")
     assert page.evaluate("document.querySelector('#keys').inert && document.querySelector('#drawing').inert")
     assert browsed.changes() == {}
     held.pop().continue_()
-    page.wait_for_function("() => document.querySelector('#left .older').innerText === ''")
-    page.click("#part-lock")
+    page.click("#part-lock")  # as soon as it is seen
     assert browsed.changes() == {"joint.locked": True}
 
 
@@ -976,9 +975,9 @@ def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: B
     page.click("#tab-map")
     page.select_option("#metric", "outcome")  # done in a moment
     page.wait_for_selector(".plot .heatmaplayer image")
-    page.wait_for_function("() => document.querySelector('.plot').data.some((one) => one.z?.length === 41)")
-    page.wait_for_load_state("networkidle")
-    page.on("request", lambda request: asked.append(request.url))
+    page.wait_for_function("() => document.querySelector('.plot').data.some((one) => one.z?.length === 21)")
+    page.wait_for_selector("#picture progress", state="detached")
+    page.on("request", lambda request: None if request.url.endswith("/begin") else asked.append(request.url))
     height = page.evaluate("document.querySelector('.plot').layout.height")
     page.set_viewport_size({"width": 400, "height": 900})
     page.wait_for_function("height => document.querySelector('.plot').layout.height > height", arg=height)
@@ -1055,6 +1054,195 @@ def test_the_figures_of_a_page_are_drawn_for_its_width_and_axe_finds_no_violatio
         assert wrong == []
     finally:
         page.close()
+
+
+def lines_of(page: Any) -> list[str]:
+    """Return the names of the lines in the first picture."""
+    return page.evaluate("[...document.querySelector('#picture .plot').data].map((line) => line.name)")
+
+
+def test_a_pasted_table_has_a_name_of_its_own(browsed: Browsed) -> None:
+    """Saved as thesis_rig.toml it would stand for the file that was opened."""
+    page = browsed.page
+    page.click("#keys-text")
+    page.fill("#dialog textarea", RIG.read_text(encoding="utf-8").replace("8 Hz", "7 Hz"))
+    page.click("#dialog >> text=Use this text")
+    page.wait_for_selector("#machine-1[aria-selected=true]")
+    assert page.inner_text("#machine-1") == "thesis_rig_2"
+    page.wait_for_function(f"() => document.querySelector('{FIELD}').value === '7 Hz'")
+    page.click("#out")
+    with page.expect_download() as saved:
+        page.click("#dialog >> text=Stage file")
+    assert saved.value.suggested_filename == "thesis_rig_2.toml"
+    page.keyboard.press("Escape")
+
+
+def test_conclusions_whose_verdicts_changed_go_and_so_does_what_is_of_another_machine(browsed: Browsed) -> None:
+    page = browsed.page
+    browsed.answered("The free joint stops the hunting.")
+    page.route("**/ask/check", lambda _: None)
+    browsed.type("controller.crossover", "12 Hz")
+    browsed.answered("Locked: settles.")
+    assert "stops the hunting" not in page.inner_text("#answer")
+    page.route("**/ask/machine", lambda _: None)
+    browsed.add("another.toml")
+    page.wait_for_selector("#answer .other", state="attached")
+    assert page.locator("#answer .case").first.is_hidden()
+
+
+def test_a_cure_is_one_button_and_can_be_taken_back(browsed: Browsed) -> None:
+    page = browsed.page
+    browsed.change({"joint.locked": True})
+    page.wait_for_selector("#verdict strong.hunts")
+    page.click("#verdict button:text-is('Free the joint')")
+    page.wait_for_selector("#verdict strong.settles")
+    assert browsed.changes() == {"joint.locked": False}
+    page.click("#verdict button:text-is('Take back: Free the joint')")
+    page.wait_for_selector("#verdict strong.hunts")
+    assert browsed.changes() == {"joint.locked": True}
+
+
+def test_the_machine_is_dragged_on_its_map_which_stays(browsed: Browsed) -> None:
+    page = browsed.page
+    page.click("#tab-map")
+    page.wait_for_selector(".handle")
+    point, place = (page.locator(name).first.bounding_box() for name in (".handle", ".plot .nsewdrag"))
+    middle = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(place["x"] + 0.2 * place["width"], middle[1], steps=4)
+    page.wait_for_selector("#verdict strong:is(.hunts, .bistable)")
+    page.wait_for_timeout(400)  # longer than what is old stands in colour
+    assert page.locator("#picture .figure:is(.old, [inert])").count() == 0
+    page.mouse.up()
+    assert float(browsed.changes()["controller.crossover"].split()[0]) < 5
+    page.click("#undo")
+    page.wait_for_selector("#verdict strong.settles")
+    page.focus(".handle")
+    page.keyboard.press("ArrowRight")
+    assert float(browsed.changes()["controller.crossover"].split()[0]) > 8
+
+
+def test_the_map_is_refined_once_the_check_has_ended(browsed: Browsed) -> None:
+    """It takes no time from the check, and shows something before."""
+    page, checks, maps = browsed.page, [], []
+    page.click("#tab-map")
+    page.select_option("#metric", "outcome")  # done in a moment
+    page.route("**/ask/check", lambda route: checks.append(route))
+    page.on("requestfinished", lambda request: maps.append(request.url) if "ask/map" in request.url else None)
+    rows = "document.querySelector('.plot')?.data?.find((one) => one.z)?.z.length"
+    with page.expect_request("**/ask/check"):
+        browsed.change({"masses.stage": "0.52 kg"})
+    page.wait_for_function(f"() => {rows} === 6")
+    page.wait_for_function("() => !document.querySelector('.figure').inert")
+    assert page.evaluate(rows) == 6
+    checks[0].continue_()
+    page.wait_for_function(f"() => {rows} === 21")
+    assert len(maps) <= 2
+
+
+def test_a_slider_that_is_let_go_keeps_its_verdict(browsed: Browsed) -> None:
+    page, asked = browsed.page, []
+    page.wait_for_selector("#answer .rest .note")
+    page.on("request", lambda request: asked.append(request.url.rpartition("/")[2]))
+    place = page.locator(f"{ROW} input[type=range]").bounding_box()
+    page.mouse.move(place["x"] + 0.7 * place["width"], place["y"] + 2)
+    with page.expect_response("**/ask/verdict"):
+        page.mouse.down()
+    page.wait_for_function("() => !document.querySelector('#verdict .word').inert")
+    with page.expect_request("**/ask/check"):
+        page.mouse.up()
+    assert asked.count("verdict") == 1
+
+
+def test_a_text_that_is_called_shape_stays_one_beside_arrays(browsed: Browsed) -> None:
+    """A hatching has one."""
+    read = browsed.page.evaluate(
+        """async bytes => {
+            const { frames } = await import('/wire.js');
+            const chunks = [{ value: new Uint8Array(bytes) }, { done: true }];
+            for await (const part of frames({ read: async () => chunks.shift() })) return { ...part, x: [...part.x] };
+        }""",
+        [*frame({"fillpattern": {"shape": "/"}, "x": np.arange(3.0)})],
+    )
+    assert read == {"fillpattern": {"shape": "/"}, "x": [0, 1, 2]}
+
+
+def test_tracks_of_sliders_have_the_colours_of_verdicts(browsed: Browsed) -> None:
+    page = browsed.page
+    track = f"document.querySelector('{ROW} input[type=range]').style.getPropertyValue('--track')"
+    page.wait_for_function(f"() => {track}.includes('#d55e00') && {track}.includes('#009e73')")
+
+
+def test_a_run_shows_the_error_first_with_the_joint_locked_and_free(browsed: Browsed) -> None:
+    page = browsed.page
+    page.wait_for_function("() => document.querySelector('.plot')?.layout?.yaxis.title.text.startsWith('Error')")
+    assert {"Locked", "Free (as given)"} <= {*lines_of(page)[:2]}
+
+
+def test_a_logged_run_lies_over_the_simulated_one(browsed: Browsed, tmp_path: Path) -> None:
+    page = browsed.page
+    browsed.no_logs()
+    page.set_input_files("#log-files", written(tmp_path))
+    page.wait_for_selector("#identify")
+    page.click("#tab-run")
+    page.wait_for_function(
+        "() => document.querySelector('#picture .plot')?.data?.some((line) => line.name === 'logged')"
+    )
+    browsed.no_logs()
+
+
+def test_on_a_narrow_page_verdict_and_a_small_picture_stay_above_the_sliders(browsed: Browsed) -> None:
+    page = browsed.page
+    page.wait_for_selector("#verdict strong")
+    page.set_viewport_size({"width": 400, "height": 900})
+    page.wait_for_selector("#small .main-svg")
+    page.locator(f"{ROW} input[type=range]").scroll_into_view_if_needed()
+    page.evaluate("document.querySelector('#keys').scrollIntoView()")
+    glance, slider = (page.locator(name).bounding_box() for name in ("#glance", f"{ROW} input[type=range]"))
+    assert glance["y"] >= 0
+    assert glance["height"] < 300
+    assert slider["x"] + slider["width"] <= 400
+    assert page.locator("#small").is_visible()
+
+
+def test_bare_numbers_take_the_unit_that_is_shown(browsed: Browsed) -> None:
+    page = browsed.page
+    browsed.type("controller.crossover", "9")
+    page.wait_for_function(f"() => document.querySelector('{FIELD}').value === '9 Hz'")
+    assert browsed.changes() == {"controller.crossover": "9 Hz"}
+    page.click("#tab-map")
+    page.fill("#x-from", "3")
+    page.keyboard.press("Tab")
+    assert page.input_value("#x-from") == "3 Hz"
+    page.click("#tab-remedies")
+    page.fill("#within", "2")
+    page.keyboard.press("Tab")
+    assert page.input_value("#within") == "2 um"
+
+
+def test_a_server_that_ends_is_said_so_and_its_restart_is_found_again(browsed: Browsed) -> None:
+    """The page asks nothing, and opens no other address."""
+    command = [sys.executable, "-c", SERVER, "app", str(RIG), "--no-browser", "--port"]
+    context = browsed.page.context.browser.new_context()
+    with subprocess.Popen([*command, "0"], stdout=subprocess.PIPE, text=True) as first:
+        assert first.stdout is not None
+        token = re.search(r"http://\S+", first.stdout.readline())
+        assert token is not None
+        page = context.new_page()
+        page.goto(token[0])
+        page.wait_for_selector("[data-part=controller]")
+        first.terminate()
+        page.wait_for_selector("#trouble:not([hidden])")
+    port = re.search(r":(\d+)/", token[0])
+    assert port is not None
+    with subprocess.Popen([*command, port[1]], stdout=subprocess.PIPE, text=True) as second:
+        try:
+            page.wait_for_selector("#trouble", state="hidden")
+            page.wait_for_selector("#verdict strong")
+        finally:
+            second.terminate()
+            context.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

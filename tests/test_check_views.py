@@ -193,7 +193,7 @@ def test_cycles_that_attract_are_solid_and_others_dashed():
 
 def test_response_of_one_run():
     figure = response_figure(fake_trace())
-    titles = ["Position", "Error", "Actuator force", "Joint deflection"]
+    titles = ["Error", "Position", "Actuator force", "Joint deflection"]
     assert [panel.title for panel in figure.panels] == titles
     assert figure.subject == "Thesis rig"
     assert same(mpl_arrays(figure), plotly_arrays(figure))

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import friso
+from friso.drives.elements import root_of
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
 from friso.drives.questions import UserAnswers
@@ -330,3 +331,10 @@ def test_no_damage_to_a_file_raises_anything_but_one_message(
     path.write_text(text[:first] + data.draw(strange) + text[first + size :], "utf-8")
     with suppress(InputError):
         stage_from(path, None, ANSWERS[kind])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1", "nobody-knows"])
+def test_xml_counts_as_it_was_read_whatever_encoding_it_declares(encoding: str) -> None:
+    """The text has been decoded before."""
+    root = root_of(f'<?xml version="1.0" encoding="{encoding}"?><a b="ü"/>', "as a drive writes it")
+    assert root.get("b") == "ü"

@@ -8,16 +8,20 @@ import sys
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from target_stages import CONTROLLERS, MACHINES
+from target_stages import CONTROLLERS, EXAMPLES, MACHINES
 from test_targets import COMPILERS, STRICT, TRAPS, machined, needs_compiler, swing_of, written
 
+import friso
 from friso.drives.target import TARGETS, Parcel
 from friso.drives.targets import fmu
+from friso.errors import InputError
+from friso.questions.export.parcel import packed
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, which runs FMUs, is not installed")
 validation = pytest.importorskip("fmpy.validation")
@@ -182,10 +186,72 @@ def test_two_coupled_fmus_hunt_as_friso_s_machine(tmp_path: Path, version: str) 
 
 
 def test_without_a_compiler_sources_are_written_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fmu, "COMPILERS", ())
-    monkeypatch.setattr(fmu, "_binary", fmu._binary.__wrapped__)
+    """A compiler that refuses everything, as the empty shell of macOS does, is none."""
+    monkeypatch.setattr(fmu, "COMPILERS", (sys.executable,))
+    for name in ("_binary", "_compiler"):
+        monkeypatch.setattr(fmu, name, getattr(fmu, name).__wrapped__)
     assert "Not compiled" in TARGETS["fmu"].remark()
     model = fmu._models(parcel())[0]
     names = zipfile.ZipFile(fmu.BytesIO(fmu._archive(parcel(), model, "3"))).namelist()
     assert not any(name.startswith("binaries") for name in names)
     assert {"sources/axis.c", "sources/fmi3.c", "sources/buildDescription.xml", "modelDescription.xml"} <= {*names}
+
+
+@pytest.mark.parametrize(("system", "processor", "names"), [
+    ("darwin", "arm64", ["aarch64-darwin"]),
+    ("darwin", "x86_64", ["darwin64", "x86_64-darwin"]),
+    ("linux", "aarch64", ["aarch64-linux"]),
+    ("linux", "x86_64", ["linux64", "x86_64-linux"]),
+    ("win32", "AMD64", []),
+])  # fmt: skip
+def test_the_remark_names_the_folders_that_there_are(
+    monkeypatch: pytest.MonkeyPatch, system: str, processor: str, names: list[str]
+) -> None:
+    monkeypatch.setattr(fmu, "_compiler", lambda: "cc")
+    monkeypatch.setattr(fmu.sys, "platform", system)
+    monkeypatch.setattr(fmu.platform, "machine", lambda: processor)
+    folders = [fmu._folder(version) for version in "23"]
+    remark = TARGETS["fmu"].remark()
+    assert [one for one in folders if one] == names == [one for one in names if one in remark]
+    assert ("Not compiled" in remark) is (not names)
+
+
+def test_a_name_of_a_stage_stays_a_comment_of_the_test() -> None:
+    """It ends no text and no comment, whatever it is."""
+    lines = ['say """; raise SystemExit', "\\u12 \\N{x}", 'ends in "', "*/ int evil; /* x"]
+    files = TARGETS["fmu"].files(replace(parcel(), header=lines))
+    compile(files["axis_test.py"], "axis_test.py", "exec")
+    assert all(f"# {line}\n" in files["axis_test.py"] for line in lines)
+    code = TARGETS["c"].files(replace(parcel(), header=lines))["axis.c"]
+    assert code.count("/*") == code.count("*/")
+    assert "* / int evil; / * x" in code
+
+
+def test_an_fmu_keeps_its_clock() -> None:
+    """Sample time is no variable, as the clock of an archive does not follow it."""
+    for model in fmu._models(parcel()):
+        assert "drive.sample_time" not in {one.name for one in model.variables}
+    assert "drive.sample_time" in {str(one) for one in parcel().program.parameters}
+
+
+@pytest.mark.parametrize("name", ["model", "fmi2", "fmi3", "math"])
+def test_names_of_the_interface_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match=f'"{name}", a word of FMI'):
+        TARGETS["fmu"].check_names(name, parcel().program)
+
+
+@pytest.mark.parametrize(("changes", "answers", "powers"), [
+    ({"drive.force_per_output": "0.5 N*m"}, {}, None),
+    ({}, {"motor_constant": "0.5 N*m/A"}, {"A": 1, "kg": -1, "m": -2, "s": 2}),
+])  # fmt: skip
+def test_outputs_have_their_units(
+    changes: dict[str, str], answers: dict[str, str], powers: dict[str, int] | None
+) -> None:
+    """Also on a rotary axis, whose output per torque is one per newton metre; a drive's output has none."""
+    stage = friso.load(EXAMPLES / "robot_wrist.toml").replace(changes)
+    parcel = packed(stage, TARGETS["fmu"], "axis", answers, 50, plant=True)
+    model = fmu._models(parcel)[0]
+    description = zipfile.ZipFile(fmu.BytesIO(fmu._archive(parcel, model, "2"))).read("modelDescription.xml").decode()
+    assert ('unit="A"' in description) is (powers is not None)
+    assert powers is None or fmu._powers(parcel.units["output.per_newton"]) == powers
+    assert "rad with 16 steps" in TARGETS["c"].files(parcel)["axis_machine.h"]

@@ -134,6 +134,17 @@ def test_settings_against_friction_leave_friso(settings: dict[str, Any]) -> None
     assert parcel.program.steps != parcel_of("van_dijk_notch", "rigid_lugre").program.steps
 
 
+def test_windows_in_a_position_loop_leave_friso() -> None:
+    """They act at the samples of the slower loop, with its integral and with all that pauses or empties it."""
+    own = {"windows_in_position_loop": True, "position_integral_time": "100 ms", "freeze_window": "1 um"}
+    own |= {"freeze_window_exit": "5 um", "freeze_window_time": "5 ms", "standstill_window": "20 um"}
+    own |= {"standstill_factor": 0.5, "integral_deadband": "2 um", "integral_rests_in_moves": True}
+    changes = {f"controller.{key}": value for key, value in own.items()}
+    parcel = packed(stage_of("cascade", "isolator").replace(changes), TARGETS["st"], "axis", {}, SHORT)
+    rows = parcel.vector.table
+    assert np.abs(outputs_in_text(parcel, rows)[:, 0] - np.array(rows)[1:, -1]).max() <= parcel.tolerance
+
+
 def test_every_kind_of_stage_leaves_friso() -> None:
     """Every controller that the tests know, and every example, is written and reproduces its run in structured text."""
     from variants import VARIANTS

@@ -5,21 +5,27 @@ The browser exchanges the token for a key, which it sends with every later reque
 
 from __future__ import annotations
 
+import hmac
 import logging
 import secrets
 import time
 from collections.abc import Set
+from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from friso.platform.private import read_private, write_private
+
 POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "default-src 'none'; script-src 'self' blob:; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""Sources that a page may load: this server alone, scripts only from files. plotly.js makes style elements itself."""
+"""Sources that a page may load: this server alone, scripts from files and from what the page has fetched with its key
+(plotly.js, which makes style elements itself)."""
 
 HEADERS = {
     "Content-Security-Policy": POLICY,
@@ -33,7 +39,7 @@ HEADERS = {
 
 REFUSED = (
     "friso app answers only the browser that was opened with the address it printed: open that address. "
-    "After a restart the server prints a new one.\n"
+    "After a restart at another port the server prints a new one.\n"
 )
 
 
@@ -54,6 +60,10 @@ ENTRY = "/enter"
 TOKEN = "friso-token"
 """Header that holds a token."""
 
+PROOF, CHALLENGE = "friso-proof", "friso-challenge"
+"""Headers by which a page that an earlier server at this port let in proves it: it knows the secret, which it never
+sends, so that no other program at this port learns it."""
+
 LET_IN = "friso.let_in"
 """Marker in the scope of a request that came with a key."""
 
@@ -62,12 +72,14 @@ BEARER = "Bearer "
 are sent to all servers of the same name, whatever their port."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Access:
     """The names under which the server answers, and the secrets that let a browser in.
 
     `hosts` holds names with the port. `token` stands in the address that friso prints, and stays valid. A browser
-    exchanges it for `session`, the key of later requests.
+    exchanges it for `session`, the key of later requests, and for the `secret` by which it enters a later server at
+    the same port, with the key `entered_again`. The secret is kept in the file `store`, if there is one; with it ends
+    the key.
     """
 
     hosts: frozenset[str]
@@ -77,10 +89,32 @@ class Access:
     """One-time tokens, each with the time [s] at which it was made and the session that it began, "" before."""
     ended: set[str] = field(default_factory=set)
     """Sessions that are over."""
+    challenge: str = field(default_factory=lambda: secrets.token_urlsafe(32))
+    """Text from which this server's proofs are made."""
+    store: Path | None = None
+    secret: str = ""
+    entered_again: str = field(default_factory=lambda: secrets.token_urlsafe(32))
+
+    def __post_init__(self) -> None:
+        with suppress(OSError, UnicodeDecodeError):
+            self.secret = read_private(self.store).decode("ascii") if self.store else ""
+        if not self.secret:
+            self._renew()
+
+    def _renew(self) -> None:
+        """Make a new secret: no earlier page enters with the old one, and what entered with it is out."""
+        self.secret, self.entered_again = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
+        if self.store:
+            with suppress(OSError):  # then pages are not let in again
+                write_private(self.store, self.secret.encode("ascii"))
+
+    def is_proven(self, proof: str) -> bool:
+        """Tell whether a proof was made from this server's challenge by a page that knows the secret."""
+        return _same(proof, hmac.new(self.secret.encode(), self.challenge.encode(), "sha256").hexdigest())
 
     @classmethod
-    def at(cls, host: str, port: int) -> Access:
-        """Return the access to a server at a host and port.
+    def at(cls, host: str, port: int, store: Path | None = None) -> Access:
+        """Return the access to a server at a host and port, whose secret is kept in the file `store`.
 
         A host such as localhost, which means this machine alone, may also be called by its other names, such as
         127.0.0.1.
@@ -88,7 +122,7 @@ class Access:
         named = (f"[{host}]" if ":" in host else host).lower()
         names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
         hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP_PORT else set())
-        return cls(frozenset(hosts))
+        return cls(frozenset(hosts), store=store)
 
     def token_for_once(self) -> str:
         """Return a new token that is valid once, for the address that friso opens in a browser.
@@ -125,13 +159,14 @@ class Access:
                 return session
             if session and session not in self.ended and not _same(key, session):
                 self.ended.add(session)
+                self._renew()
                 LOGGER.warning(TWICE)
         return self.session if _same(token, self.token) else ""
 
     def has(self, key: str) -> bool:
         """Tell whether a key belongs to a session that has not ended."""
         begun = {session for _, session in self.once.values() if session}
-        return any(_same(key, session) for session in {self.session, *begun} - self.ended)
+        return any(_same(key, session) for session in {self.session, self.entered_again, *begun} - self.ended)
 
 
 HTTP_PORT = 80
@@ -180,15 +215,20 @@ class Gate:
         key = headers.get("authorization", "").removeprefix(BEARER)
         if path == ENTRY and scope["method"] == "POST":
             session = access.session_of(headers.get(TOKEN, ""), key)
-            return JSONResponse({"key": session}) if session else _refused()
+            if not session and access.is_proven(headers.get(PROOF, "")):
+                session = access.entered_again
+            elif not session and access.has(key):
+                session = key
+            entered = {"key": session, "secret": access.secret}
+            return JSONResponse(entered) if session else _refused({CHALLENGE: access.challenge})
         if access.has(key):
             scope[LET_IN] = True
             return None
         return None if path in self.public else _refused()
 
 
-def _refused() -> Response:
-    return PlainTextResponse(REFUSED, 403)
+def _refused(headers: dict[str, str] | None = None) -> Response:
+    return PlainTextResponse(REFUSED, 403, headers)
 
 
 def _same(one: str, other: str) -> bool:

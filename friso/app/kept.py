@@ -30,11 +30,17 @@ class KeptAnswers:
         self._turn = Lock()
 
     def answer(
-        self, function: Callable[..., Answer], machine: Machine, work: Work, options: Mapping[str, Any] | None = None
+        self,
+        function: Callable[..., Answer],
+        machine: Machine,
+        work: Work,
+        options: Mapping[str, Any] | None = None,
+        compute: Callable[[], Answer] | None = None,
     ) -> Any:
         """Return a function's answer about a machine, computed now or kept from before.
 
-        `options` are those of the function. The warnings that came with a kept answer are added to the `work` again.
+        `options` are those of the function. `compute` computes the same answer from what is there already. The warnings
+        that came with a kept answer are added to the `work` again.
         Raises whatever the function raises.
         """
         place = _place(machine, options)
@@ -45,7 +51,7 @@ class KeptAnswers:
                 work.notes += there[1]
                 return there[0]
         before = len(work.notes)
-        answer = function(machine.stage, **(options or {}), progress=work.progress)
+        answer = compute() if compute else function(machine.stage, **(options or {}), progress=work.progress)
         with self._turn:
             kept[place] = answer, work.notes[before:]
             while len(kept) > KEPT_ANSWERS:

@@ -13,21 +13,28 @@ from typing import TYPE_CHECKING, Any
 import friso
 from friso.app import machine as machines
 from friso.app.archive import archive
+from friso.app.cures import cures_of
 from friso.app.frames import figure_on_page
-from friso.app.ghosts import ghosts_of, with_edge
+from friso.app.ghosts import ghosts_of, with_edge, with_log, with_other_joint
 from friso.app.kept import KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
+from friso.app.maps import home_of, located, sketched, tracks_of, without_own
+from friso.app.settings import app_settings
 from friso.app.uploads import Uploads
 from friso.axis import speaking_of
 from friso.equations.motion import rests
 from friso.errors import InputError
 from friso.hunting import cannot_hunt, is_moved_evenly
+from friso.identification.logs.assemble import read_log
+from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
+from friso.questions.check.question import lost_as_built
+from friso.questions.logs.question import options_of
 from friso.questions.map.places import SHOWN, with_places
-from friso.shown.cases import case_labels
+from friso.shown.cases import COLOURS, case_labels
 from friso.shown.drawing.figure import Figure
 from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
@@ -158,11 +165,34 @@ def _other(name: str, asked: PageRequest, work: Work) -> Answer:
 
 def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the run: first its figures, then its sentences, which need measurements of the run."""
-    asked.chosen()
+    log = _logged(asked) if asked.options else None
     ghosts = _ghosts(asked, work, friso.simulate)
-    answer, lines = friso.simulate(asked.machine.stage), _lines("simulate", asked)
-    yield {**figures_of(answer, ghosts), **lines, "kind": "partly"}
+    stage = asked.machine.stage
+    answer, lines = friso.simulate(stage), _lines("simulate", asked)
+    others = {name: case for name, case in stage.variants().items() if name not in ("given", _given(stage))}
+
+    def drawn(figure: Figure) -> Figure:
+        """Lay the other state of the joint, the logged run and the pinned machine beside a run."""
+        for name, case in others.items():
+            (other,) = friso.simulate(case).figures()
+            own = case_labels(stage)[_given(stage)], COLOURS[_given(stage)]
+            figure = with_other_joint(figure, other, own, (case_labels(stage)[name], COLOURS[name]))
+        if log:
+            run = answer.result
+            figure = with_log(figure, log, run["reference"].to_numpy(), run["time"].to_numpy())
+        return ghosts(figure)
+
+    yield {**figures_of(answer, drawn), **lines, "kind": "partly"}
     yield {**words_of(answer), **lines}
+
+
+def _logged(asked: PageRequest) -> Log:
+    """Return the first of the dropped files as a log of positions."""
+    if unknown := {*asked.options} - {"files", "map", "unit", "scale", "dt"}:
+        raise InputError("options", ", ".join(sorted(unknown)), "files that were dropped, and what is said of them")
+    files, assigned = _dropped(asked)
+    with _named_as_dropped():
+        return read_log(files[0], options_of(**{"dt": None, **assigned}))
 
 
 def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -182,6 +212,7 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict on the machine in one word, for the joint locked and free if it has one.
 
+    It is not certain of a stage with unknown values, or with a drive whose samples and delays make the loop unstable.
     It is computed as a map of one or two cells, by a search for attractors. The word is "none" for a stage that may
     hunt while its reference keeps moving.
     """
@@ -192,7 +223,8 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
         words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
     work.notes += [*work.meanwhile, *filter(None, [unknown_condition(stage).removesuffix(": ")])]
-    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)]}
+    certain = not stage.doubt and not lost_as_built(stage)
+    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)], "certain": certain}
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -203,6 +235,8 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     cases = {name: case.verdict for name, case in answer.result.items()}
     stage = asked.machine.stage
     more = {"cases": _labelled(stage, cases), "verdict": cases[_given(stage)], **_lines("check", asked, options)}
+    more["cures"] = cures_of(answer.result, _given(stage))
+    more["certain"] = answer.result[_given(stage)].judgement.hunting.certain
     yield parts_of(answer, ghosts, **more)
 
 
@@ -246,25 +280,27 @@ def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "check": ("draws",),
-    "map": ("x", "y", "log", "metric", "edge"),
+    "map": ("x", "y", "log", "metric", "edge", "coarse"),
     "boundary": ("x", "y", "log"),
     "tune": ("within", "settle", "force_limit", "bandwidth_limit", "margin", "only", "keep"),
 }
 """The options that a page may set, by command."""
 
-COARSE_TO_FINE = (6, 21, 41)
-"""Numbers of points along each axis of a map, in the order of its pictures."""
+COARSE_TO_FINE = (6, 21)
+"""Numbers of points along each axis of a map, in the order of its pictures. The last one has its edges located."""
 
 
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield a map over two keys from coarse to fine, with marks where the machines lie in it.
 
-    If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead.
+    If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead. With the option
+    `coarse` the first picture is all, unless the map is there: a page asks for more once its verdict is known.
     """
     options = asked.chosen(*OPTIONS["map"])
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
     metric, stage = str(options.get("metric", "outcome")), asked.machine.stage
+    home = home_of(asked.machine, [*keys.values()])
     if metric == "sketch" and not rests(stage.flat()):  # there is a verdict only where the reference comes to stand
         metric = "stick_slip" if is_moved_evenly(stage) else "outcome"
     shown = {"metric": metric, "log": options.get("log", False)}
@@ -273,24 +309,36 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         """Return the ranges of both axes with `count` points."""
         return {name: f"{text}:{count}" for name, text in axes.items()}
 
-    def swept(count: int) -> SweepAnswer:
-        """Return the map with `count` points along each axis."""
-        return KEPT.answer(friso.sweep, asked.machine, work, {**ranges(count), **shown})
+    def cells(count: int) -> SweepAnswer:
+        """Return the map with `count` points along each axis, without located edges."""
+        return KEPT.answer(sketched, home, work, {**ranges(count), **shown})
 
-    def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
-        """Return a map as the page shows it, with the machines and the edge of hunting on it."""
+    def part(answer: SweepAnswer, count: int, edge: Answer | None = None, title: str = "") -> AnswerPart:
+        """Return a map as the page shows it, with the machines and the edge of hunting on it.
+
+        `title` stands above it instead of what it shows.
+        """
 
         def drawn(figure: Figure) -> Figure:
-            return with_edge(_on_map(figure, asked, [*keys.values()]), edge)
+            titled = replace(figure, title=title or figure.title)
+            return with_edge(_on_map(titled, asked, [*keys.values()]), edge)
 
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges(count), **shown}, "sweep")}
-        return parts_of(answer, drawn, **more)
+        if home == asked.machine:
+            return parts_of(answer, drawn, **more)
+        words = {**words_of(answer), "sentences": [], "details": []}  # they are about the place of another machine
+        return {**figures_of(answer, drawn, lambda: without_own(answer)), **words, **more}
 
-    *coarse, finest = COARSE_TO_FINE
-    for count in coarse:
-        yield {**part(swept(count), count), "kind": "partly"}
-    answer = swept(finest)
+    finest = COARSE_TO_FINE[-1]
+    whole_options = {**ranges(finest), **shown}
+    if not KEPT.holds(friso.sweep, home, whole_options):
+        for count in COARSE_TO_FINE:
+            title = f"A first look: {count} by {count} cells, whose edges are not located yet"
+            yield {**part(cells(count), count, title=title), "kind": "partly", "sentences": [], "details": []}
+            if options.get("coarse"):
+                return
+    answer = KEPT.answer(friso.sweep, home, work, whole_options, lambda: located(cells(finest), work.progress))
     whole = part(answer, finest)
     if options.get("edge"):
         yield {**whole, "kind": "partly"}
@@ -301,6 +349,25 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         except InputError as error:  # such as a stage that cannot hunt: its map is shown all the same
             whole["sentences"] += [str(error)]
     yield whole
+
+
+def tracks(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
+    """Yield the verdict at values [SI] along the sliders of keys; none for a stage without a verdict."""
+    stage, said = asked.machine.stage, asked.options.get("values")
+    most, columns = app_settings.most_values, said.values() if isinstance(said, Mapping) else [None]
+    if not all(isinstance(one, list) and len(one) <= most and all(map(_is_number, one)) for one in columns):
+        raise InputError("values", "something else", f"at most {most} values by key")
+    fields, sought = numeric_keys(stage.flat()), rests(stage.flat())
+    values = {
+        key: [exactly(float(value), fields[key].unit) for value in column]
+        for key, column in dict(said or {}).items()
+        if sought and key in fields and isinstance(stage.flat().get(key), float)
+    }
+    yield {"kind": "answer", "tracks": tracks_of(stage, values, work.progress) if values else {}}
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:
@@ -466,6 +533,7 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
     "loops": loops,
     "flexure": flexure,
     "map": map_study,
+    "tracks": tracks,
     "boundary": boundary,
     "tune": tune,
     "design": design,
@@ -477,8 +545,8 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
 QUICK = frozenset({"machine"})
 """The questions that need no computation."""
 
-PICTURES = frozenset({"run", "cell", "loops", "bode", "flexure", "map"})
-"""The questions whose first part is a picture that appears soon; all other questions wait for it."""
+FIRST = frozenset({"verdict", "run", "cell", "loops", "bode", "flexure", "map"})
+"""The questions whose first part, a verdict or a picture, appears soon; all other questions wait for it."""
 
 
 def _answered(command: str, asked: PageRequest, work: Work) -> Answer:
@@ -493,7 +561,7 @@ def _mapped(asked: PageRequest, work: Work) -> Answer:
     The edge of hunting belongs to the command boundary and is left out.
     """
     options = asked.chosen(*OPTIONS["map"])
-    options.pop("edge", None)
+    options = {name: value for name, value in options.items() if name not in ("edge", "coarse")}
     options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
     return KEPT.answer(friso.sweep, asked.machine, work, options)
 

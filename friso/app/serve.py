@@ -20,6 +20,7 @@ from friso.app.connections import MOST_CONNECTIONS, Connection, Once, failed
 from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
 from friso.app.work import Workshop
+from friso.engine.cache import cache_folder
 from friso.errors import InputError
 from friso.interface.starting import example
 from friso.platform.early import SIGNALS
@@ -57,7 +58,7 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
         raise InputError("--host", host, "the name or address by which others reach this machine", "--host rig.local")
     listener = listening(host, port)
     own = listener.getsockname()[1]
-    access = Access.at(host, own)
+    access = Access.at(host, own, cache_folder() / f"app-{own}.secret")
     named = f"[{host}]" if ":" in host else host
     address = f"http://{named}:{own}/?token="
     print(f"friso app: {address}{access.token}\nCtrl-C ends it.", flush=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from hashlib import sha256
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -18,7 +18,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
-from friso.app.questions import PICTURES, QUICK, PageRequest, job_of
+from friso.app.questions import FIRST, QUICK, PageRequest, job_of
 from friso.app.uploads import Uploads
 from friso.app.work import Workshop
 from friso.errors import InputError
@@ -55,7 +55,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]
         number = data.get("number")
         number = number if isinstance(number, int) else 0
-        frames = workshop.answer(page, lane, number, partial(job, asked), name in QUICK, name in PICTURES)
+        frames = workshop.answer(page, lane, number, partial(job, asked), name in QUICK, name in FIRST)
         return StreamingResponse(frames, media_type=BINARY)
 
     async def started_with(request: Request) -> Response:
@@ -94,7 +94,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         Route("/{file}", _page),
     ]
     gone = {ClientDisconnect: _gone}
-    public = {"/", PLOTLY, *(f"/{name}" for name in _page_files())}
+    public = {"/", *(f"/{name}" for name in _page_files())}  # small: a slow reader of the large one needs the key
     return Gate(Starlette(routes=routes, lifespan=lifespan, exception_handlers=gone), access, public)
 
 
@@ -137,7 +137,7 @@ CHUNK_BYTES = 65536
 
 def _file(request: Request, content: bytes, kind: str) -> Response:
     """Send a file in chunks, or only confirm that the browser already has this content."""
-    mark = f'"{sha256(content).hexdigest()}"'
+    mark = _mark(content)
     headers = {"ETag": mark, "Cache-Control": "no-cache"}  # the browser must ask whether the file has changed
     if mark in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
@@ -148,6 +148,11 @@ def _file(request: Request, content: bytes, kind: str) -> Response:
 
     headers["Content-Length"] = str(len(content))
     return StreamingResponse(chunks(), headers=headers, media_type=kind)
+
+
+@lru_cache(64)
+def _mark(content: bytes) -> str:
+    return f'"{sha256(content).hexdigest()}"'
 
 
 async def _json(request: Request) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from friso.drives.languages import c_language, commented
 from friso.drives.machine import FORCE, GAMMA, MachineRun, StraightCode
-from friso.drives.program import identifier
+from friso.drives.program import POSITION, identifier
 from friso.drives.target import Parcel
 from friso.equations.component import STEADY
 
@@ -227,7 +227,8 @@ def machine_files(parcel: Parcel) -> Mapping[str, str]:
 def _usage(parcel: Parcel, run: MachineRun) -> list[str]:
     """Say how the machine is used, and how far it is from friso."""
     name, machine = parcel.name, run.machine
-    differences = ", ".join(f"{difference:.1e} m with {steps}" for steps, difference in run.differences.items())
+    unit = parcel.units[str(POSITION)]
+    differences = ", ".join(f"{difference:.1e} {unit} with {steps}" for steps, difference in run.differences.items())
     return [
         "",
         f"The machine with its friction as a plant. Call {name}_machine_defaults and {name}_machine_init once. Then,",

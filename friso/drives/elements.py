@@ -16,6 +16,6 @@ def root_of(text: str, expected: str) -> ElementTree.Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError("", "a document type", f"an XML file without one, {expected}")
     try:
-        return ElementTree.fromstring(text.encode())
+        return ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError("", f"no XML: {error}", f"a file {expected}") from None

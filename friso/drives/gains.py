@@ -15,6 +15,9 @@ from friso.quantities import quoted
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
+DRIVE_OUTPUT = "output of the drive"
+"""What stands for a unit where the output of a drive has none."""
+
 
 @dataclass(frozen=True)
 class Gains:
@@ -74,7 +77,7 @@ def output_of(stage: Stage, user_values: Mapping[str, Any]) -> tuple[str, float]
     if per_ampere := Turn.of(flat, answers, stage.axis_kind.exerts).per_ampere:
         return "A", 1 / per_ampere
     if of_output := flat.get("drive.force_per_output"):
-        return "output of the drive", 1 / of_output
+        return DRIVE_OUTPUT, 1 / of_output
     return stage.axis_kind.unit("N"), 1.0
 
 

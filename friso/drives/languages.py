@@ -163,4 +163,4 @@ def c_language(real: str = "double") -> Language:
 
 def commented(lines: Iterable[str]) -> list[str]:
     """Return a comment in C of some lines."""
-    return ["/*", *(f" * {line.replace('*/', '* /')}".rstrip() for line in lines), " */"]
+    return ["/*", *(f" * {line.replace('*/', '* /').replace('/*', '/ *')}".rstrip() for line in lines), " */"]

@@ -20,7 +20,7 @@ from friso_thesis.studies.thesis.judges.control_law import (
     judged_formulas,
 )
 from friso_thesis.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, analysed
-from friso_thesis.studies.thesis.linear.plants import Springs, abscissa_with_bristles
+from friso_thesis.studies.thesis.linear.plants import LowLines, Springs, abscissa_with_bristles
 from friso_thesis.studies.thesis.space import OPEN
 from friso_thesis.studies.thesis.studies import thesis_rig
 
@@ -48,6 +48,7 @@ def changed(changes: Mapping[str, Any]) -> Linear:
     [
         ("E1", (True, True, True, True)),
         ("F7", (True, True, True, True, False, True)),
+        ("F7L", (True, True, True)),
         ("F8", (True, True, False)),
         ("F22", (True, None, None)),
         ("F23", (True, None)),
@@ -97,6 +98,9 @@ def test_parts_of_made_evidence(linear: Linear) -> None:
     }
     other = replace(linear, plants={**linear.plants, **made})
     assert judged("F7", other).pattern == (False, False, False, True, False, False)
+    lines = {"stuck": (1e5, 0.5, 0.5), "sliding": (0.0, 2e3, 0.5)}  # the bristles alone; the stage alone, and damped
+    low = {name: replace(linear.plants[name], low=LowLines(*line)) for name, line in lines.items()}
+    assert judged("F7L", replace(linear, plants={**linear.plants, **low})).pattern == (False, False, False)
     limited = replace(linear, free=replace(linear.free, unsampled=50.0))
     assert all(part.holds for part in judged("F23", limited).parts)
 

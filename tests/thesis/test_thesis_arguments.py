@@ -211,7 +211,7 @@ def test_other_solvers() -> None:
     values = {f"{joint}_{name}_{key}": number for joint in ("locked", "free") for name in solvers
               for key, number in own.items()}  # fmt: skip
     for changes, pattern in (
-        ({f"{joint}_ode15s_evaluations": 2000 for joint in ("locked", "free")}, (Y, N)),
+        ({f"{joint}_ode15s_held_evaluations": 2000 for joint in ("locked", "free")}, (Y, N)),
         ({f"{joint}_ode45_held_evaluations": 1300 for joint in ("locked", "free")}, (N, Y)),
         ({"locked_ode45_held_peaks": 0}, (N, Y)),
         ({"locked_ode45_held_swing_m": 2e-3}, (N, Y)),

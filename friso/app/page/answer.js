@@ -8,24 +8,41 @@ let last = {};
 const labels = new WeakMap(); // of each machine, the keys that its newest entry was given, and what that is called
 const MOST = 200;
 const working = new Working();
-const [cases, rest] = [el("div", {}), el("div", { class: "rest" })];
+const [word, cases, rest] = [el("div", { class: "word" }), el("div", {}), el("div", { class: "rest" })];
 let complete = false;
+let concluded = ""; // the verdicts from which the rest concludes
 let shownBy = ""; // the lane whose progress is shown
 
-/** Show what is said of a version in a word for each case, and the rest that is said of it, which is left where it is null. */
-function show(version, newCases, newRest) {
+/** What a verdict is in a word, as regions of the map are called. */
+const WORDS = { hunts: "Hunts", bistable: "A kick starts it", transient: "Slow", settles: "Settles" };
+
+/** What sets a machine as a button says, or takes that back: `set` is called with keys and values [SI]. */
+let cures = { set: () => {}, taken: () => null, back: () => {} };
+export const onCure = (told) => (cures = told);
+
+/** Show the verdict on a version, what is said of it in a line for each case, and the rest, which is left where it is null. */
+function show(version, answer, newCases, newRest) {
+  const taken = cures.taken();
+  const ways = (answer.cures ?? []).map(({ label, values }) => el("button", { type: "button", class: "cure", onclick: () => cures.set(label, values) }, label));
+  const back = taken ? [el("button", { type: "button", class: "cure", onclick: cures.back }, `Take back: ${taken}`)] : [];
+  const said = answer.verdict in WORDS ? [el("strong", { class: answer.certain ? answer.verdict : "" }, `${WORDS[answer.verdict]}${answer.certain ? "" : " (not certain)"}`)] : [];
+  word.replaceChildren(...said, ...ways, ...back);
   cases.replaceChildren(...newCases);
   if (newRest) rest.replaceChildren(...newRest);
+  $("verdict").replaceChildren(word);
   $("answer").replaceChildren(cases, rest, working.place);
-  mark(cases, version);
-  if (newRest) mark(rest, version);
+  for (const element of [word, cases, ...(newRest ? [rest] : [])]) mark(element, version);
 }
+
+/** What decides whether a conclusion still holds: the machine, and its verdicts. */
+const verdicts = (answer, { machine }) => JSON.stringify([machine.name, machine.text, answer.cases]);
 
 /** Verdicts by run and cycle, which come while something is dragged. */
 export function quick(answer, version) {
   complete = false;
   say(answer.notes, version);
-  show(version, answer.cases.map(({ label, verdict }) => sentence(`${label}: ${verdict}.`, verdict)), null);
+  const holds = verdicts(answer, version) === concluded;
+  show(version, answer, answer.cases.map(({ label, verdict }) => sentence(`${label}: ${verdict}.`, verdict)), holds ? null : []);
 }
 
 function say(texts, version) {
@@ -46,8 +63,9 @@ export function whole(answer, version, draw) {
   more.push(...paragraphs(answer.notes));
   if (draw && !answer.asked.options.draws) more.push(el("button", { type: "button", id: "draw", onclick: () => draw(DRAWS) }, `How probable is hunting? (${DRAWS} draws, minutes)`));
   complete = true;
+  concluded = verdicts(answer, version);
   say([], version);
-  show(version, first, more);
+  show(version, answer, first, more);
 }
 
 /** Whether a whole answer is no longer what is to be said; what it says stays until there is more. */
@@ -57,7 +75,7 @@ export function changed() {
 
 export function refused(text, version) {
   say([], version);
-  show(version, [el("p", { class: "case", role: "alert" }, text)], []);
+  show(version, {}, [el("p", { class: "case", role: "alert" }, text)], []);
 }
 
 function sentence(text, verdict) {

@@ -2,6 +2,7 @@
 import { $, anew, dialog, el, words } from "./dom.js";
 import { PARTS } from "./drawing.js";
 
+const BARE = /^\s*[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?\s*$/i;
 const QUANTITY = /^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(\S.*)?$/i;
 const STEPS = 1000;
 const SLIDER = "-slider";
@@ -20,6 +21,12 @@ export function worded(key, si, digits = 6) {
   const number = Number((si / factor).toPrecision(digits));
   return typeof key.value === "number" ? number : `${number} ${unit}`.trim();
 }
+
+/** A text in which a bare number has a unit: the one that is shown. */
+export const withUnit = (text, unit) => (unit && BARE.test(text) ? `${text.trim()} ${unit}` : text.trim());
+
+/** The unit that is shown at a key: as it is written, or that of its example. */
+export const unitOf = (key) => (key.plain && key.value != null && QUANTITY.exec(String(key.value))?.[2]) || (QUANTITY.exec(String(key.example))?.[2] ?? key.unit ?? "");
 
 /** Where sliders go is settled when a machine is opened: they do not move under the hand. */
 export const forgetRanges = () => ranges.clear();
@@ -93,16 +100,17 @@ function row(key, machine, changed, tell) {
 }
 
 function field(key, value, id, tell) {
-  const read = (text) => (text.trim() === "" ? null : !key.unit && Number.isFinite(Number(text)) ? Number(text) : text.trim());
+  const read = (text) => (text.trim() === "" ? null : !key.unit && Number.isFinite(Number(text)) ? Number(text) : withUnit(text, key.unit && unitOf(key)));
   const input = el("input", { id, type: "text", value: String(value ?? ""), placeholder: `e.g. ${key.example}`, autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-help` });
   input.addEventListener("change", () => {
-    input.defaultValue = input.value; // handed over
-    tell.set(key.path, read(input.value));
+    const value = read(input.value);
+    input.value = input.defaultValue = String(value ?? ""); // handed over
+    tell.set(key.path, value);
   });
   if (!key.plain || !key.range || !QUANTITY.test(String(key.value))) return [input];
   if (!ranges.has(key.path) || !inside(ranges.get(key.path), key.si)) ranges.set(key.path, key.range);
   const range = ranges.get(key.path);
-  const slider = el("input", { id: id + SLIDER, type: "range", min: 0, max: STEPS, value: place(range, key.si), "aria-label": `${words(key.path)}, slider` });
+  const slider = el("input", { id: id + SLIDER, "data-track": key.path, type: "range", min: 0, max: STEPS, value: place(range, key.si), "aria-label": `${words(key.path)}, slider` });
   slider.addEventListener("pointerdown", tell.hold);
   slider.addEventListener("input", () => {
     const moved = worded(key, at(range, slider.value), 4);
@@ -111,6 +119,23 @@ function field(key, value, id, tell) {
   });
   slider.addEventListener("change", tell.release);
   return [input, slider];
+}
+
+const TRACK = 11; // values along a track
+const COLOURS = { hunts: "#d55e00", bistable: "#d55e00", transient: "#e69f00", settles: "#009e73" };
+
+/** The values [SI] along the tracks of the sliders that are there, by key. */
+export const alongTracks = () => Object.fromEntries([...document.querySelectorAll("[data-track]")].map(({ dataset }) => [dataset.track, Array.from({ length: TRACK }, (_, k) => at(ranges.get(dataset.track), (STEPS * k) / (TRACK - 1)))]));
+
+/** Colour the tracks by the verdicts along them; grey where there is none. */
+export function colourTracks(tracks) {
+  for (const slider of document.querySelectorAll("[data-track]")) {
+    const verdicts = tracks[slider.dataset.track] ?? [];
+    const ends = verdicts.map((_, k) => [k - 0.5, k + 0.5].map((place) => `${(100 * Math.max(0, Math.min(1, place / (TRACK - 1)))).toFixed(1)}%`).join(" "));
+    const stops = verdicts.map((verdict, k) => `${COLOURS[verdict] ?? "var(--line)"} ${ends[k]}`);
+    slider.style.setProperty("--track", stops.length ? `linear-gradient(to right, ${stops.join(", ")})` : "");
+    slider.title = stops.length ? `Along it: ${verdicts.filter((word, k) => word !== verdicts[k - 1]).join(", ")}` : "";
+  }
 }
 
 const inside = (range, si) => si >= range.low && si <= range.high;

@@ -1,5 +1,6 @@
 // Logs: dropped files, their channels with roles, and the machine that they show.
 import { el } from "./dom.js";
+import { withUnit } from "./keys.js";
 import { shownAnswer } from "./long.js";
 import { paragraphs } from "./tables.js";
 import { drop, end, hand } from "./wire.js";
@@ -62,6 +63,11 @@ export class Logs {
     return { ...this.sent(), options: { files: this.files.map((file) => file.id), map: Object.fromEntries(this.roles), unit, scale, dt: this.dt?.value ?? "", ...more } };
   }
 
+  /** What the run asks for to have the first log laid over it. */
+  laid() {
+    return this.files.length ? this.options().options : {};
+  }
+
   async look() {
     const answer = await shownAnswer(this.result, "logs", "logs", () => this.options(), this.tell);
     if (answer) this.fields(answer);
@@ -83,7 +89,11 @@ export class Logs {
       const measure = el("input", { type: "text", id: `measure-${role}`, class: "measure", "aria-label": `Unit or scale of ${name}`, placeholder: "unit or scale", title: "Unit of the channel (mm), or scale (35.15 N/V), where the file does not say it", value: this.measures.get(role) ?? "", onchange: () => this.measured(role, measure.value) });
       return el("div", { class: "role" }, el("label", {}, name, el("select", { id: `role-${role}`, onchange: choose }, ...options)), measure);
     };
-    this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "", onchange: () => this.look() });
+    this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "" });
+    this.dt.addEventListener("change", () => {
+      this.dt.value = withUnit(this.dt.value, "ms");
+      this.look();
+    });
     this.assumed = el("input", { type: "checkbox", id: "assumed", checked: this.assumed?.checked ?? false });
     const start = () => {
       const assumed = this.assumed.checked;

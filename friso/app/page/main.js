@@ -2,7 +2,7 @@
 import * as answers from "./answer.js";
 import { $, anew, el, plain, tabs } from "./dom.js";
 import { drawing } from "./drawing.js";
-import { edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
+import { alongTracks, colourTracks, edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
 import { DRAWING, FIELDS, isNow, look, mark, now } from "./shown.js";
@@ -20,13 +20,16 @@ let held = "";
 let begun = false;
 let late = false; // what is on the left is drawn again once that takes nothing from under the hand
 let pressed = false;
+let tracked = { version: null, tracks: {} }; // the verdicts along the sliders, and the version that they are of
 let drawn = {}; // the machine and the part whose keys are there
 
 const sent = () => ({ machine: machines.sent(), pinned: machines.pinned() });
 const set = (values, dragged = false) => machines.set(values, dragged);
 
+answers.onCure({ set: (label, values) => machines.cure(label, withUnits(values)), taken: machines.cured, back: () => undo() });
+
 const pictures = new Pictures(sent, {
-  set: (values) => set(values),
+  set,
   worded: withUnits,
   progress: answers.progress,
   shown: (part, tab, version) => version.answers.set(tab, part),
@@ -40,6 +43,7 @@ const verdict = new Live("verdict", "verdict", 5000, (part, version) => {
   if (part.kind === "message") return answers.progress(part, "verdict");
   if (part.kind === "failed") return answers.refused(part.text, version);
   if (part.kind !== "answer") return; // what is wrong with the machine is said where it was set
+  version.answers.set("verdict", part);
   answers.quick(part, version);
   answers.note(part.verdict, version, machines.back);
 });
@@ -48,8 +52,7 @@ function withUnits(values) {
   const all = shown.tables.flatMap((table) => table.keys);
   return Object.fromEntries(
     Object.entries(values).map(([path, si]) => {
-      const key = all.find((item) => item.path === path);
-      return [path, worded(key, si)];
+      return [path, typeof si === "number" ? worded(all.find((item) => item.path === path), si) : si];
     }),
   );
 }
@@ -74,7 +77,7 @@ function changed(dragged) {
 /** The picture follows the machine, and then the verdict: both at once would be slower. */
 function follow(dragged) {
   const version = now();
-  pictures.changed(dragged, () => verdict.ask({ machine: version.sent }, version));
+  pictures.changed(dragged, () => version.answers.has("verdict") || verdict.ask({ machine: version.sent }, version)); // a slider that is let go keeps its verdict
 }
 
 /** The server has read the machine, or refused it. */
@@ -134,16 +137,26 @@ function without(part, version) {
   answers.refused(part.text, version);
 }
 
+/** Colour the sliders' tracks by the verdict along them. */
+async function tracks() {
+  const version = now();
+  const part = await ask("tracks", pictures.body({ values: alongTracks() }), "tracks");
+  if (part?.kind === "answer" && isNow(version)) colourTracks((tracked = { version, tracks: part.tracks }).tracks);
+}
+
 async function check(draws) {
   const version = now();
   const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item, "check"));
   if (!part || !isNow(version)) return;
+  version.concluded = true;
+  pictures.concluded();
   if (part.kind !== "answer") return answers.refused(part.text, version);
   verdict.stop();
   answers.whole(part, version, shown.uncertain.length ? check : null);
   answers.note(part.verdict, version, machines.back); // it may come before the quick verdict, which is then not asked for
   version.answers.set("check", part);
   pictures.checked(part, version);
+  tracks();
 }
 
 function redraw() {
@@ -170,6 +183,7 @@ function left() {
     edit: editText,
   });
   mark($("keys"), now(), FIELDS);
+  if (tracked.version && isNow(tracked.version)) colourTracks(tracked.tracks);
 }
 
 /** The text of the machine as it is set now, which the server may not have written yet. */
@@ -195,6 +209,7 @@ function pointed(event) {
 function choose(part) {
   chosen = part;
   left();
+  if (now().answers.has("check")) tracks();
 }
 
 function bar() {

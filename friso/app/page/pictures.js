@@ -1,29 +1,31 @@
 // The pictures of the answer, in tabs: each asks its own question.
 import { $, el, tabs, words } from "./dom.js";
-import { worded } from "./keys.js";
+import { unitOf, withUnit, worded } from "./keys.js";
 import { Beside } from "./beside.js";
+import { handle, small } from "./handle.js";
 import { Logs } from "./logs.js";
 import { clear, draw } from "./plot.js";
 import { Remedies } from "./remedies.js";
-import { FIELDS, isNow, look, mark, now } from "./shown.js";
+import { ANSWER, FIELDS, isNow, look, mark, now } from "./shown.js";
 import * as machines from "./state.js";
 import { ask, Live } from "./wire.js";
 import { paragraphs, table } from "./tables.js";
 
 const AT_REST = 250;
 const LANE = "picture";
+const HOME = "map";
 
 export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
   constructor(sent, tell) {
-    Object.assign(this, { sent, tell, shown: "run", then: null, machine: null, answer: null, timer: 0, kept: new Map() });
+    Object.assign(this, { sent, tell, shown: HOME, then: null, machine: null, answer: null, timer: 0, kept: new Map() });
     this.live = this.follows("run");
     this.loops = this.follows("loops");
     this.tabs = [
+      { id: "map", label: "Map" },
       { id: "run", label: "Run" },
       { id: "check", label: "Hunting" },
       { id: "bode", label: "Loops" },
-      { id: "map", label: "Map" },
       { id: "boundary", label: "Boundary" },
       { id: "flexure", label: "Leaf springs", when: () => this.has("flexure") },
       { id: "remedies", label: "What stops it" },
@@ -51,7 +53,7 @@ export class Pictures {
 
   bar() {
     const there = this.machine ? [...this.tabs.filter((tab) => !tab.when || tab.when()), ...this.machine.others] : [];
-    if (this.machine && !there.some((tab) => tab.id === this.shown)) this.show("run");
+    if (this.machine && !there.some((tab) => tab.id === this.shown)) this.show(HOME);
     const buttons = there.map(({ id, label }) =>
       el("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === this.shown), "aria-controls": "picture", onclick: () => this.show(id) }, label),
     );
@@ -61,15 +63,16 @@ export class Pictures {
   }
 
   show(id) {
-    if (id === this.shown) return;
+    if (id !== this.shown) this.turn(id);
+  }
+
+  /** Show a tab anew. */
+  turn(id) {
     this.shown = id;
     this.goOn();
     this.halt();
-    const place = $("picture");
-    if (this.plots) clear(this.plots);
-    place.replaceChildren();
     this.bar();
-    this.begin(place);
+    this.begin();
     this.ask();
   }
 
@@ -77,15 +80,17 @@ export class Pictures {
   described(machine, version) {
     Object.assign(this, { machine, of: version });
     this.bar();
+    if (!machines.dragging() && this.answer) this.glance();
     if ($("axes")) mark($("axes"), version, FIELDS);
   }
 
   /** Another machine was opened: the keys and ranges of its maps are others. */
   opened() {
-    if (!this.form) return;
-    clear(this.plots);
-    $("picture").replaceChildren();
-    this.begin($("picture"));
+    if (this.isMap()) this.begin();
+  }
+
+  isMap() {
+    return this.shown === "map" || this.shown === "boundary";
   }
 
   /** Nothing that is on its way is of the machine as it is set now. */
@@ -103,26 +108,26 @@ export class Pictures {
 
   /** There is no machine, and no tabs. */
   none() {
-    this.machine = null;
-    this.show("run");
-    this.halt();
-    if (this.plots) clear(this.plots);
-    this.below?.replaceChildren();
-    this.bar();
+    this.machine = this.then = null;
+    this.turn(HOME);
   }
 
-  /** What stands above the plots of a tab. */
-  begin(place) {
+  /** What stands on a tab before its answer is there. */
+  begin() {
+    const place = $("picture");
+    if (this.plots) clear(this.plots);
+    place.replaceChildren();
     this.form = null;
     this.plots = null;
     if (this.own[this.shown]) {
       place.append(this.own[this.shown].place);
       return look(); // the machine may be another one since it was there
     }
-    if (this.shown === "map" || this.shown === "boundary") this.form = this.axes(place);
     this.plots = el("div", { class: "plots" });
     this.below = el("div", {});
-    place.append(this.plots, this.below);
+    place.append(this.plots);
+    if (this.isMap() && this.machine) this.form = this.axes(place);
+    place.append(this.below);
   }
 
   /** The machine has changed; `dragged`: not yet for good. `then` is called once a picture that follows is drawn. */
@@ -131,9 +136,9 @@ export class Pictures {
     this.then = then;
     if (this.shown !== "run") this.goOn();
     if (this.own[this.shown]) return;
-    if (!this.plots) this.begin($("picture"));
+    if (!this.plots) this.begin();
     if (this.shown === "run") {
-      this.live.ask(this.body(), { version: now(), then });
+      this.live.ask(this.body(this.own.logs.laid()), { version: now(), then });
     } else {
       clearTimeout(this.timer);
       if (dragged && this.shown === "bode") return this.loops.ask(this.body(), { version: now(), then: null });
@@ -152,15 +157,21 @@ export class Pictures {
   async ask() {
     const { shown } = this;
     if (!this.machine || this.own[shown] || this.of.machine.text !== machines.current().text) return; // asked once it is described
-    if (shown === "run") return this.live.ask(this.body(), { version: now(), then: this.then });
+    if (shown === "run") return this.live.ask(this.body(this.own.logs.laid()), { version: now(), then: this.then });
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;
     if (!this.plots.children.length) this.below.replaceChildren(el("progress", { "aria-label": "Progress" })); // the line of the answer is the check's, too
     const version = now();
+    if (shown === "map") options.coarse = this.rough = !version.concluded;
     const part = (answer) => this.shown === shown && (answer.kind === "partly" ? this.arrived(answer, version) : answer.kind !== "answer" && this.tell.progress(answer, LANE));
     const answer = await ask(shown, this.body(options), LANE, part);
-    if (answer && this.shown === shown) this.arrived(answer, version);
+    if (answer && answer.kind !== "partly" && this.shown === shown) this.arrived(answer, version);
+  }
+
+  /** The check has ended: a map that waited for it is refined. */
+  concluded() {
+    if (this.shown === "map" && this.rough) this.ask();
   }
 
   /** The check is there, whose figures are one of the pictures: what waits would tell less. */
@@ -178,15 +189,31 @@ export class Pictures {
       return mark(this.below, version);
     }
     Object.assign(this, { answer, version });
-    if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) }, answer.names);
-    for (const box of this.plots.children) if (answer.figures?.some((figure) => figure.name === box.dataset.name)) mark(box, version);
-    if (answer.kind === "partly" && !answer.sentences.length) return this.tell.shown(answer, this.shown, version); // its words follow
+    if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point), drawn: () => this.glance() }, answer.names);
+    const free = this.shown === "map" && answer.axes ? Object.values(answer.axes) : [];
+    for (const box of this.plots.children) if (answer.figures?.some((figure) => figure.name === box.dataset.name)) mark(box, version, ANSWER, free);
+    if (answer.kind === "partly" && !answer.sentences.length && this.shown !== "map") return this.tell.shown(answer, this.shown, version); // its words follow
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = (answer.drawings ?? []).map((item) => this.drawn(item));
     const working = answer.kind === "partly" ? [el("progress", { "aria-label": "Progress" })] : [];
     this.below.replaceChildren(...working, ...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
     mark(this.below, version);
     this.tell.shown(answer, this.shown, version);
+  }
+
+  /** The handle on the map, and the small picture, of what is drawn. */
+  glance() {
+    const box = this.plots?.querySelector(".figure");
+    const plotted = box?.querySelector(".plot");
+    if (!plotted?.data) return;
+    if ($("small").getClientRects().length) small($("small"), plotted);
+    if (this.shown !== "map" || !this.answer.axes) return;
+    const values = Object.values(this.answer.axes).map((path) => this.numeric().find((key) => key.path === path)?.si);
+    handle(box, this.answer, values, (set, dragged) => this.tell.set(this.tell.worded(set), dragged));
+  }
+
+  numeric() {
+    return this.machine.tables.filter((item) => item.present).flatMap((item) => item.keys);
   }
 
   drawn({ label, svg }) {
@@ -199,7 +226,7 @@ export class Pictures {
 
   /** The two keys of a map, with their ranges; gives the options of the question. */
   axes(place) {
-    const numeric = this.machine.tables.filter((item) => item.present).flatMap((item) => item.keys.filter((key) => key.range && typeof key.value === "string"));
+    const numeric = this.numeric().filter((key) => key.range && typeof key.value === "string");
     const wanted = this.kept.get("axes") ?? ["controller.crossover", "friction.static"];
     const chosen = wanted.map((path, k) => numeric.find((key) => key.path === path) ?? numeric[k]);
     const fields = chosen.map((key, k) => this.axis(numeric, key, "xy"[k]));
@@ -242,6 +269,8 @@ export class Pictures {
       low.value = worded(item, item.si / 4, 3);
       high.value = worded(item, item.si * 4, 3);
     };
+    const complete = ({ target }) => (target.value = withUnit(target.value, unitOf(numeric.find((one) => one.path === key.value))));
+    for (const end of [low, high]) end.addEventListener("change", complete);
     key.addEventListener("change", fill);
     fill();
     const label = name === "x" ? "To the right" : "Upwards";

@@ -20,7 +20,7 @@ function themed(value, colours) {
 /**
  * Draw figures into a place, keeping the plots that are there: those of the same name are updated, first those that are
  * in sight. `tell` is called with the point that is `clicked`, and with that which the pointer is over (`hovered`), null
- * once it is gone. `names` are those of all figures that are to be there, null while that is not known: what is there stays.
+ * once it is gone; and after each time that a plot is drawn (`drawn`). `names` are those of all figures that are to be there, null while that is not known: what is there stays.
  */
 export function draw(place, figures, tell = {}, names = figures.map((figure) => figure.name)) {
   const boxes = () => new Map([...place.children].filter((child) => child.dataset.name).map((child) => [child.dataset.name, child]));
@@ -89,6 +89,7 @@ function plot(place, figure, tell) {
   if (!fresh) return;
   if (tell.clicked) place.on("plotly_click", (event) => tell.clicked(event.points[0]));
   if (!tell.hovered) return;
+  place.on("plotly_afterplot", tell.drawn);
   place.on("plotly_hover", (event) => tell.hovered(event.points[0]));
   place.on("plotly_unhover", () => tell.hovered(null));
 }

@@ -1,10 +1,11 @@
 // What stops the hunting: the ways of tune and of design, and machines that are taken over from them.
 import { el } from "./dom.js";
+import { withUnit } from "./keys.js";
 import { shownAnswer } from "./long.js";
 
 export class Remedies {
   constructor(sent, tell) {
-    const within = el("input", { id: "within", type: "text", placeholder: "e.g. 1 um" });
+    const within = el("input", { id: "within", type: "text", placeholder: "e.g. 1 um", onchange: () => (within.value = withUnit(within.value, "um")) });
     const only = el("select", { id: "only" }, ...["", "controller", "joint"].map((word) => el("option", { value: word }, word || "anything")));
     this.result = el("div", {});
     const start = async (question, options) => {

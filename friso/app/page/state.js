@@ -27,12 +27,22 @@ export const changes = (machine = current()) => machine.steps[machine.step];
 export const sent = (machine = current()) => ({ name: machine.name, text: machine.text, made: machine.made, changes: changes(machine) });
 export const pinned = () => state.pinned;
 
-/** Add a machine; `made`: on the page, there is no file of it. */
+/** Add a machine; `made`: on the page, there is no file of it, and it has a name that no other one here has. */
 export function add(name, text, made = false, given = {}) {
   drag = null;
-  state.machines.push({ name, text, made, steps: [given], step: 0 });
+  state.machines.push({ name: made ? free(name) : name, text, made, steps: [given], step: 0 });
   state.shown = state.machines.length - 1;
   changed();
+}
+
+/** A name for a stage file that no machine of the page has: with a number, unless it is free. */
+function free(name) {
+  const stem = name.replace(/(_\d+)?\.toml$/, "");
+  const names = state.machines.map((machine) => machine.name);
+  for (let number = 2, wanted = name; ; number += 1) {
+    if (!names.includes(wanted)) return wanted;
+    wanted = `${stem}_${number}.toml`;
+  }
 }
 
 export function show(number) {
@@ -82,6 +92,7 @@ function append(machine, next) {
   machine.steps.push(next);
   machine.steps.splice(0, machine.steps.length - MOST_STEPS);
   machine.step = machine.steps.length - 1;
+  machine.cured = null;
 }
 
 /** Show a machine as it was when no more than these keys were `given`; one that was closed is opened again. */
@@ -100,6 +111,16 @@ export function go(step) {
   machine.step = Math.max(0, Math.min(step, machine.steps.length - 1));
   changed();
 }
+
+/** Set keys as a button says; `label` is what that is called until they are changed again. */
+export function cure(label, values) {
+  set(values);
+  current().cured = { step: current().step, label };
+  changed();
+}
+
+/** What the last change is called if it came of a button, else null. */
+export const cured = () => (current().cured?.step === current().step ? current().cured.label : null);
 
 export function pin() {
   state.pinned = state.pinned ? null : structuredClone(sent());

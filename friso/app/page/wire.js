@@ -1,6 +1,6 @@
 // Questions to the server. A newer question on a lane overtakes the one before it; answers come in frames, see frames.py.
 import { token } from "./dom.js";
-import { enter, request } from "./entry.js";
+import { again, enter, plotly, request } from "./entry.js";
 
 const page = token();
 const lanes = new Map();
@@ -80,7 +80,7 @@ export async function first() {
   try {
     await enter();
     const response = await request("begin");
-    if (response.ok) return await response.json();
+    if (response.ok) return await plotly().then(() => response.json());
     reached(false, response.status === 403 ? ANEW : GONE);
   } catch {
     reached(false);
@@ -129,7 +129,7 @@ function joined(chunks, size) {
 function unpacked(value, numbers) {
   if (Array.isArray(value)) return value.map((item) => unpacked(item, numbers));
   if (value === null || typeof value !== "object") return value;
-  if (value.shape) {
+  if (Array.isArray(value.shape)) { // that of a hatching is a text
     const [rows, columns] = value.shape;
     if (columns === undefined) return new Float32Array(numbers, value.array, rows);
     return Array.from({ length: rows }, (_, row) => new Float32Array(numbers, value.array + 4 * row * columns, columns));
@@ -141,7 +141,7 @@ function unpacked(value, numbers) {
 
 const listeners = [];
 let there = true;
-let looking = null;
+const LOOKED = 1000; // [ms]
 
 /** Be told when the server goes and comes back: with whether it is there, and a text. */
 export const onReach = (listener) => listeners.push(listener);
@@ -153,21 +153,21 @@ function reached(now, text = GONE) {
   if (now === there && now) return;
   there = now;
   listeners.forEach((listener) => listener(now, text));
-  if (!now && looking === null) looking = setInterval(look, 2000);
 }
 
+/** See whether the server is there; one that was started again at this address is entered again. */
 async function look() {
   try {
-    const response = await request("begin");
-    if (response.status === 403) return reached(false, ANEW);
-    if (!response.ok) return;
-    clearInterval(looking);
-    looking = null;
+    const { status } = await request("begin", { method: "HEAD" });
+    if (status === 403 && !(await again())) return reached(false, ANEW);
     reached(true);
   } catch {
-    // still gone
+    reached(false);
+  } finally {
+    setTimeout(look, LOOKED);
   }
 }
+setTimeout(look, LOOKED);
 
 /**
  * What asks again and again while something is dragged: one question on its way, and the newest one waiting; one that

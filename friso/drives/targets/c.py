@@ -15,7 +15,7 @@ from friso.drives.target import CodeTarget, Parcel
 
 _WORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile
-while sqrt fabs floor exp pow isfinite output command dropped state parameters"""
+while sqrt fabs floor exp pow isfinite output command dropped state parameters math tgmath stdio stdlib string"""
 
 
 def _arguments(parcel: Parcel, real: str) -> str:

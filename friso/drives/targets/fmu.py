@@ -13,6 +13,7 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from io import BytesIO
@@ -20,10 +21,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from friso.drives.gains import DRIVE_OUTPUT
 from friso.drives.languages import commented
 from friso.drives.program import MEANINGS, MOTOR_POSITION, POSITION, identifier
 from friso.drives.target import CodeTarget, Parcel
 from friso.drives.targets.c import TARGET as C
+from friso.equations.sampled import SAMPLE_TIME
 from friso.quantities import by_pint
 from friso.version import VERSION
 
@@ -33,8 +36,17 @@ BASE_UNITS = {"gram": "kg", "meter": "m", "second": "s", "ampere": "A", "kelvin"
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden")
 SUFFIXES = {"linux": "so", "darwin": "dylib"}
-FOLDERS = {"2": {"x86_64": "{system}64"}, "3": {one: f"{one}-{{system}}" for one in ("x86_64", "aarch64")}}
+PROCESSORS = {"x86_64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
+"""The standard's names of processors, by those of systems."""
+
+FOLDERS = {"2": {"x86_64": "{system}64"}, "3": {own: f"{one}-{{system}}" for own, one in PROCESSORS.items()}}
 """Folders of binaries in an archive, by version of the standard and processor."""
+
+TRIAL = (("trial.c", "#include <math.h>\n#include <stdlib.h>\n#include <string.h>\nint trial(void) { return 0; }\n"),)
+"""Source by which a compiler shows that it works; that of macOS may be an empty shell."""
+
+RESERVED = {"model", "fmi2", "fmi3", "stdbool", "stdint"}
+"""Names that would collide with functions and files of the interface."""
 
 OUTPUT, BEFORE, DROPPED, START = "output", "output_before", "dropped", "start_position"
 """Names of variables beside parameters and inputs."""
@@ -83,6 +95,7 @@ class FmuModel:
     """What an archive holds."""
 
     name: str
+    about: str
     variables: Sequence[FmuVariable]
     part: FmuPart
 
@@ -101,16 +114,17 @@ def _models(parcel: Parcel) -> list[FmuModel]:
         FmuVariable(str(one), "input", begins[str(one)], parcel.units[str(one)], MEANINGS[one][1])
         for one in parcel.program.inputs
     ]
-    own = _parameters(parcel, parcel.program.parameters)
+    own = _parameters(parcel, parcel.program.parameters, but=SAMPLE_TIME)  # an FMU keeps its clock
     variables = [time, *own, before, *inputs, output, dropped]
-    models = [FmuModel(name, variables, _controller(parcel, own, _places(variables)))]
+    models = [FmuModel(name, "the controller", variables, _controller(parcel, own, _places(variables)))]
     if run is None:
         return models
     theirs, unit = _parameters(parcel, run.machine.parameters), parcel.units[str(POSITION)]
     start = FmuVariable(START, "parameter", begins[str(POSITION)], unit, "position at rest with which it begins")
     read = [FmuVariable(str(one), "output", start.start, unit, MEANINGS[one][1]) for one in (POSITION, MOTOR_POSITION)]
     variables = [time, *theirs, start, replace(output, kind="input"), *read]
-    models.append(FmuModel(f"{name}_machine", variables, _machine(parcel, theirs, _places(variables), OUTPUT)))
+    part = _machine(parcel, theirs, _places(variables), OUTPUT)
+    models.append(FmuModel(f"{name}_machine", "the machine with its friction", variables, part))
     outside = [one for one in inputs if one.name not in {one.name for one in read}]
     shared = {one.name: one for one in (*own, *theirs)}
     variables = [time, *shared.values(), before, start, *outside, *read, output, dropped]
@@ -122,13 +136,13 @@ def _models(parcel: Parcel) -> list[FmuModel]:
         [*machine.told, *control.sampled, *control.told, *machine.sampled],
         [*machine.told, *control.told],
     )
-    return [*models, FmuModel(f"{name}_loop", variables, both)]
+    return [*models, FmuModel(f"{name}_loop", "controller and machine in one", variables, both)]
 
 
-def _parameters(parcel: Parcel, values: Mapping[Any, float]) -> list[FmuVariable]:
-    """Return the parameters of a part, whose values are those of keys by symbol."""
-    units = {str(key): parcel.units.get(str(key)) or "1" for key in values}
-    return [FmuVariable(str(key), "parameter", value, units[str(key)], str(key)) for key, value in values.items()]
+def _parameters(parcel: Parcel, values: Mapping[Any, float], but: Any = None) -> list[FmuVariable]:
+    """Return the parameters of a part, whose values are those of keys by symbol, `but` one."""
+    named = {str(key): value for key, value in values.items() if key != but}
+    return [FmuVariable(key, "parameter", value, parcel.units.get(key) or "1", key) for key, value in named.items()]
 
 
 def _places(variables: Sequence[FmuVariable]) -> dict[str, str]:
@@ -142,6 +156,7 @@ def _controller(parcel: Parcel, own: Sequence[FmuVariable], at: Mapping[str, str
     return FmuPart(
         [f"{name}_parameters parameters;", f"{name}_state controller;"],
         [
+            f"{name}_defaults(&model->parameters);",
             *(f"model->parameters.{identifier(one.name)} = {at[one.name]};" for one in own),
             f"{name}_init(&model->controller, &model->parameters, {inputs}, {at[BEFORE]});",
         ],
@@ -186,12 +201,12 @@ def _powers(unit: str) -> dict[str, int]:
 def _archive(parcel: Parcel, model: FmuModel, version: str) -> bytes:
     """Return the archive of a model for a version of the standard, which depends on nothing but what it holds."""
     code = {name: text for name, text in C.files(parcel).items() if name.endswith((".c", ".h")) and "_test" not in name}
-    named = {one.unit for one in model.variables} - {"1", "output of the drive"}
+    named = {one.unit for one in model.variables if one.unit != "1" and DRIVE_OUTPUT not in one.unit}
     values = {
         "name": parcel.name,
         "model": model.name,
         "header": "\n".join(commented([*parcel.header])),
-        "about": parcel.header[0] if parcel.header else parcel.name,
+        "about": " ".join([*parcel.header[:1], f"This is {model.about}."]),
         "tool": f"friso {VERSION}",
         "period": repr(parcel.program.period),
         "stop": repr(len(parcel.vector.output) * parcel.program.period),
@@ -229,10 +244,23 @@ def _folder(version: str) -> str:
 
 @cache
 def _binary(code: Iterable[tuple[str, str]]) -> bytes:
-    """Compile sources by name to a shared library; empty without a compiler."""
-    compiler = next((path for name in COMPILERS if (path := shutil.which(name))), None)
-    if compiler is None:
-        return b""
+    """Compile sources by name to a shared library; empty without a compiler that works."""
+    compiler = _compiler()
+    return _library(compiler, code) if compiler else b""
+
+
+@cache
+def _compiler() -> str:
+    """Return the first C compiler that works; "" if there is none."""
+    for path in filter(None, map(shutil.which, COMPILERS)):
+        with suppress(subprocess.CalledProcessError, OSError):
+            _library(path, TRIAL)
+            return path
+    return ""
+
+
+def _library(compiler: str, code: Iterable[tuple[str, str]]) -> bytes:
+    """Compile sources by name to a shared library. Raises CalledProcessError if the compiler refuses them."""
     with TemporaryDirectory() as folder:
         for name, text in code:
             (Path(folder) / name).write_text(text, "utf-8")
@@ -243,11 +271,13 @@ def _binary(code: Iterable[tuple[str, str]]) -> bytes:
 
 def _remark() -> str:
     """Say for which platforms the archives are compiled."""
-    if any(map(shutil.which, COMPILERS)) and (folder := _folder("3")):
-        return f"Compiled for {folder}; other platforms compile the sources inside (python -m fmpy compile FILE)."
+    folders = {version: folder for version in FOLDERS if _compiler() and (folder := _folder(version))}
+    if folders:
+        compiled = " and ".join(f"{folder} (FMI {version}.0)" for version, folder in folders.items())
+        return f"Compiled for {compiled}; elsewhere importers compile the sources inside (python -m fmpy compile FILE)."
     return (
-        "Not compiled, as there is no C compiler (cc, gcc, clang), or the standard names no binary for this platform: "
-        "the archives hold sources, which importers compile (python -m fmpy compile FILE)."
+        "Not compiled, as no C compiler (cc, gcc, clang) works here, or the standard names no binary for this "
+        "platform: the archives hold sources, which importers compile (python -m fmpy compile FILE)."
     )
 
 
@@ -269,4 +299,4 @@ def _files(parcel: Parcel) -> Mapping[str, Any]:
     return {**archives, **dict(vectors), f"{name}_test.py": _templates().get_template("test.py.jinja").render(values)}
 
 
-TARGET = CodeTarget("FMI", _files, C.own_names, holds_machine=True, remark=_remark)
+TARGET = CodeTarget("FMI", _files, C.own_names | RESERVED, holds_machine=True, remark=_remark)

@@ -68,11 +68,12 @@ def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
 
 
 def response_figure(trace: xr.Dataset) -> Figure:
-    """Draw position, error, force and joint deflection over one whole run."""
+    """Draw error, position, force and joint deflection over one whole run; the error shows hunting."""
     time = samples(trace, "time")
     reference = Series(time, samples(trace, "reference"), "reference", GREY, "dashed")
     position = Series(time, samples(trace, "position"), "position", BLUE)
-    panels = [Panel("Position", _TIME, Axis("Position", "m"), (reference, position))]
+    moved = Panel("Position", _TIME, Axis("Position", "m"), (reference, position))
+    panels: list[Panel] = []
     stands = _at_stand(trace)
     for name, title in (
         ("error", "Error"),
@@ -84,6 +85,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
             line = Series(time, values, title.lower(), BLUE)
             view = common_range([values[stands]], least=2 * min(BANDS)) if name == "error" else None
             panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"]), view), (line,)))
+    panels.insert(1, moved)
     caption = (
         "The whole run; the error is the reference minus the position, at the scale of what follows the move: the move "
         "itself is cut off."

@@ -242,13 +242,7 @@ def _as_built(case: Case) -> Case:
 
     If samples and delays of the drive make this loop unstable, the verdict becomes uncertain.
     """
-    if not any(key.startswith("drive.") for key in case.stage.flat()):
-        return case
-    from friso.frequency.crossover import unstable_as_built  # 0.3 s to import
-
-    states: tuple[LoopState, LoopState] = ("sticks", "slides")
-    lost = unstable_as_built(case.stage.flat())
-    where = tuple(state for state, unstable in zip(states, lost, strict=True) if unstable)
+    where = lost_as_built(case.stage)
     if not where:
         return case
     from friso.shown.loop_words import UNSTABLE_AS_BUILT
@@ -257,6 +251,16 @@ def _as_built(case: Case) -> Case:
     reason = UNSTABLE_AS_BUILT if own.certain else f"{own.reason}; {UNSTABLE_AS_BUILT}"
     hunting = replace(own, certain=False, reason=reason)
     return replace(case, unstable_as_built=where, judgement=replace(case.judgement, hunting=hunting))
+
+
+def lost_as_built(stage: Stage) -> tuple[LoopState, ...]:
+    """Return the states in which samples and delays of the drive make the loop of a stage unstable."""
+    if not any(key.startswith("drive.") for key in stage.flat()):
+        return ()
+    from friso.frequency.crossover import unstable_as_built  # 0.3 s to import
+
+    states: tuple[LoopState, LoopState] = ("sticks", "slides")
+    return tuple(state for state, lost in zip(states, unstable_as_built(stage.flat()), strict=True) if lost)
 
 
 def _as_drawn(case: Case, draws: Draws, name: str) -> Case:

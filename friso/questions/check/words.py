@@ -543,7 +543,7 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     grows = judgement.hunting.passing and judgement.hunting.lower_gains == "unstable"  # the faster the loop, the sooner
     ways = [_to(case, case.faster)] if case.faster and not grows else []
     ways += [_to(case, case.slower)] if case.slower else []
-    ways += ["free the joint"] if _freeing_helps(item, cases) else []
+    ways += ["free the joint"] if freeing_helps(item, cases) else []
     away = _running_away(case)
     cure = [f"Cure: {listed(ways, 'or')}{away and f'; {away}'}."] if ways else [f"{_capital(away)}."] if away else []
     if judgement.margin or CheckPart.BANDWIDTHS in judgement.given_up:
@@ -606,7 +606,7 @@ def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
+def freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
     """Tell whether a locked joint, if freed, surely ends the hunting."""
     joint, free = item.case.stage.joint, cases.get("free")
     if free is None or joint is None or not joint.locked:

@@ -50,7 +50,7 @@ def header(parcel: Parcel, check: CheckAnswer) -> list[str]:
     moves = ", ".join(f"{key} = {value}" for key, value in motion.items())
     late = flat.get("drive.delay", 0.0)
     waits = (
-        [f"The drive adds its delay of {with_unit(late, 's')} after each sample; it is not part of this."]
+        [f"The drive adds its delay of {with_unit(late, 's')} after each sample; it is not part of the controller."]
         if late
         else []
     )
@@ -65,7 +65,8 @@ def header(parcel: Parcel, check: CheckAnswer) -> list[str]:
         *centres,
         *waits,
     ]
-    return [line.replace("µ", "u") for line in lines]  # editors of PLCs differ in what they make of it
+    shown = ("".join(filter(str.isprintable, line)) for line in lines)
+    return [line.replace("µ", "u") for line in shown]  # editors of PLCs differ in what they make of it
 
 
 def controller_blocks(answer: ControllerAnswer) -> list[AnswerBlock]:

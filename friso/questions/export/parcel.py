@@ -44,9 +44,9 @@ def packed(
         for key in (*program.parameters, *(machine.parameters if machine else ()))
     }
     of_inputs = {str(one): meaning[0] for one, meaning in MEANINGS.items()}
-    units = {key: axis.unit(one) for key, one in (of_keys | of_inputs).items()} | {
-        str(PER_NEWTON): f"{unit}/{axis.unit('N')}"
-    }
+    units = {key: axis.unit(one) for key, one in (of_keys | of_inputs).items()}
+    force = axis.unit("N")
+    units[str(PER_NEWTON)] = f"{unit}/({force})" if "*" in force else f"{unit}/{force}"
     slow = [flat[key] for loop in LOOPS if (key := f"drive.{loop}_sample_time") in flat]
     linear = linear_controller(flat, round(max(slow, default=program.period) / program.period))
     digest = sha256(stage.to_toml().encode()).hexdigest()

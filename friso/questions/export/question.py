@@ -103,7 +103,7 @@ def export(
     name : str, optional
         Name of the controller in code and of its files; default: the name of the stage file.
     machine : bool
-        Add the machine with its friction as a plant of fixed steps (c).
+        Add the machine with its friction as a plant of fixed steps (c, fmu).
 
     Returns
     -------

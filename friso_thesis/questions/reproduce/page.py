@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from datetime import date
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -40,6 +41,10 @@ COLOURS = {
     "cannot be decided": PINK,
     "not yet covered": GREY,
 }
+
+
+FAILS_FIRST = ("differs", "holds in part", "depends", *[*COLOURS][4:-1], "holds")
+"""Judgements in the order of the claims as text."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +131,8 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
 
 
 def claims_markdown(reproduction: Reproduction) -> str:
-    """Return all claims with their reasons as a Markdown page, in which the documentation shows a finished run."""
+    """Return all claims with their reasons as a Markdown page, as the documentation has that of a whole run."""
+    verdicts = words.in_order(reproduction.verdicts)
     heads = ("Claim", "Where", "What the thesis claims, in short", "By its count", "By what attracts", "Holds in draws")
     rows = [heads, ("---",) * len(heads)]
     rows += [
@@ -138,21 +144,33 @@ def claims_markdown(reproduction: Reproduction) -> str:
             words.attracts(item),
             words.share(item) + (f": {item.depends_on}" if item.depends_on else ""),
         )
-        for item in words.in_order(reproduction.verdicts)
+        for item in verdicts
     ]
-    draws = len(reproduction.plausible.draws)
-    how = f"`friso reproduce`, friso {VERSION}: {reproduction.judged_points} values per axis, {draws} joint draws."
-    parts = ["# The thesis, claim by claim", conclusion(reproduction), how]
-    parts.append("\n".join("| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows))
-    for item in words.in_order(reproduction.verdicts):
-        if item.finding:
-            said = f"{item.claim.text[:1].upper()}{item.claim.text[1:]} ({item.claim.where})."
-            lines = [f"## {item.claim.id}: {words.AGREEMENT[item.judgement]}", "", said, ""]
-            lines += [f"- {words.criterion_word(part)}: {part.number}" for part in item.finding.stated]
-            reason = words.whole_reasons(item)
-            lines += ["", f"Why: {reason}"] if reason else []
-            parts.append("\n".join([*lines, "", item.dependence]))
+    today = date.today()
+    how = (
+        f"Computed by `friso reproduce` (friso {VERSION}) on {today.day} {today:%B %Y}: {reproduction.judged_points} "
+        f"values per axis, up to {len(reproduction.plausible.draws)} joint draws of what the thesis leaves open. The "
+        "figures, the quotes and the criteria are on the page that it writes besides. Below the table stand numbers "
+        "and reasons: what fails first."
+    )
+    table = "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows)
+    parts = ["# The thesis, claim by claim", conclusion(reproduction), how, table]
+    for judgement in FAILS_FIRST:
+        those = [item for item in verdicts if item.finding and item.judgement == judgement]
+        if those:
+            parts += [f"## {words.AGREEMENT[judgement].capitalize()}", "\n".join(map(_reasoned, those))]
     return "\n\n".join(parts) + "\n"
+
+
+def _reasoned(verdict: ClaimVerdict) -> str:
+    """Return the numbers and reasons of a judgement as an item of a list: what is met in short, the rest whole."""
+    numbers: dict[str, list[str]] = {}
+    for part in verdict.finding.stated if verdict.finding else ():
+        met = words.criterion_word(part) == "agrees"
+        numbers.setdefault(words.criterion_word(part), []).append(words.short(part.number) if met else part.number)
+    texts = [f"{word}: {'; '.join(of_word).rstrip('.')}." for word, of_word in numbers.items()]
+    reason = words.whole_reasons(verdict)
+    return " ".join([f"- **{verdict.claim.id}**", *texts, *([f"Why: {reason}"] if reason else []), *verdict.besides])
 
 
 def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) -> tuple[FigureSection, ...]:

@@ -101,7 +101,7 @@ def reproduce(
     only : list of str, optional
         Claims, such as "F15B", that alone are judged, with what they need; default: all of them.
     draws : int
-        Joint draws of the values that the thesis does not state, in each of which every claim is judged.
+        Most joint draws of the values that the thesis does not state. A claim is judged in as many as decide on it.
     laws : bool
         Judge the conclusions of the thesis under every friction law too.
     folder : Path, optional

@@ -248,7 +248,7 @@ def fit_sentence(plausible: Plausible) -> str:
         f"{count} printed number{'s' if count > 1 else ''} ({claims}), all on maps of {MAP_POINTS} x {MAP_POINTS}"
     )
     off = f"off by a factor of {math.exp(fit.misfit):.2f} (RMS of the logarithm)"
-    tried = f"Of friso's own choice and {len(plausible.draws)} joint draws"
+    tried = f"Of friso's own choice and {fit.draws} joint draws"
     if fit.draw.number < 0:
         return f"{tried}, friso's own choice fits best: {off}, by {compared}."
     own = (

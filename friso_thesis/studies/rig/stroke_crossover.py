@@ -38,7 +38,7 @@ choice."""
 RELATIVE_STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
 """Strokes relative to the stage's: up to 1 mm in Table 3. The steps are our choice."""
 
-AT_ONCE = 5
+AT_ONCE = 4
 """Number of rails tried at once on a cell of which only is asked whether any rail has peaks (our choice). Fewer leave
 processors idle, more are run in vain."""
 

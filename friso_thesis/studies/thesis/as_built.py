@@ -43,6 +43,7 @@ from friso.studies.rig.outcome import excite, freed, locked_stage, pace, rig_log
 from friso_thesis.studies.rig.in_position import InPosition, in_position
 from friso_thesis.studies.rig.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover, limits_of_crossover
+from friso_thesis.studies.thesis.settings import settings
 
 AS_BUILT: Mapping[str, Any] = MappingProxyType(
     {
@@ -73,8 +74,7 @@ COULOMB_LEVEL = 2.0
 measured-cycles`."""
 
 RAIL_SEED = 1
-RAIL_COUNT = 20
-"""Seed and number of the moves and of the varied rails."""
+"""Seed of the moves and of the varied rails, of which there are `JudgeSettings.rail_count`."""
 
 RELATIVE_CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
 """Crossovers relative to 8 Hz (Sec. 4.3.2)."""
@@ -83,7 +83,7 @@ RELEASE_DISTANCES = (-0.05, 0.05)
 """Displacements of the releases over the distance of the move: 5 mm to either side."""
 
 RELATIVE_STROKES, STROKE_CROSSOVERS = np.array([0.02, 0.1, 0.3, 1.0]), np.array([3.0, 4.0, 5.0, 6.0, 8.0, 12.0]) / 8
-"""Strokes over the rig's and crossovers over 8 Hz, for Fig. 26. Each cell has `RAIL_COUNT`."""
+"""Strokes over the rig's and crossovers over 8 Hz, for Fig. 26. Each cell has all rails."""
 
 NOISE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
 """Factors on friso's choice of the drive's force noise in Fig. 28, which the thesis does not state."""
@@ -133,32 +133,36 @@ def rig_with_drive(stage: Stage) -> Stage:
     return stage.replace(dict(AS_BUILT))
 
 
+def _rails() -> np.ndarray:
+    """Return the seeds of the rails, as the virtual rig numbers them."""
+    return 1.0 + np.arange(float(settings.rail_count))
+
+
 def moves(stage: Stage) -> MovesOnRails:
     """Run the moves of Fig. 24 and 25 with the rig's real drive on several rails."""
     machine = _prescribed(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
-    seeds, frequencies = 1.0 + np.arange(float(RAIL_COUNT)), crossover(machine) * RELATIVE_CROSSOVERS
-    keys = CROSSOVER
+    seeds, frequencies = _rails(), crossover(machine) * RELATIVE_CROSSOVERS
+    keys, count = CROSSOVER, len(seeds)
     held = run_moves(
         locked,
         move(machine),
-        numbers_of(RAIL_SEED, len(RELATIVE_CROSSOVERS), RAIL_COUNT),
+        numbers_of(RAIL_SEED, len(RELATIVE_CROSSOVERS), count),
         on_rails(machine, {keys: frequencies}, seeds),
     )
     first, second = (on_rails(machine, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
-    loose = run_moves(free, move(machine), numbers_of(RAIL_SEED, 1, RAIL_COUNT), first)
+    loose = run_moves(free, move(machine), numbers_of(RAIL_SEED, 1, count), first)
     tasks = [released(machine, share * distance(machine)) for share in RELEASE_DISTANCES]
-    let_go = RailRuns.joined([run_moves(locked, task, numbers_of(RAIL_SEED, 1, RAIL_COUNT), second) for task in tasks])
+    let_go = RailRuns.joined([run_moves(locked, task, numbers_of(RAIL_SEED, 1, count), second) for task in tasks])
     return MovesOnRails(
-        frequencies, held.shaped(len(RELATIVE_CROSSOVERS), RAIL_COUNT), loose, let_go.shaped(len(tasks), RAIL_COUNT)
+        frequencies, held.shaped(len(RELATIVE_CROSSOVERS), count), loose, let_go.shaped(len(tasks), count)
     )
 
 
 def grid(stage: Stage) -> StrokeCrossover:
     """Run moves with the real drive over strokes and crossovers, as far as limits need (Fig. 26)."""
-    seeds = 1.0 + np.arange(float(RAIL_COUNT))
     return limits_of_crossover(
-        with_joint(_prescribed(stage), locked=False), RAIL_SEED, RELATIVE_STROKES, STROKE_CROSSOVERS, seeds
+        with_joint(_prescribed(stage), locked=False), RAIL_SEED, RELATIVE_STROKES, STROKE_CROSSOVERS, _rails()
     )
 
 
@@ -170,9 +174,7 @@ def cycles(stage: Stage) -> CyclesOnRails:
     swing = float(run.swing[0]) if run.swings[0] else 0.01 * distance(machine)
     flat = machine.flat()
     cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
-    rails, asymmetry = moves_on_varied_rails(
-        even, RAIL_SEED, cases, 1.0 + np.arange(float(RAIL_COUNT)), swing, silent, ""
-    )
+    rails, asymmetry = moves_on_varied_rails(even, RAIL_SEED, cases, _rails(), swing, silent, "")
     changes = {
         "drive.motor_constant_ratio": np.array([MOTORS[1] * flat.get("drive.motor_constant_ratio", 1.0)]),
         "friction.coulomb": np.array([COULOMB_LEVEL * flat["friction.coulomb"]]),

@@ -93,6 +93,9 @@ class Part:
     beyond: str = ""
     undecided: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "holds", bool(self.holds))  # NumPy's is no bool of JSON, in which findings are kept
+
     @property
     def open(self) -> str:
         """Return why the criterion is not decided; "" if it is."""

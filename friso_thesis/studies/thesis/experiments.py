@@ -44,6 +44,7 @@ from friso_thesis.studies.thesis.as_built import (
 )
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import PartNeeded
+from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import LOCKED
 
 FORCE_AMPLITUDE = 5.0
@@ -190,14 +191,14 @@ class Experiments:
         """Run an experiment that is not among the attributes yet."""
         if name not in _RUNS:
             raise AttributeError(name)
-        about, kind = ("experiment", name, self._stage_file), get_type_hints(Experiments)[name]
-        setattr(self, name, self._kept.result(about, kind, partial(_experiment, name, self._stage_file)))
+        about, kind = ("experiment", name, self._stage_file, settings.rail_count), get_type_hints(Experiments)[name]
+        setattr(self, name, self._kept.result(about, kind, partial(_experiment, name, *about[2:])))
         return vars(self)[name]
 
 
 @lru_cache(maxsize=64)
-def _experiment(name: str, stage_file: str) -> Any:
-    """Run an experiment by its name on the stage in the text of a stage file.
+def _experiment(name: str, stage_file: str, rails: int) -> Any:
+    """Run an experiment by its name on the stage in the text of a stage file, where it needs some on so many `rails`.
 
     The result is cached for the judges of several claims.
     """
@@ -287,6 +288,6 @@ _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
         GRID: grid,
         ON_RAILS: cycles,
         STANDSTILL: standstill,
-        TRACES: lambda stage: traces(stage, _lively_rail(_experiment(MOVES, stage.to_toml()))),
+        TRACES: lambda stage: traces(stage, _lively_rail(_experiment(MOVES, stage.to_toml(), settings.rail_count))),
     }
 )

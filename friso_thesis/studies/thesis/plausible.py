@@ -1,7 +1,7 @@
 """Judge the claims for random choices of the values that the thesis does not state.
 
 Such a choice of all values is a joint draw. The module finds in how many draws each claim holds, on which values that
-depends, and which draw fits the printed numbers best.
+depends, and which draw fits the printed numbers best. No more draws are made for a claim once they have decided.
 """
 
 from __future__ import annotations
@@ -9,14 +9,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
 from friso.escapes import one_line
-from friso.progress import Tally
-from friso.shares import Share, separation, share
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Registered, by_peak_count, by_way
+from friso.progress import Tally, silent
+from friso.shares import DOUBT_PROBABILITY, Share, separation, share
+from friso_thesis.studies.thesis.claims import (
+    ClaimJudgement,
+    Evidence,
+    Finding,
+    Part,
+    Registered,
+    by_peak_count,
+    by_way,
+)
 from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
@@ -25,9 +34,9 @@ from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import DRAW_SEED, FORCE_NOISE, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
 
-DRAW_COUNT, ANALYSED_EVERY = 48, 3
-"""Default number of joint draws, and interval between draws with linear analysis and experiments, which take longer
-than all maps."""
+DRAW_COUNT, ANALYSED_PART = settings.draw_looks[-1], 3
+"""Default number of joint draws, and that number over the number of draws with linear analysis and experiments, which
+take longer than all maps."""
 
 MAP_POINTS = 21
 """Values per axis of the maps of a draw, whatever the baseline has. Limits are interpolated."""
@@ -71,7 +80,8 @@ class ClaimInSpace:
     holds, and `holds` their fraction of the draws that decide; `parts` has the fraction for each part of the claim.
     `hangs_on` lists the values that decide whether the claim holds, the most decisive first. A draw counts as
     `undecided` if no criterion fails but one is open, or if the claim could not be computed; `failures` has the reasons
-    for the latter by number of the draw.
+    for the latter by number of the draw. The intervals hold, together, at all looks at a growing number of draws: each
+    misses with a part of 5 %.
     """
 
     seeds: tuple[tuple[int, int], ...]
@@ -101,6 +111,35 @@ class ClaimInSpace:
         """Return for how many random choices of the open values a part of the claim holds."""
         return self.parts[part].met
 
+    def judged(self, own: Finding) -> ClaimJudgement:
+        """Return the judgement on a claim with the finding `own` at friso's choice of the open values.
+
+        One rule serves all claims: the interval of the share in which a claim holds, of the draws that decide. If these
+        are fewer than `least_decided`, or the interval is too wide for any other word, the claim is "not decided
+        enough". It "holds" if it holds at friso's choice and the interval lies above `half_share`. If it fails at
+        friso's choice and the interval ends below `rare_share`, it fails as it does there, in part or wholly. It
+        "depends" if it holds somewhere (at friso's choice, or in more than stray draws) and fails somewhere.
+        """
+        if not turns(own):
+            return own.judgement
+        holds, low, high, stray = own.judgement == "holds", self.holds.low, self.holds.high, settings.stray_share
+        if self.decided < settings.least_decided:
+            return "not decided enough"
+        if (low > settings.half_share) if holds else (high <= settings.rare_share):
+            return own.judgement
+        return "depends" if (holds or low > stray) and (not holds or high < 1 - stray) else "not decided enough"
+
+    def settled(self, own: Finding) -> bool:
+        """Tell whether the draws have decided: no more of them turn the judgement if the interval holds the share."""
+        border = settings.half_share if own.judgement == "holds" else settings.rare_share
+        decides = self.holds.low > border or self.holds.high <= border
+        return not turns(own) or (self.decided >= settings.least_decided and decides)
+
+
+def turns(own: Finding) -> bool:
+    """Tell whether draws can turn the judgement of a finding at friso's choice: a criterion fails, or all hold."""
+    return own.judgement == "holds" or False in own.pattern
+
 
 @dataclass(frozen=True)
 class PrintedNumber:
@@ -118,75 +157,94 @@ class BestFit:
 
     friso's own choice counts as one, numbered -1. `misfit` is the root mean square of the logarithms of found over
     printed numbers, and `at_baseline` that of friso's choice. All are on maps of `MAP_POINTS` values per axis.
-    `numbers` are the numbers compared.
+    `numbers` are the numbers compared, and `draws` is in how many draws all of them were judged.
     """
 
     draw: Draw
     misfit: float
     at_baseline: float
     numbers: tuple[PrintedNumber, ...]
+    draws: int
 
 
 @dataclass(frozen=True)
 class Plausible:
     """Results on all claims, by name, for random choices of the open values.
 
-    There are the best fit (None without draws), and the findings at friso's `own` choice, on maps of `MAP_POINTS`
-    values per axis.
+    There is the best fit, None without draws. A claim without draws is not among the `claims`.
     """
 
     draws: tuple[Draw, ...]
     claims: Mapping[str, ClaimInSpace]
     fit: BestFit | None
-    own: Mapping[str, Finding]
 
 
 def plausible(
-    entries: Mapping[str, Registered], draws: int, kept: Kept = NOT_KEPT, tally: Tally | None = None
+    entries: Mapping[str, Registered],
+    findings: Mapping[str, Finding],
+    draws: int,
+    kept: Kept = NOT_KEPT,
+    tally: Tally | None = None,
 ) -> Plausible:
-    """Judge the claims for `draws` random choices of the values that the thesis leaves open.
+    """Judge the claims for up to `draws` random choices of the values that the thesis leaves open.
 
-    Claims on linear analysis or experiments are judged in one of `ANALYSED_EVERY` draws. Claims on maps and responses
-    alone are also judged at friso's own choice, which may be the best fit. `kept` has saved findings, and `tally`
-    counts the progress.
+    `findings` are those at friso's own choice; a claim whose judgement draws cannot turn, or that nothing drawn enters,
+    has no draws. The others are looked at after some draws, and those that have decided are drawn no further. Claims on
+    linear analysis or experiments are judged in the first draws alone, one of `ANALYSED_PART`. Claims that print a
+    number are also judged at friso's own choice on maps as coarse as those of a draw: it may be the best fit. `kept`
+    has saved findings, and `tally` counts the progress.
     """
-    cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
-    costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
-    drawn = tuple(draw(number) for number in range(draws))
-    own: dict[str, Finding] = {}
-    by_claim_tried: dict[str, list[tuple[Draw, Finding | None]]] = {name: [] for name in (*cheap, *costly)}
-    failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
-    pieces = [(one, cheap, _work(cheap)) for one in (*drawn, baseline()) if drawn and cheap]
-    pieces += [(one, costly, _work(costly)) for one in drawn[ANALYSED_EVERY - 1 :: ANALYSED_EVERY] if costly]
+    tally, drawn = tally or Tally(silent, 0), tuple(draw(number) for number in range(draws))
+    tried: dict[str, list[tuple[Draw, Finding | None]]] = {}
+    failures: dict[str, dict[int, str]] = {name: {} for name in entries}
+    by_claim: dict[str, ClaimInSpace] = {}
 
-    def judged(one: Draw, group: Mapping[str, Registered], work: int) -> Findings:
+    def judged(one: Draw, group: Mapping[str, Registered]) -> Findings:
         about = ("draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
-        findings = kept.findings(about, partial(_judged, group, one))
-        if tally:
-            tally.add(work, f"{one.name} of {draws}" if one in drawn else "friso's own choice")
-        return findings
+        by_name = kept.findings(about, partial(_judged, group, one))
+        tally.add(_work(group), f"{one.name} of {draws}" if one in drawn else "friso's own choice")
+        return by_name
 
-    by_piece = side_by_side([partial(judged, *piece) for piece in pieces])
-    for (one, group, _), findings in zip(pieces, by_piece, strict=True):
-        for name in group:
-            finding = findings.get(name)
-            if one in drawn:
-                by_claim_tried[name].append((one, finding))
-                failures[name] |= {} if finding else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
-            elif finding:
-                own[name] = finding
-    by_claim = {
-        name: _in_space(entries[name], tried, failures[name]) for name, tried in by_claim_tried.items() if tried
+    left = {name: entry for name, entry in entries.items() if turns(findings[name])}
+    tally.total -= work_of(entries, draws) - work_of(left, draws)
+    for first, last in pairwise((0, *looks(draws))):
+        pieces = [(one, group) for one in drawn[first:last] if (group := _judged_in(left, one.number, draws))]
+        each_finding = side_by_side([partial(judged, *piece) for piece in pieces])
+        for (one, group), by_name in zip(pieces, each_finding, strict=True):
+            for name in group:
+                finding = by_name.get(name)
+                tried.setdefault(name, []).append((one, finding))
+                failures[name] |= {} if finding else {one.number: by_name[f"{name} {FAILED}"].parts[0].number}
+        by_claim |= {name: _in_space(entries[name], tried[name], failures[name]) for name in left if name in tried}
+        ahead = work_of(left, draws, last)
+        left = {name: entry for name, entry in left.items() if not _settled(by_claim.get(name), findings[name])}
+        tally.total -= ahead - work_of(left, draws, last)
+    printing = {name: entries[name] for name in tried if numbers_of(name, findings[name])}
+    tally.total += _work(printing)
+    own = judged(baseline(), printing) if printing else {}
+    return Plausible(drawn, by_claim, _fit({name: tried[name] for name in printing}, own))
+
+
+def _settled(space: ClaimInSpace | None, own: Finding) -> bool:
+    return space is not None and space.settled(own)
+
+
+def looks(draws: int) -> tuple[int, ...]:
+    """Return after how many of at most `draws` draws the claims are looked at."""
+    return (*(count for count in settings.draw_looks if count < draws), draws) if draws else ()
+
+
+def _judged_in(entries: Mapping[str, Registered], number: int, draws: int) -> dict[str, Registered]:
+    """Return the claims that are judged in one of `draws` draws, by its number."""
+    analysed = number < draws // ANALYSED_PART
+    return {
+        name: entry for name, entry in entries.items() if entry.needs and (analysed or not entry.needs & PARTS.keys())
     }
-    fit = _fit({name: by_claim_tried[name] for name in cheap}, own)
-    return Plausible(drawn, by_claim, fit, own)
 
 
-def work_of(entries: Mapping[str, Registered], draws: int) -> int:
-    """Return the amount of work for `draws` random rigs, in units of the progress tally."""
-    cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
-    costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
-    return (draws + bool(draws)) * _work(cheap) + draws // ANALYSED_EVERY * _work(costly)
+def work_of(entries: Mapping[str, Registered], draws: int, first: int = 0) -> int:
+    """Return the most work that draws from the number `first` on take, in units of the progress tally."""
+    return sum(_work(_judged_in(entries, number, draws)) for number in range(first, draws))
 
 
 def _work(entries: Mapping[str, Registered]) -> int:
@@ -265,12 +323,11 @@ def _met(column: Sequence[bool | None], count: int) -> MetPart:
 def _share(flags: np.ndarray, count: int) -> Share:
     """Return the fraction of true flags among `count` random choices, with its interval.
 
-    Choices without a flag count as undecided.
+    Choices without a flag count as undecided. All looks together miss the fraction with a probability of 5 %.
     """
     missing = count - len(flags)
-    return share(
-        np.append(flags, np.zeros(missing, bool)), np.append(np.ones(len(flags), bool), np.zeros(missing, bool))
-    )
+    decided = np.append(np.ones(len(flags), bool), np.zeros(missing, bool))
+    return share(np.append(flags, np.zeros(missing, bool)), decided, DOUBT_PROBABILITY / len(settings.draw_looks))
 
 
 def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) -> Iterator[Separation]:
@@ -298,8 +355,9 @@ def _fit(
     left.
     """
     first = baseline()
-    at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]
-    by_draw: dict[int, list[PrintedNumber]] = {first.number: at_baseline}
+    by_draw: dict[int, list[PrintedNumber]] = {
+        first.number: [item for name, finding in own.items() for item in numbers_of(name, finding)]
+    }
     drawn: dict[int, Draw] = {first.number: first}
     for name, tried in by_claim_tried.items():
         for one, finding in tried:
@@ -312,7 +370,8 @@ def _fit(
     if not usable:
         return None
     best = min(usable, key=lambda number: usable[number])
-    return BestFit(drawn[best], usable[best], misfits.get(first.number, np.inf), tuple(by_draw[best]))
+    others = len(misfits.keys() - {first.number})
+    return BestFit(drawn[best], usable[best], misfits.get(first.number, np.inf), tuple(by_draw[best]), others)
 
 
 def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:

@@ -110,9 +110,9 @@ def reproduce(
     Maps have `points` values per axis, and for judging at least `JUDGED_POINTS`. With `only`, just these claims are
     judged, with what they need, and the result has no others. `with_cycles` also computes the hunting
     cycles behind every map, and adds to each judgement what attracts the stages. With `draws`, every claim is judged in
-    as many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not computed
-    again. `progress` is called with steps done, steps in all and what comes next. Raises InputError for an unknown
-    study or claim and for numbers that are too low or too high, ValueError for an unusable rtol.
+    up to as many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not
+    computed again. `progress` is called with steps done, steps in all and what comes next. Raises InputError for an
+    unknown study or claim and for numbers that are too low or too high, ValueError for an unusable rtol.
     """
     chosen, asked = _studies(names), _claims(only)
     _check("points", points, 3, MOST_POINTS, "41")
@@ -128,7 +128,8 @@ def reproduce(
     judged_points = max(points, JUDGED_POINTS)
     half = -(-judged_points // 2)
     total = len(studies) * (judged_points**2 + half**2) + sum(map(_part_work, parts)) + work_of(entries, draws)
-    total += with_cycles * sum(map(_survey_work, studies.values())) + 2 * points**2 * ("isolator-damping" in studies)
+    surveyed_studies = _surveyed_studies(entries, studies, asked) if with_cycles else []
+    total += sum(map(_survey_work, surveyed_studies)) + 2 * points**2 * ("isolator-damping" in studies)
     tally = Tally(progress, total)
     tally.add(0, "responses")
     base = evidence(needs - STUDIES.keys(), judged_points, rtol, kept=kept)
@@ -153,9 +154,9 @@ def reproduce(
         tally.add(_survey_work(study) // 2, f"edges of hunting, map {study.panel}")
         return surveyed, cycles
 
-    studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
-    surveyed = {name: of_map for name, (of_map, _) in zip(studies, studied, strict=with_cycles)}
-    cycles = {name: of_map for name, (_, of_map) in zip(studies, studied, strict=with_cycles)}
+    studied = side_by_side([partial(behind, study) for study in surveyed_studies])
+    surveyed = {study.name: of_map for study, (of_map, _) in zip(surveyed_studies, studied, strict=True)}
+    cycles = {study.name: of_map for study, (_, of_map) in zip(surveyed_studies, studied, strict=True)}
     by_count, readings, attracting = {}, {}, {}
     for name, entry in entries.items():
         with words_read() as words:
@@ -163,7 +164,7 @@ def reproduce(
         readings[name] = _read_otherwise(entry, base, words)
         if (attracts := _by_attraction(entry, base, surveyed, cycles)) is not None:
             attracting[name] = attracts
-    space = plausible(entries, draws, kept, tally)
+    space = plausible(entries, by_count, draws, kept, tally)
     others = _others(entries, base, loose)
     verdicts = tuple(
         verdict(
@@ -196,6 +197,17 @@ def reproduce(
 def _part_work(part: str) -> int:
     """Return the progress steps that a part of the linear analysis, or an experiment, takes."""
     return dict(settings.experiment_work).get(part, settings.linear_work)
+
+
+def _surveyed_studies(
+    entries: Mapping[str, Registered], studies: Mapping[str, ThesisStudy], asked: frozenset[str] | None
+) -> list[ThesisStudy]:
+    """Return the studies behind whose maps cycles are looked for: all, or those of claims `asked` for by name.
+
+    Claims about runs alone need none.
+    """
+    needs = {need for entry in entries.values() if not entry.of_runs for need in entry.needs}
+    return [study for name, study in studies.items() if asked is None or name in needs]
 
 
 def _survey_work(study: ThesisStudy) -> int:

@@ -40,28 +40,10 @@ class ClaimVerdict:
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """Return the judgement, at friso's own choice of the open values and at random ones.
-
-        One rule serves all claims: the 95 % interval of the share in which a claim holds, of the draws that decide. If
-        these are fewer than `least_decided`, or the interval is too wide for any other word, the claim is "not decided
-        enough". It "holds" if it holds at friso's choice and the interval lies above `half_share`. If it fails at
-        friso's choice and the interval ends below `rare_share`, it fails as it does there, in part or wholly. It
-        "depends" if it holds somewhere (at friso's choice, or in more than stray draws) and fails somewhere.
-        """
+        """Return the judgement, at friso's own choice of the open values and at random ones (`ClaimInSpace.judged`)."""
         if self.finding is None:
             return "not yet covered"
-        own, space = self.finding.judgement, self.space
-        holds, fails = own == "holds", False in self.finding.pattern
-        if space is None or not (holds or fails):
-            return own
-        low, high, stray = space.holds.low, space.holds.high, settings.stray_share
-        if space.decided < settings.least_decided:
-            return "not decided enough"
-        if holds and low > settings.half_share:
-            return own
-        if fails and high <= settings.rare_share:
-            return own
-        return "depends" if (holds or low > stray) and (fails or high < 1 - stray) else "not decided enough"
+        return self.space.judged(self.finding) if self.space else self.finding.judgement
 
     @property
     def robust(self) -> bool:
@@ -90,14 +72,20 @@ class ClaimVerdict:
             sentence += f"; that depends on {_listed(self.space)}." if self.space.hangs_on else "."
             sentence += " No choice of the unstated values that was tried makes it hold." if self.robust else ""
             sentence += self._too_few
+        return " ".join((sentence, *self.besides))
+
+    @property
+    def besides(self) -> tuple[str, ...]:
+        """Say in sentences what turns a criterion, or may, besides the random open values."""
+        sentences = []
         if self.turned:
-            sentence += f" With {' and with '.join(self.turned)} a criterion is judged otherwise."
+            sentences.append(f"With {' and with '.join(self.turned)} a criterion is judged otherwise.")
         if self.reread:
             turns = "; ".join(f"{name}: {self._word_of(finding)}" for name, finding in self.reread.items())
-            sentence += f" Other readings of the thesis's words turn a criterion: {turns}."
+            sentences.append(f"Other readings of the thesis's words turn a criterion: {turns}.")
         if self.undrawn:
-            sentence += f" It depends also on what is assumed and not drawn: {self.undrawn}."
-        return sentence
+            sentences.append(f"It depends also on what is assumed and not drawn: {self.undrawn}.")
+        return tuple(sentences)
 
     @property
     def _too_few(self) -> str:

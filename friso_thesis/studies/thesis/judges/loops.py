@@ -143,6 +143,45 @@ def _and(case: LimitCase) -> str:
     return " and ".join(f"{f:.4g}" for f in case.resonances) + " Hz"
 
 
+@judges("F7L", figure="7", needs=(PLANT,))
+def spring_mass_and_damper_lines(evidence: Evidence) -> Finding:
+    """Judge which lines the plant follows far below its resonances: a spring if stuck, mass and damper if sliding."""
+    analysis = evidence.analysis
+    low = {name: analysis.plants[name].low for name in (*_FREE, *_TOUCHED)}
+    spring = {"stuck": analysis.springs.joint, "stuck-touched": analysis.springs.bristles}
+    slides = {name: low[name] for name in low if name.startswith("sliding")}
+    whole = _masses(evidence)[True]
+    return Finding.of(
+        Part(
+            "with the cart stuck it is a spring at low frequency: about as stiff as the joint (within a factor of "
+            f"{words.about:g}), and with the limiter touched as the bristles before sliding",
+            all(about(low[name].stiffness, stiffness) for name, stiffness in spring.items()),
+            " and ".join(f"{low[name].stiffness:.4g} N/m of {stiffness:.4g}" for name, stiffness in spring.items()),
+            why="The spring there is another.",
+        ),
+        Part(
+            f"with the cart sliding it follows the mass line of about the whole {whole:.3g} kg, without a spring",
+            all(about(one.mass, whole) and abs(one.stiffness) < LITTLE_SPRING for one in slides.values()),
+            ", ".join(f"{name} {one.mass:.3g} kg" for name, one in slides.items()),
+            why="Another mass moves there.",
+        ),
+        Part(
+            "at even lower frequencies the damper dominates: the mass line ends far below the first resonance (by a "
+            f"factor of more than {words.order:.2g})",
+            all(
+                one.damping > 0 and analysis.plants[name].first > words.order * one.corner
+                for name, one in slides.items()
+            ),
+            ", ".join(f"{name} {one.damping:.3g} N s/m, below {one.corner:.2g} Hz" for name, one in slides.items()),
+            why="The damper outweighs the mass up to the resonance.",
+        ),
+    )
+
+
+LITTLE_SPRING = 1e-3
+"""Stiffness [N/m] below which a sliding plant has no spring: rounding leaves a millionth of it."""
+
+
 SIMULATED_HIGHEST, MEASURED_HIGHEST = 60.0, 48.0
 """Highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
 

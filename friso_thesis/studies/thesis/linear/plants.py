@@ -118,17 +118,32 @@ FINER_POINTS = 201
 
 
 @dataclass(frozen=True)
+class LowLines:
+    """Lines that a plant follows far below its first resonance: stiffness [N/m], damping [N s/m] and mass [kg]."""
+
+    stiffness: float
+    damping: float
+    mass: float
+
+    @property
+    def corner(self) -> float:
+        """Return the frequency [Hz] below which the damper outweighs the mass."""
+        return self.damping / self.mass / (2 * np.pi)
+
+
+@dataclass(frozen=True)
 class LimitCase:
     """Stage position over force in one limit case.
 
     `resonances` and `antiresonances` [Hz] ascend. `mass` [kg] is the mass whose line the response follows below the
-    parasitic mode, at `mass_at` [Hz]; both are NaN without such a line.
+    parasitic mode, at `mass_at` [Hz]; both are NaN without such a line. `low` has its lines below all resonances.
     """
 
     resonances: tuple[float, ...]
     antiresonances: tuple[float, ...]
     mass: float
     mass_at: float
+    low: LowLines
 
     @property
     def parasitic(self) -> float:
@@ -182,10 +197,18 @@ def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
 def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
     omega = frequencies(flat, member, DriveTiming.of(flat), settings.margin_density, [plant_poles(flat, member)])
     resonances, antiresonances = (_peaks(flat, member, omega, sign) for sign in (1, -1))
-    at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan))
+    low = _low_lines(flat, member, omega[0])
+    at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan, low))
     omega_at = np.array([2 * np.pi * at])
     mass = np.nan if np.isnan(at) else float(1 / (abs(plants(flat, member, omega_at)[0, 0]) * omega_at[0] ** 2))
-    return LimitCase(resonances, antiresonances, mass, at)
+    return LimitCase(resonances, antiresonances, mass, at, low)
+
+
+def _low_lines(flat: Mapping[str, Any], member: Members, lowest: float) -> LowLines:
+    """Return the lines of a plant at frequencies far below the `lowest` searched [rad/s], where nothing resonates."""
+    omega = float(lowest) * np.array([1e-4, 1e-1])
+    spring, force = (complex(value) for value in 1 / plants(flat, member, omega)[0])
+    return LowLines(spring.real, force.imag / float(omega[1]), (spring.real - force.real) / float(omega[1]) ** 2)
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
