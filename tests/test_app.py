@@ -935,6 +935,7 @@ def test_a_verdict_that_leaves_out_an_unstable_drive_is_not_certain(served: Serv
     """The wrist of the examples settles without its delays, with which it buzzes."""
     answer = served.ask(question, Path(friso.example("robot_wrist")))[-1]
     assert (answer["verdict"], answer["certain"]) == ("settles", False)
+    assert answer["in_short"] == "unstable with its delay; without: settles"
     assert served.ask(question, RIG)[-1]["certain"]
 
 

@@ -33,9 +33,21 @@ from pages import NAMESPACES, Page, packed_values
 from patched import patched
 from snapshots import Snapshots
 
-from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing, advised
+from friso.hunting import (
+    AttractionEnd,
+    BandwidthWindow,
+    CheckPart,
+    Judgement,
+    Kick,
+    LoopState,
+    LowerGains,
+    Margin,
+    StickSlipSpeeds,
+    Swing,
+    advised,
+)
 from friso.hunting.criteria import Verdict
-from friso.questions.check.cases import rows, rows_behind
+from friso.questions.check.cases import case_document, rows, rows_behind
 from friso.questions.check.figures import check_figures, response_figure
 from friso.questions.check.words import answer, conclusion, details_sentences, edge_text, verdict_sentence
 from friso.shown import pages
@@ -43,6 +55,8 @@ from friso.shown.cases import COLOURS, ShownCase, shown_cases
 from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Figure
+from friso.shown.loop_words import UNSTABLE_AS_BUILT
+from friso.shown.motion_words import stick_slip_sentences
 from friso.shown.pages import made_with
 from friso.version import VERSION
 
@@ -349,6 +363,49 @@ AMPLITUDE, CONSTANT, MULTIPLIER = "Hunting cycle, amplitude", "Hunting cycle, ti
 EDGE, TAKEN, PEAKS = "Edge of hunting", "Multiplier taken over", "Counted peaks"
 WHOLE = hunts(hunting=fake_hunting(replace(PAIR, multiplier=-0.93, growth=np.nan)))
 SURE, UNSURE = (Margin(1.2187, 9.7496, certain, 1.2248) for certain in (True, False))
+
+
+UNDELAYED = settles(hunting=replace(fake_hunting(), certain=False, reason=UNSTABLE_AS_BUILT))
+RESTLESS = settles(verdict="transient", hunting=UNCERTAIN, settled_after=None)
+BOTH: tuple[LoopState, ...] = ("sticks", "slides")
+
+
+@pytest.mark.parametrize(
+    ("judgement", "changes", "words"),
+    [
+        (hunts(), {"unstable": BOTH}, "unstable; hunts"),
+        (hunts(), {"unstable": ("slides",)}, "unstable while it slides; hunts"),
+        (RESTLESS, {"unstable": BOTH}, "unstable"),
+        (settles(verdict="failed"), {"unstable": BOTH, "runs_away": True}, "unstable; runs away"),
+        (UNDELAYED, {"unstable_as_built": BOTH}, "unstable with its delay; without: settles"),
+        (settles(hunting=UNCERTAIN), {"unstable_as_built": ("sticks",)}, "without: settles (not certain)"),
+    ],
+)
+def test_sentence_table_and_document_agree_on_an_unstable_loop(judgement: Judgement, changes: Any, words: str) -> None:
+    """The loop comes first everywhere; friction is not said to hunt, nor not to, where the loop decides."""
+    case = replace(fake_case(), judgement=judgement, **changes)
+    verdict = tabled(judgement, **changes)["Verdict"]
+    assert verdict is not None
+    assert words in verdict
+    assert case_document(case)["verdict_in_short"] == verdict
+    says = sentence(judgement, **changes)
+    assert "unstable" in says
+    assert ("hunt" in says.lower()) == (judgement.verdict == "hunts")
+
+
+@pytest.mark.parametrize(
+    ("lasts", "sticks", "words"),
+    [
+        (True, True, "sticks and slips"),
+        (True, False, "swings about its reference"),
+        (False, False, "slides smoothly"),
+        (None, False, "no verdict"),
+    ],
+)
+def test_sentence_and_table_agree_on_steady_sliding(lasts: bool | None, sticks: bool, words: str) -> None:
+    speeds = StickSlipSpeeds(lasts, sticks, 1e-6, None, (), (1e-3, 1e-3), 0)
+    assert words in str(tabled(settles(verdict="none"), stick_slip=speeds)["Verdict"])
+    assert words in stick_slip_sentences(speeds, 1e-3)[0] or lasts is None
 
 
 @pytest.mark.parametrize(

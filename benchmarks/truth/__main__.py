@@ -164,7 +164,7 @@ def _arguments() -> argparse.Namespace:
         choices=SERIES,
         default="stages",
         help="machines: cascades, transmissions, deadbands; axes: of machine tools, with settings against friction; "
-        "drives: axes with friction at the motor; servos: with the friction of robots' joints, and settings at standstill",
+        "drives: axes with friction at the motor; servos: with friction of joints, settings at standstill",
     )
     parser.add_argument("--checks", action="store_true", help="check the stages alone, and refute nothing")
     parser.add_argument("--simulate", action="store_true", help="compare runs of the stages with SciPy instead")

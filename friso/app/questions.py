@@ -25,7 +25,7 @@ from friso.app.uploads import Uploads
 from friso.axis import speaking_of
 from friso.equations.motion import rests
 from friso.errors import InputError
-from friso.hunting import cannot_hunt, is_moved_evenly
+from friso.hunting import cannot_hunt, is_moved_evenly, unstable
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import MAPPABLE
@@ -34,8 +34,9 @@ from friso.quantities import exactly
 from friso.questions.check.question import lost_as_built
 from friso.questions.logs.question import options_of
 from friso.questions.map.places import SHOWN, with_places
-from friso.shown.cases import COLOURS, case_labels
+from friso.shown.cases import COLOURS, case_labels, verdict_in_short
 from friso.shown.drawing.figure import Figure
+from friso.shown.loop_words import after_loop
 from friso.shown.unknown import unknown_condition
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
@@ -223,8 +224,10 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
         words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
     work.notes += [*work.meanwhile, *filter(None, [unknown_condition(stage).removesuffix(": ")])]
-    certain = not stage.doubt and not lost_as_built(stage)
-    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)], "certain": certain}
+    word, lost = words[_given(stage)], lost_as_built(stage)
+    short = after_loop(f"{word}{' (not certain)' if stage.doubt else ''}", unstable(stage), lost)
+    certain = {"certain": not stage.doubt and not lost, "in_short": short}
+    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": word, **certain}
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -236,7 +239,8 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     stage = asked.machine.stage
     more = {"cases": _labelled(stage, cases), "verdict": cases[_given(stage)], **_lines("check", asked, options)}
     more["cures"] = cures_of(answer.result, _given(stage))
-    more["certain"] = answer.result[_given(stage)].judgement.hunting.certain
+    case = answer.result[_given(stage)]
+    more |= {"certain": case.judgement.hunting.certain, "in_short": verdict_in_short(case)}
     yield parts_of(answer, ghosts, **more)
 
 

@@ -114,7 +114,9 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
         raise InputError("friction.model", quoted(model), f"one of {', '.join(sorted(FRICTION.classes))}")
     law: type[Section] = friction_law(model)
     names = [name for name in numeric_fields(law) if law.model_fields[name].is_required() and not guessed]
-    contact, of_what = ("ball screw", "the guide") if kind == LINEAR else ("strain-wave gear", "the bearings and the gear")
+    contact, of_what = (
+        ("ball screw", "the guide") if kind == LINEAR else ("strain-wave gear", "the bearings and the gear")
+    )
     instead = f'; or friction.coulomb and friction.guess="{contact}" alone, or friction.model=none'
     meaning = dict.fromkeys(names, f"friction of {of_what}{instead if model == 'lugre' else ''}")
     asked += _of_table("friction", law, names, meaning, kind)

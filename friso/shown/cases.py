@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from friso.axis import unit_shown
 from friso.hunting import Case
 from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
-from friso.shown.loop_words import UNSTABLE_AS_BUILT, unstable_in_short
+from friso.shown.loop_words import UNSTABLE_AS_BUILT, after_loop
 from friso.shown.motion_words import stick_slip_in_short
 from friso.stage import Stage
 
@@ -23,12 +23,8 @@ def band_text(band: float) -> str:
 
 def verdict_in_short(case: Case) -> str:
     """Write the verdict as tables, pages and documents show it: how the loop is unstable, then what the stage does."""
-    if case.unstable:
-        does = "" if swings_by_its_loop(case) else f"; {_does(case)}"
-        return f"{unstable_in_short(case.unstable)}{does}"
-    if built := case.unstable_as_built:
-        return f"{unstable_in_short(built).replace('unstable', 'unstable with its delay')}; without: {_does(case)}"
-    return _does(case)
+    does = "" if swings_by_its_loop(case) else _does(case)
+    return after_loop(does, case.unstable, case.unstable_as_built)
 
 
 def swings_by_its_loop(case: Case) -> bool:

@@ -24,6 +24,13 @@ def unstable_where(states: tuple[LoopState, ...]) -> str:
     return f"unstable {where}, whatever the friction: retune the controller (friso bode)"
 
 
-def unstable_in_short(states: tuple[LoopState, ...]) -> str:
-    """Say in the fewest words that a loop is unstable, and in which state if it is stable in the other."""
-    return "unstable" if len(states) > 1 else f"unstable while it {states[0]}"
+def after_loop(does: str, unstable: tuple[LoopState, ...], as_built: tuple[LoopState, ...]) -> str:
+    """Say in the fewest words that a loop is unstable, itself or with its drive, and what the stage `does` then.
+
+    A state is named if the loop is stable in the other one.
+    """
+    states, drive, then = (unstable, "", "; ") if unstable else (as_built, " with its delay", "; without: ")
+    if not states:
+        return does
+    where = "" if len(states) > 1 else f" while it {states[0]}"
+    return f"unstable{drive}{where}{then if does else ''}{does}"

@@ -25,7 +25,8 @@ function show(version, answer, newCases, newRest) {
   const taken = cures.taken();
   const ways = (answer.cures ?? []).map(({ label, values }) => el("button", { type: "button", class: "cure", onclick: () => cures.set(label, values) }, label));
   const back = taken ? [el("button", { type: "button", class: "cure", onclick: cures.back }, `Take back: ${taken}`)] : [];
-  const said = answer.verdict in WORDS ? [el("strong", { class: answer.certain ? answer.verdict : "" }, `${WORDS[answer.verdict]}${answer.certain ? "" : " (not certain)"}`)] : [];
+  const short = (answer.in_short ?? "none").replace(answer.verdict, WORDS[answer.verdict] ?? answer.verdict);
+  const said = short === "none" ? [] : [el("strong", { class: answer.certain && !short.startsWith("unstable") ? answer.verdict : "" }, short)];
   word.replaceChildren(...said, ...ways, ...back);
   cases.replaceChildren(...newCases);
   if (newRest) rest.replaceChildren(...newRest);
