@@ -194,6 +194,14 @@ def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
     assert np.array(by_map.windows) == pytest.approx(np.array(long_runs.windows), rel=0.02)
 
 
+def test_no_map_decides_on_kicks_under_friction_that_follows_the_drive(locked: Stage) -> None:
+    """Of a drawn stage it called three of 128 displacements hunting from which long runs come to rest."""
+    law = {"friction.model": "load_dependent", "friction.load_coefficient": 0.05}
+    followed = locked.replace(law)
+    assert hunting(followed).attracting
+    assert _map_of(followed) is None
+
+
 def test_a_map_without_all_that_attracts_tells_nothing_of_kicks(locked: Stage) -> None:
     surveyed = hunting(locked).surveyed
     assert surveyed is not None

@@ -236,8 +236,11 @@ def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:
 
 
 def map_may_decide(stages: Ensemble) -> bool:
-    """Tell whether maps may decide what attracts stages: they have one, and remember no past."""
-    return has_a_map(stages) and not stages.remember
+    """Tell whether maps may decide what attracts stages: they have one, and remember no past.
+
+    Friction that follows the drive's force lets stages land elsewhere than their distance foretells.
+    """
+    return has_a_map(stages) and not stages.remember and not stages.structure.follows_drive
 
 
 def has_a_map(stages: Ensemble) -> bool:
