@@ -32,5 +32,5 @@ def after_loop(does: str, unstable: tuple[LoopState, ...], as_built: tuple[LoopS
     states, drive, then = (unstable, "", "; ") if unstable else (as_built, " with its delay", "; without: ")
     if not states:
         return does
-    where = "" if len(states) > 1 else f" while it {states[0]}"
+    where = "" if len(states) > 1 else f" while it {next(iter(states))}"
     return f"unstable{drive}{where}{then if does else ''}{does}"

@@ -231,7 +231,7 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
             keys |= {f"{PARTS}.integral": scale * leak * share / (1 - half), f"{PARTS}.leak": leak / (1 - half)}
             stiffness, zeros, poles = scale * leak * static, others, rest
     keys[f"{PARTS}.stiffness"] = stiffness
-    terms = {"static stiffness": stiffness, **({"gain of the integral": scale * share} if infinite.any() else {})}
+    terms = {"static stiffness": stiffness, "gain of the integral": keys.get(f"{PARTS}.integral", 1.0)}
     for name, value in terms.items():
         if not value > 0:
             raise _wrong(f"a {name} of {value:.6g}", f"a controller that pulls back: a {name} greater than 0")
