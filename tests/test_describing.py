@@ -16,9 +16,11 @@ from variants import (
     DAHL,
     HOLD,
     NO_FRICTION,
+    dwell,
     elasto_plastic,
     free,
     gms,
+    load_dependent,
     lugre,
     maxwell,
     rolling,
@@ -44,6 +46,8 @@ LAWS = {
     "elasto_plastic": elasto_plastic(),
     "gms": gms(),
     "rolling": rolling(),
+    "dwell": dwell(),
+    "load_dependent": load_dependent(),
 }
 STICKING = {"maxwell_slip", "elasto_plastic", "gms"}
 """Laws of which all or a part follows small motions as a spring."""

@@ -95,7 +95,7 @@ def test_prefixed_lengths_read_between_one_and_a_thousand(value):
         (None, "s", "–"),
         (float("nan"), "s", "–"),
         (1234.5, "s", "1234 s"),
-        (1e-15, "m", "1.00e-06 nm"),
+        (1e-15, "m", "< 0.00100 nm"),
         (0.0496, "Hz", "0.0496 Hz"),
     ],
 )
