@@ -280,6 +280,10 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "two integrals": ({"numerator": [100.0, 200.0], "denominator": [1.0, 0.0, 0.0]}, "one integral"),
     "at z = -1": ({"numerator": [5.0, 4.0], "denominator": [1.0, 1.0], "sample_time": "1 ms"}, "z = -1"),
     "pushes away": ({"numerator": [-100.0], "denominator": [1.0, 3.0]}, "pulls back"),
+    "integral pushes away": (
+        {"numerator": [120.0, 8000.0, -4e4], "denominator": [0.001, 1.0, 0.0]},
+        "gain of the integral greater than 0",
+    ),
     "no stiffness": ({"numerator": [100.0, 0.0], "denominator": [1.0, 3.0]}, "pulls back"),
     "nothing": ({}, "one of numerator"),
     "two ways": ({"numerator": [1.0], "denominator": [1.0, 2.0], "poles": [-3.0]}, "one of numerator"),
