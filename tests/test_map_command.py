@@ -328,3 +328,12 @@ def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(mapped: tuple[Pa
     done = friso_inside(tmp_path, "map", RIG, *small, "--metric", "peaks")
     assert done.returncode == 0, done.stderr
     assert "verdict" in xr.open_zarr(more)
+
+
+def test_a_map_says_that_it_leaves_out_a_drive_that_makes_the_loop_unstable() -> None:
+    """A wrist that buzzes by its delay settles on a map, which knows of no delay."""
+    axes = {"speed": [0.9, 1.1], "friction": [0.9, 1.1]}
+    for name, said in (("robot_wrist", True), ("thesis_drive", False)):
+        answer = friso_api.sweep(friso_api.example(name), axes)
+        assert answer.sentences()[0].startswith("Without the samples and delays of its drive") == said
+        assert ("condition" in answer.document()) == said

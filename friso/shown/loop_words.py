@@ -8,9 +8,26 @@ from friso.shown.drawing.prefixes import listed
 
 if TYPE_CHECKING:
     from friso.hunting import LoopState
+    from friso.stage import Stage
 
 UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with which the loop is unstable"
 """Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
+
+
+def lost_as_built(stage: Stage) -> tuple[LoopState, ...]:
+    """Return the states in which samples and delays of the drive make the loop of a stage unstable."""
+    if not any(key.startswith("drive.") for key in stage.flat()):
+        return ()
+    from friso.frequency.crossover import unstable_as_built  # 0.3 s to import
+
+    states: tuple[LoopState, LoopState] = ("sticks", "slides")
+    return tuple(state for state, lost in zip(states, unstable_as_built(stage.flat()), strict=True) if lost)
+
+
+def without_drive(stage: Stage) -> str:
+    """Write as a condition that an answer leaves out the drive, which makes the loop unstable; "" if it does not."""
+    lost = lost_as_built(stage)
+    return "Without the samples and delays of its drive, with which the loop is unstable: " if lost else ""
 
 
 def unstable_loop(states: tuple[LoopState, ...]) -> list[str]:

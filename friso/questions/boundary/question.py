@@ -36,6 +36,13 @@ class BoundaryAnswer(Answer):
     name: str
 
     @property
+    def condition(self) -> str:
+        """Say on which unknown values the answer rests, and that it leaves out a drive that makes the loop unstable."""
+        from friso.shown.loop_words import without_drive
+
+        return super().condition + without_drive(self.stage)
+
+    @property
     def varied(self) -> Sequence[str]:
         """Return the keys over which cycles are followed."""
         return [swept.key for swept in self.result.space.ranges]

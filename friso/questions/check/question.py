@@ -24,7 +24,7 @@ from friso.studies.settings import settings
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from friso.hunting import LoopState, ParameterMargin
+    from friso.hunting import ParameterMargin
     from friso.hunting.criteria import Verdict
     from friso.remedies.catalogue import Suggestion
     from friso.shown.files import Files
@@ -242,25 +242,15 @@ def _as_built(case: Case) -> Case:
 
     If samples and delays of the drive make this loop unstable, the verdict becomes uncertain.
     """
+    from friso.shown.loop_words import UNSTABLE_AS_BUILT, lost_as_built
+
     where = lost_as_built(case.stage)
     if not where:
         return case
-    from friso.shown.loop_words import UNSTABLE_AS_BUILT
-
     own = case.judgement.hunting
     reason = UNSTABLE_AS_BUILT if own.certain else f"{own.reason}; {UNSTABLE_AS_BUILT}"
     hunting = replace(own, certain=False, reason=reason)
     return replace(case, unstable_as_built=where, judgement=replace(case.judgement, hunting=hunting))
-
-
-def lost_as_built(stage: Stage) -> tuple[LoopState, ...]:
-    """Return the states in which samples and delays of the drive make the loop of a stage unstable."""
-    if not any(key.startswith("drive.") for key in stage.flat()):
-        return ()
-    from friso.frequency.crossover import unstable_as_built  # 0.3 s to import
-
-    states: tuple[LoopState, LoopState] = ("sticks", "slides")
-    return tuple(state for state, lost in zip(states, unstable_as_built(stage.flat()), strict=True) if lost)
 
 
 def _as_drawn(case: Case, draws: Draws, name: str) -> Case:

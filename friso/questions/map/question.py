@@ -79,6 +79,13 @@ class SweepAnswer(Answer):
         return [axis.name for dimension in self.study.dimensions for axis in dimension.axes]
 
     @property
+    def condition(self) -> str:
+        """Say on which unknown values the map rests, and that it leaves out a drive that makes the loop unstable."""
+        from friso.shown.loop_words import without_drive
+
+        return super().condition + ("" if of_runs_alone([self.metric]) else without_drive(self.study.stage))
+
+    @property
     def data(self) -> xr.Dataset:
         """Return outcome, peaks, amplitude, status and more over the axes, with coordinates in SI."""
         return self.result
