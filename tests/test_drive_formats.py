@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import friso
-from friso.drives.elements import root_of
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
 from friso.drives.questions import UserAnswers
 from friso.drives.read import stage_from
+from friso.drives.xml_files import root_of
 from friso.errors import InputError
 
 MOVE = {"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "0.1 s"}

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from math import radians
 
 from friso.axis import KINDS, axis_of
-from friso.drives.elements import root_of
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks
 from friso.drives.pid_units import PidUnits, force_of, open_units
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
+from friso.drives.xml_files import root_of
 from friso.errors import InputError
 
 GROUP = "POSITION_CONTROL"

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from friso.axis import LINEAR
-from friso.drives.elements import root_of
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
 from friso.drives.pid_units import (
     LENGTH,
@@ -23,6 +22,7 @@ from friso.drives.pid_units import (
     open_length,
 )
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
+from friso.drives.xml_files import root_of
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
 
