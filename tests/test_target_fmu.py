@@ -128,7 +128,7 @@ def test_what_is_not_allowed_is_an_error_and_changes_nothing(folder: Path, versi
         for place in (at["output_before"], at["output"], at["time"], 9999):
             with pytest.raises(fmpy.fmi1.FMICallException):
                 put(one, version, place, 1.0)
-        for time, duration in ((1.0, STEP), (0.0, -STEP), (0.0, float("nan"))):
+        for time, duration in ((1.0, STEP), (0.0, -STEP), (0.0, float("nan")), (0.0, 1e300)):
             with pytest.raises(fmpy.fmi1.FMICallException):
                 one.doStep(time, duration)
         one.doStep(0.0, STEP)

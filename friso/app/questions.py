@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -370,7 +371,8 @@ def tracks(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Tell whether a value of JSON is a finite number; whole ones may be too large for one."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:

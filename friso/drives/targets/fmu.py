@@ -103,10 +103,8 @@ class FmuModel:
 def _models(parcel: Parcel) -> list[FmuModel]:
     """Return the models of a parcel: the controller and, if it has one, the machine and both together."""
     name, begins, run = parcel.name, parcel.vector.start, parcel.machine
-    held, output = (
-        begins[OUTPUT],
-        FmuVariable(OUTPUT, "output", begins[OUTPUT], parcel.unit, "output of the controller"),
-    )
+    held = begins[OUTPUT]
+    output = FmuVariable(OUTPUT, "output", held, parcel.unit, "output of the controller")
     time = FmuVariable("time", "time", 0.0, "s", "time")
     before = FmuVariable(BEFORE, "parameter", held, parcel.unit, "output with which control begins")
     dropped = FmuVariable(DROPPED, "output", 0.0, "1", "samples that changed nothing, as their results were not finite")

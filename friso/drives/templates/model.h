@@ -15,6 +15,7 @@
 
 #define TOKEN "{{ token }}"
 static const double STEP = {{ period }}; /* s */
+static const double MOST = 9007199254740992.0; /* samples: 2^53, up to which a double holds whole numbers */
 
 /* Every variable is a double, whose reference is its place among the values; the first is the time. */
 enum { COUNT = {{ variables | length }} };
@@ -27,7 +28,7 @@ static const double starts[COUNT] = { {{ variables | map(attribute="start") | ma
 typedef struct {
     double values[COUNT];
     double start;
-    double samples; /* since the start; a double holds whole numbers up to 2^53 */
+    double samples; /* since the start */
     Phase phase;
 {% for field in part.fields %}
     {{ field }}
@@ -116,7 +117,7 @@ static int model_step(Model *model, double time, double duration)
 {
     double end = (time + duration - model->start) / STEP;
     int k;
-    if (model->phase != STEPPING || !isfinite(end) || !(duration > 0.0)) return 0;
+    if (model->phase != STEPPING || !(end < MOST) || !(duration > 0.0)) return 0;
     if (fabs(time - model->values[0]) > 1e-6 * STEP) return 0;
     while (model->samples < end - 1e-6) model_sample(model);
     model_tell(model);
