@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from friso.equations.conditions import friction_level
-from friso.equations.friction.bristles import bristle_friction, bristles_active, keeping_bristle
+from friso.equations.friction.bristles import bristle_friction, keeping_bristle
 from friso.equations.friction.common import (
     Friction,
     StribeckCurve,
@@ -22,7 +22,8 @@ from friso.equations.friction.common import (
     stribeck_level,
     stribeck_level_from_speed,
 )
-from friso.equations.friction.measured import MeasuredFriction, on_bristles, virgin_displacements
+from friso.equations.friction.lugre import LuGre
+from friso.equations.friction.measured import MeasuredFriction
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import register_friction
 
@@ -74,12 +75,8 @@ class DwellFriction(StribeckSection):
         outputs = {"lack": Output(lack, "N", "friction that more rest would add")}
         return law.joined((ageing,), outputs)
 
-    @staticmethod
-    def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return what measurements after a long rest would show, which is what LuGre shows."""
-        static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        displacement = virgin_displacements(static, stiffness)
-        return on_bristles(flat, displacement, -static * np.expm1(-displacement * stiffness / static))
+    shown = staticmethod(LuGre.shown)  # of measurements after a long rest
+    active = staticmethod(LuGre.active)  # the level stays between Coulomb and static friction
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
@@ -90,11 +87,3 @@ class DwellFriction(StribeckSection):
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Return the range of dwell times, of which neither friction over speed nor the virgin curve tells."""
         return {"friction.dwell_time": DwellFriction.usual_times}
-
-    @staticmethod
-    def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition of passivity that the law violates; "" if it is passive.
-
-        It is LuGre's, as the level stays between Coulomb and static friction.
-        """
-        return bristles_active(flat)
