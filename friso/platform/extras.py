@@ -6,8 +6,8 @@ from importlib.util import find_spec
 
 from friso.errors import InputError
 
-EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo")}
-"""Packages of each extra that commands need, by the extra's name in pyproject.toml.
+EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo"), "fmu": ("fmpy",)}
+"""Packages of each extra that commands or what they write need, by the extra's name in pyproject.toml.
 `friso.identification.logs.confined` lists packages of log formats."""
 
 
