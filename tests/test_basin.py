@@ -361,3 +361,51 @@ def test_a_stage_that_rests_just_below_break_away_is_not_shaken_loose_by_roundin
     ends, completed, _ = ends_in(kicks, 5, Target(77.9911e-6, 76.8975, 850.0, 212.5))
     assert completed.all()
     assert ends.tolist() == [True, False, False, False, False]
+
+
+LEANING = friso.loads(
+    """name = "Friction by direction"
+[masses]
+stage = "1.702 kg"
+[friction]
+model = "lugre"
+static = "3.377 N"
+coulomb = "1.151 N"
+stribeck_velocity = "7.764 mm/s"
+stribeck_exponent = 2
+viscous = "0.7068 N*s/m"
+bristle_stiffness = "43870 N/m"
+bristle_damping = "75.23 N*s/m"
+asymmetry = -0.35
+[controller]
+kind = "pid"
+kp = "901.9 N/m"
+ki = "7895 N/(m*s)"
+kd = "33.28 N*s/m"
+derivative_on = "measurement"
+[motion]
+kind = "release"
+displacement = "0.106 mm"
+duration = "17.4 s"
+"""
+)
+
+
+def test_kicks_of_a_stage_that_leans_are_searched_on_both_sides() -> None:
+    """From 0.495 mm on the negative side, from 0.69 mm on the positive one: by single runs 3 % beside these."""
+    found = hunting(LEANING)
+    assert found.target is not None
+    kick = displacements_that_hunt(LEANING, found.target)
+    assert not kick.symmetric
+    assert kick.smallest == pytest.approx(-0.495e-3, rel=0.02)
+    assert kick.towards(1)[0][0] == pytest.approx(0.692e-3, rel=0.02)
+    assert len(kick.windows) == len(kick.towards(1)) + len(kick.towards(-1))
+    for side in (1, -1):
+        least = side * kick.towards(side)[0][0]
+        ends = [
+            friso.simulate(LEANING.replace({"motion.displacement": f"{least * factor!r} m", "motion.duration": "30 s"}))
+            for factor in (1.03, 1 / 1.03)
+        ]
+        swings = [float(np.ptp(run["position"].values[-len(run.time) // 10 :])) for run in ends]
+        assert swings[0] > 3e-3
+        assert swings[1] < 1e-5

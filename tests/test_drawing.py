@@ -37,7 +37,7 @@ from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import KEPT_PER_BUCKET, MOST_BUCKETS, drawable, thin
 from friso.shown.drawing.figure import Axis, Figure, Map, Panel, Series
 from friso.shown.drawing.palette import GREY
-from friso.shown.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
+from friso.shown.drawing.prefixes import choose, pretty, range_with_unit, swing_with_unit, with_unit
 
 # ---------------------------------------------------------------- plain data
 
@@ -105,8 +105,10 @@ def test_values_in_sentences(value: float | None, unit: str, text: str):
 
 def test_ranges_and_shares_in_sentences():
     assert pretty("m/s**2") == "m/s²"
-    assert plus_minus(0.52e-3, "m") == "±0.52 mm"
-    assert plus_minus(0.345e-3, "m") == "±345 µm"
+    assert swing_with_unit(0.52e-3, 0.0, "m") == "±0.52 mm"
+    assert swing_with_unit(0.345e-3, 1e-5, "m") == "±345 µm"
+    assert swing_with_unit(6.0732e-3, 4.5346e-3, "m") == "from −1.54 to +10.6 mm about its target"
+    assert swing_with_unit(1e-3, 3e-3, "m", 4) == "from +2 to +4 mm about its target"
     assert range_with_unit(0.233e-3, 2.07e-3, "m") == "0.233 to 2.07 mm"
     assert range_with_unit(520.1e-6, 520.4e-6, "m") == "520 µm"
     shares = {1.0: "100 %", 0.954: "95 %", 12.3: "1200 %", 0.00012: "0.012 %", 1.9e-7: "0.000019 %", np.nan: "–"}

@@ -7,7 +7,7 @@ import pytest
 from refusals import refused
 
 import friso
-from friso.identification.experiments.hunting import PredictedCycle, swings_of
+from friso.identification.experiments.hunting import KIND, PredictedCycle, swings_of
 from friso.identification.experiments.standstill import StandstillResult, wandering
 from friso.identification.readings.common import record
 
@@ -40,6 +40,16 @@ def test_cycles_of_hunting_are_counted_whatever_the_noise(noise: float) -> None:
     assert shown.period == pytest.approx(1.6, rel=0.01)
     assert shown.amplitude == pytest.approx(3.75e-4, abs=3 * noise + 1e-6)
     assert (shown.above, shown.below) == pytest.approx((5e-4, 2.5e-4), abs=4 * noise + 1e-6)
+    assert shown.middle == pytest.approx(1.25e-4, abs=4 * noise + 1e-6)
+    assert KIND.numbers(shown)["extremes_m"] == pytest.approx((-2.5e-4, 5e-4), abs=4 * noise + 1e-6)
+
+
+def test_swings_without_a_reference_are_told_about_their_middle() -> None:
+    time = np.arange(0, 16, STEP)
+    wave = np.sin(2 * np.pi * time / 1.6 - 0.5)
+    shown = swings_of(record("alone", STEP, position=0.05 + np.where(wave > 0, 5e-4, 2.5e-4) * wave))
+    assert shown.middle == pytest.approx(0.0, abs=1e-6)
+    assert "±375 µm" in KIND.headline(shown)
 
 
 def test_a_log_of_standstill_with_its_force_is_told_how_to_go_on(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import friso
 from friso.axis import KINDS, LINEAR, speaking_of
-from friso.shown.drawing.prefixes import length_at_rest, plus_minus, range_with_unit, with_unit
+from friso.shown.drawing.prefixes import length_at_rest, range_with_unit, swing_with_unit, with_unit
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0}
@@ -27,7 +27,7 @@ def test_a_length_that_nobody_sees_is_said_to_be_shorter() -> None:
         assert with_unit(3e-7, "m") == length_at_rest(3e-7) == "< 1.00 µm"
         assert with_unit(1e-6, "m") == "1.00 µm"
         assert (with_unit(0.0, "m"), with_unit(3e-7, "s")) == ("0 m", "300 ns")
-        assert plus_minus(3e-7, "m") == "less than ±1.00 µm"
+        assert swing_with_unit(3e-7, 0.0, "m") == "less than ±1.00 µm"
         assert range_with_unit(2e-7, 3e-7, "m") == "< 1.00 µm"
         assert range_with_unit(2e-7, 3e-6, "m") == "< 1.00 µm to 3.00 µm"
         assert length_at_rest(3e-6, 5e-6) == "< 5.00 µm"

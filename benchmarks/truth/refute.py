@@ -106,7 +106,7 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
     trial = bench.starts(*ALL, seed)
     if claim.attracted:
         windows = claim.kick.windows if claim.kick else ()
-        if _may_hunt(bench, trial, tuple((low * high) ** 0.5 for low, high in windows)):
+        if _may_hunt(bench, trial, tuple(np.sign(low) * (low * high) ** 0.5 for low, high in windows)):
             return
         if not any(may_attract(bench, motion) for motion in claim.motions):
             yield Refutation("verdict", claim.sure, f"no start swings on, at either tolerance, nor {NEITHER}")
@@ -228,10 +228,13 @@ def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
 
 def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
     """Test whether displacements start hunting where claimed, and nowhere else."""
-    tried = np.geomspace(*kick.searched, KICKS + 2)[1:-1, None] * BROAD
+    sizes = np.geomspace(*kick.searched, KICKS + 2)[1:-1, None] * BROAD
+    sides = [1.0] if kick.symmetric else [1.0, -1.0]
+    tried = np.concatenate([side * sizes for side in sides])
     said = np.zeros(tried.shape, bool)
-    for low, high in kick.windows:
-        said |= (low <= tried) & (tried <= high)
+    for side in sides:
+        for low, high in kick.towards(side):
+            said |= (low <= side * tried) & (side * tried <= high)
     broad = (said == said[:, :1]).all(axis=1)  # none of the three is an end of a window
     tried, said = tried[broad], said[broad, 0]
     for rtol in (ROUGH, FINE):

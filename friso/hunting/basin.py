@@ -36,18 +36,25 @@ class Kick:
 
     A kick is either a displacement [m] of all masses, followed by a release as in the motion "release", or a push: a
     velocity [m/s] of all masses. `windows` are the ranges of kicks that start hunting, with ends known to 1 %. The last
-    window may end with the range `searched`. `unknown` counts runs that were not completed; they are left out, so a
-    window may reach across them.
+    window may end with the range `searched`. Kicks in the negative direction have a minus sign and follow those in the
+    positive one; a symmetric stage, whose kicks in either direction are alike, has none of them. `unknown` counts runs
+    that were not completed; they are left out, so a window may reach across them.
     """
 
     windows: tuple[tuple[float, float], ...]
     searched: tuple[float, float]
     unknown: int = 0
+    symmetric: bool = True
 
     @property
     def smallest(self) -> float | None:
-        """Return the smallest kick that was seen to start hunting; None if none was."""
-        return self.windows[0][0] if self.windows else None
+        """Return the smallest kick that was seen to start hunting, with its sign; None if none was."""
+        return min((low for low, _ in self.windows), key=abs, default=None)
+
+    def towards(self, side: float) -> tuple[tuple[float, float], ...]:
+        """Return the ranges of sizes of kicks that start hunting in the direction of the sign of `side`."""
+        sign = -1.0 if side < 0 and not self.symmetric else 1.0
+        return tuple((sign * low, sign * high) for low, high in self.windows if sign * low > 0)
 
 
 @dataclass(frozen=True)
@@ -217,7 +224,7 @@ def displacements_that_hunt(
         """Release the stage from displacements [m]; return which hunt, and which are certain, (n,)."""
         return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest, landing_map)
 
-    return kick_windows(hunts, target.amplitude)
+    return kick_windows(hunts, target.amplitude, _symmetric(stage))
 
 
 def displacements_that_run_away(stage: Stage) -> Kick:
@@ -231,7 +238,7 @@ def displacements_that_run_away(stage: Stage) -> Kick:
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed
 
-    return kick_windows(runs_away, flat[FORCE_LIMIT] / float(stages.number("stiffness")[0]))
+    return kick_windows(runs_away, flat[FORCE_LIMIT] / float(stages.number("stiffness")[0]), _symmetric(stage))
 
 
 def pushes_that_hunt(
@@ -250,15 +257,34 @@ def pushes_that_hunt(
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
         return _caught(released, len(kicks), target, widest, landing_map, pushed(several, kicks))
 
-    return kick_windows(hunts, target.amplitude * float(stages.number("rate")[0]))
+    return kick_windows(hunts, target.amplitude * float(stages.number("rate")[0]), _symmetric(stage))
 
 
-def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
-    """Find the windows of kicks that hunt, and narrow down their edges to 1 %.
+def _symmetric(stage: Stage) -> bool:
+    """Tell whether kicks of a stage in either direction are alike."""
+    return bool(Ensemble.held(stage.flat(), 1).symmetric[0])
+
+
+def kick_windows(
+    hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float, symmetric: bool = True
+) -> Kick:
+    """Find the windows of kicks that hunt, in both directions unless they are alike, and their edges to 1 %.
 
     The search covers a range of sizes around the kick `unit`, in [m] or [m/s]. `hunts` runs some kicks; it returns
-    which of them hunt, and for which that is certain.
+    which of them hunt, and for which that is certain. In a `symmetric` stage, only positive kicks are run.
     """
+    sides = [_windows_of_sizes(hunts, unit)]
+    if not symmetric:
+        sides.append(_windows_of_sizes(lambda sizes: hunts(-sizes), unit))
+    windows = (
+        (sign * low, sign * high) for sign, side in zip((1.0, -1.0), sides, strict=False) for low, high in side.windows
+    )
+    low, high = zip(*(side.searched for side in sides), strict=True)
+    return Kick(tuple(windows), (max(low), min(high)), sum(side.unknown for side in sides), symmetric)
+
+
+def _windows_of_sizes(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
+    """Find the windows of positive kicks that hunt (see `kick_windows`)."""
     tried = np.geomspace(
         basin_settings.kick_range[0] * unit, basin_settings.kick_range[1] * unit, basin_settings.kick_count
     )

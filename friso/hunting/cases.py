@@ -271,7 +271,7 @@ def _case(
         peak_times=runs.results.turn_times[0, :room][measures.turns[0]],
         peak_heights=runs.results.turn_values[0, :room][measures.turns[0]],
         peak_to_peak=float(measures.peak_to_peak[0]),
-        offset=float(runs.statistic("deviation_max")[0] + runs.statistic("deviation_min")[0]) / 2,
+        offset=float(measures.offset[0]),
         period=_finite(measures.period[0]),
         bands=measures.bands,
         settling_time={b: _finite(time[0]) for b, time in zip(measures.bands, measures.settling_time, strict=True)},

@@ -45,7 +45,8 @@ class StageAttractors(ArrayRows):
     - `attracts`: an attractor was found.
     - `decided`: no simulation failed that was needed to answer this.
     - `certain`: decided, and no attractor can exist beyond the range searched.
-    - `amplitude` [m], half of peak to peak, and `period` [s]: of the largest swing (NaN: no attractor).
+    - `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, and `period` [s]: of the largest swing
+      (NaN: no attractor).
     - `closed`: this swing was closed as an orbit; `multiplier`: its multiplier (NaN: it was not closed).
     - `target`: how far and how late a run must swing to count as hunting (None: these stages cannot hunt).
     """
@@ -55,6 +56,7 @@ class StageAttractors(ArrayRows):
     certain: np.ndarray
     closed: np.ndarray
     amplitude: np.ndarray
+    middle: np.ndarray
     period: np.ndarray
     multiplier: np.ndarray
     target: Target | None
@@ -66,15 +68,16 @@ class StageAttractors(ArrayRows):
         A survey of None stands for stages that cannot hunt.
         """
         count = len(certain)
-        closed, (amplitude, period, multiplier) = np.zeros(count, bool), np.full((3, count), np.nan)
+        closed, (amplitude, middle, period, multiplier) = np.zeros(count, bool), np.full((4, count), np.nan)
         if survey is None:
             nothing, decided = np.zeros(count, bool), np.ones(count, bool)
-            return cls(nothing, decided, certain, closed, amplitude, period, multiplier, None)
+            return cls(nothing, decided, certain, closed, amplitude, middle, period, multiplier, None)
         for motion in sorted(survey.motions, key=lambda motion: motion.amplitude):  # the largest swing comes last
             k, orbit = motion.stage, motion.cycles
-            closed[k], amplitude[k], period[k] = orbit is not None, motion.amplitude, motion.period
+            closed[k], amplitude[k], middle[k] = orbit is not None, motion.amplitude, motion.middle
+            period[k] = motion.period
             multiplier[k] = np.nan if orbit is None else orbit.multiplier[motion.number]
-        swing = closed, amplitude, period, multiplier
+        swing = closed, amplitude, middle, period, multiplier
         return cls(survey.attracts, survey.decided, certain, *swing, survey.target)
 
 

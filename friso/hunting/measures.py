@@ -14,7 +14,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import Stand, ends_evenly, last_corner, stands
+from friso.equations.motion import Stand, ends_evenly, last_corner, last_part, stands
 from friso.equations.structure import structure
 from friso.hunting.criteria.run_outcome import REST_BAND, End, end_of_traces, last_outside, outcomes, swings_on
 from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
@@ -70,7 +70,8 @@ class Measures:
 
     - `peaks`: the thesis's peak count; `distinct_peaks`: count of distinct peaks (see
       `friso.hunting.criteria.peak_count`).
-    - `peak_to_peak` [m] and `period` [s] of the last quarter (NaN: no swing, or one that dies out).
+    - `peak_to_peak` [m], `offset` [m] of the middle between the extremes, and `period` [s] of the last quarter (NaN: no
+      swing, or one that dies out).
     - `settling_time` [s]: until the deviation stays within each of `bands`, wherever the reference stands;
       `in_the_end`: at the last of these places (NaN: not within the run; see `friso.hunting.criteria.settling`).
     - `outcome`: words of `friso.hunting.criteria.run_outcome`.
@@ -85,6 +86,7 @@ class Measures:
     peaks: np.ndarray
     distinct_peaks: np.ndarray
     peak_to_peak: np.ndarray
+    offset: np.ndarray
     period: np.ndarray
     settling_time: tuple[np.ndarray, np.ndarray]
     in_the_end: tuple[np.ndarray, np.ndarray]
@@ -185,6 +187,7 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs, bands: tuple[float, float]
         peaks=np.where(done, turns.peaks.sum(axis=1), 0),
         distinct_peaks=np.where(done, turns.distinct.sum(axis=1), 0),
         peak_to_peak=finished(swing_of(runs)),
+        offset=finished((runs.statistic("deviation_max") + runs.statistic("deviation_min")) / 2),
         period=finished(np.where(swings_on(end, 0.0), turns.period, np.nan)),
         settling_time=(finished(settling[0]), finished(settling[1])),
         in_the_end=(finished(in_the_end[0]), finished(in_the_end[1])),
@@ -214,6 +217,8 @@ def measure_traces(
     """
     done, places = solver.status == Status.DONE, [*stands(flat)]
     end = end_of_traces(time, deviation, bands[1], done, corner_of(flat))
+    last = time >= last_part(LAST_QUARTER, end.ended, corner_of(flat))[:, None]
+    late = np.where(last, deviation, deviation[:, -1:])
     samples, swings = np.full(len(deviation), len(time)), np.nan_to_num(end.swing)
     values = np.ascontiguousarray(deviation)
     turns = scan_turning_points(np.tile(time, (len(deviation), 1)), values, samples, swings, end.ended)
@@ -235,6 +240,7 @@ def measure_traces(
         peaks=np.where(done, turns.peaks.sum(axis=1), 0),
         distinct_peaks=np.where(done, turns.distinct.sum(axis=1), 0),
         peak_to_peak=np.where(done, end.swing, np.nan),
+        offset=np.where(done, (late.max(axis=1) + late.min(axis=1)) / 2, np.nan),
         period=np.where(done & swings_on(end, 0.0), turns.period, np.nan),
         settling_time=(settled(places, 0), settled(places, 1)),
         in_the_end=(settled(places[-1:], 0), settled(places[-1:], 1)),

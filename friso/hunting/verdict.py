@@ -160,7 +160,7 @@ def judge(
         attraction = (
             Hunting((), MOVING, True, None)
             if moves_on
-            else hunting(stage, work=check_settings.survey_work_share * work)
+            else hunting(stage, work=check_settings.survey_work_share * work, side=float(ran.offset[0]))
         )
     if not motions.completed[0]:
         return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))

@@ -225,14 +225,15 @@ def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:
     landing_map, length = mapped.maps[stage], float(mapped.stages.length[stage])
     for attractor in landing_map.attractors:
         distances, swings = np.abs(attractor.distances), len(attractor.distances)
-        size = (distances[::2].max() + distances[1::2].max()) / 2 if swings % 2 == 0 else distances.max()
+        sides = (distances[::2].max(), distances[1::2].max()) if swings % 2 == 0 else (distances.max(),) * 2
+        size, middle = sum(sides) / 2, np.sign(attractor.distances[0]) * (sides[0] - sides[1]) / 2
         times = mapped.landings.times[landing_map.run[attractor.basin]]
         swing = float(np.nanmedian(np.diff(times[:, 1:], axis=1)))
         whole = swings if swings % 2 == 0 or not attractor.periodic else 2 * swings
         period = whole * swing if attractor.periodic else 2 * swing
         time = swings * swing if attractor.periodic else np.nan
         first, slope = float(attractor.distances[0]) * length, landing_map.slope(attractor)
-        yield Swinging(stage, size * length, time, period, first, whole, slope=slope)
+        yield Swinging(stage, size * length, time, period, first, whole, slope=slope, middle=float(middle) * length)
 
 
 def map_may_decide(stages: Ensemble) -> bool:

@@ -133,8 +133,8 @@ class Line:
 
     `at` [SI], shape (n, keys), has the values of the keys. `error`, of this shape, is their error [SI], NaN except at
     special points (flips, folds and tori). `kinds` has the kind of each special point, "" for an ordinary one.
-    `amplitude` [m], `period` [s] and `multiplier` of the cycles have the shape (n,). `ends` are texts on how the line
-    ends on either side.
+    `amplitude` [m], `middle` [m], `period` [s] and `multiplier` of the cycles have the shape (n,). `ends` are texts on
+    how the line ends on either side.
     """
 
     shape: CycleShape
@@ -142,6 +142,7 @@ class Line:
     error: np.ndarray
     kinds: tuple[str, ...]
     amplitude: np.ndarray
+    middle: np.ndarray
     period: np.ndarray
     multiplier: np.ndarray
     ends: tuple[str, str]
@@ -227,6 +228,7 @@ def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> 
         np.abs(_values(result.space, at + np.array([row.error for row in rows])) - values),
         tuple(row.kind for row in rows),
         np.array([row.cycle.amplitude[0] for row in rows]),
+        np.array([row.cycle.middle[0] for row in rows]),
         np.array([row.cycle.period[0] for row in rows]),
         np.array([row.cycle.multiplier[0] for row in rows]),
         traced.ends,

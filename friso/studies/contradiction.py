@@ -33,7 +33,8 @@ CHANGES: Mapping[str, tuple[str, ...]] = {
 class Standing:
     """What a machine does while its reference stands still for longest in a log.
 
-    `swing` is half of peak to peak [m] and `period` [s] of its lasting swing; both are None for a machine without one.
+    `swing` is half of peak to peak [m], `middle` between the peaks [m] and `period` [s] of its lasting swing; swing and
+    period are None for a machine without one.
     `time` [s] is how long the reference stands. `rests` is true if the machine stands still in the later half of it.
     """
 
@@ -41,6 +42,7 @@ class Standing:
     swing: float | None
     period: float | None
     rests: bool = True
+    middle: float = 0.0
 
     @property
     def hunts(self) -> bool:
@@ -65,7 +67,8 @@ class ExplainingChange:
 class Contradiction:
     """What a log shows, what the stage does, and what would explain a difference.
 
-    `swing` [m] and `period` [s] are those of the stage's largest attractor, None if nothing attracts it for certain.
+    `swing` [m], `middle` [m] and `period` [s] are those of the stage's largest attractor; swing and period are None if
+    nothing attracts it for certain.
     `may_rest` is true if the stage's own move does not end in hunting, though another may.
     """
 
@@ -76,6 +79,7 @@ class Contradiction:
     period: float | None
     explanations: tuple[ExplainingChange, ...]
     may_rest: bool = False
+    middle: float = 0.0
 
     @property
     def agrees(self) -> bool:
@@ -130,7 +134,7 @@ def standing_of(log: Log) -> Standing:
     slow = swings.period > settings.samples_of_a_swing * log.sample_time
     lasts = swings.count * swings.period > settings.share_of_a_lasting_swing * whole
     if seen and even and slow and lasts:
-        return Standing(whole, swings.amplitude, swings.period, False)
+        return Standing(whole, swings.amplitude, swings.period, False, swings.middle)
     return Standing(whole, None, None, rests)
 
 
@@ -148,11 +152,11 @@ def contradiction(stage: Stage, standing: Standing) -> Contradiction:
     flat = stage.flat()
     factors = np.geomspace(1 / settings.reach_of_a_change, settings.reach_of_a_change, settings.changes_tried)
     own = _attracted(flat, np.ones(1))
-    swing, period = (values[0] if own[0][0] else None for values in own[2:])
+    swing, period, middle = (values[0] if own[0][0] else None for values in own[2:])
     sure = bool(own[1][0]) and not stage.uncertain() and not stage.doubt
     attracts = bool(own[0][0])
     may_rest = attracts and not standing.hunts and judge_many(flat, 1, settings.rtol_of_own_moves)[0] != "hunts"
-    plain = Contradiction(standing, attracts, sure, swing, period, (), may_rest)
+    plain = Contradiction(standing, attracts, sure, swing, period, (), may_rest, middle or 0.0)
     if plain.agrees:
         return plain
     explanations = []
@@ -175,16 +179,16 @@ def _valid(flat: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _attracted(flat: Mapping[str, Any], factors: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return which stages have an attractor, for which that is certain, and its swing [m] and period [s]."""
+    """Return which stages have an attractor, for which that is certain, and its swing [m], period [s], middle [m]."""
     sketch = sketch_attractors(flat, len(factors))
-    return sketch.attracts, sketch.certain, sketch.amplitude, sketch.period
+    return sketch.attracts, sketch.certain, sketch.amplitude, sketch.period, sketch.middle
 
 
 def _nearest(
     name: str, standing: Standing, factors: np.ndarray, attracted: tuple[np.ndarray, ...]
 ) -> ExplainingChange | None:
     """Return the change with the smallest factor that makes the stage do what the log shows; None without one."""
-    attracts, certain, swings, periods = attracted
+    attracts, certain, swings, periods, _ = attracted
     for number in np.argsort(abs(np.log(factors))):
         if not certain[number]:
             continue

@@ -17,7 +17,8 @@ class Recurrence(ArrayRows):
     - `swings`: smallest number of swings after which a run repeats (0: it does not); `time` [s]: how long they take.
     - `better`, `better_time` [s]: likewise for a larger number of swings that repeats much more closely, if there is
       one.
-    - `size` [m]: peak-to-peak deviation; `deviation`: error of the repetition after `better` swings, over `size`.
+    - `size` [m]: peak-to-peak deviation, about its `middle` [m]; `deviation`: error of the repetition after `better`
+      swings, over `size`.
     - `earlier`: this error, computed some swings earlier (NaN: too few swings).
     - `mean` [m]: mean size of single swings.
 
@@ -32,6 +33,7 @@ class Recurrence(ArrayRows):
     deviation: np.ndarray
     earlier: np.ndarray
     mean: np.ndarray
+    middle: np.ndarray
 
 
 @np.errstate(all="ignore")  # swings that a run does not have are NaN
@@ -46,7 +48,9 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
     legs = np.abs(np.diff(values, axis=1))
     mean = np.nansum(legs, axis=1) / np.maximum(np.isfinite(legs).sum(axis=1), 1)
     finite = np.isfinite(values)
-    size = np.max(values, axis=1, initial=-np.inf, where=finite) - np.min(values, axis=1, initial=np.inf, where=finite)
+    high = np.max(values, axis=1, initial=-np.inf, where=finite)
+    low = np.min(values, axis=1, initial=np.inf, where=finite)
+    size, middle = high - low, (high + low) / 2
     swings, better = np.zeros(runs, np.int64), np.zeros(runs, np.int64)
     time, better_time, least, earlier = (np.full(runs, np.nan) for _ in range(4))
     for n in range(1, settings.most_repeating_swings + 1):
@@ -62,7 +66,7 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
         better[closer], better_time[closer], least[closer] = n, takes[closer], deviations[closer]
         if room - settings.compared_swings >= compared + n:
             earlier[closer] = (_deviation(values, n, room - settings.compared_swings) / size)[closer]
-    return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, earlier, mean)
+    return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, earlier, mean, middle)
 
 
 def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:

@@ -18,7 +18,7 @@ from friso.hunting.rows import ArrayRows
 class Swinging:
     """A lasting swing of a stage, closed as an orbit or observed in a simulation.
 
-    - `stage`: number of the stage; `amplitude` [m]: half of peak to peak.
+    - `stage`: number of the stage; `amplitude` [m]: half of peak to peak, about the `middle` [m].
     - `time` [s]: after which the motion, or its mirror image, repeats; NaN if it does not.
     - `period` [s]: of a whole repetition, or about two swings of a motion that does not repeat.
     - `distance` [m]: at which the stage sticks; `swings`: to either side in a period.
@@ -37,6 +37,7 @@ class Swinging:
     number: int = 0
     seen: np.ndarray | None = None
     slope: float = float("nan")
+    middle: float = 0.0
 
     def like(self, other: Swinging) -> bool:
         """Tell whether two motions of a stage are equal, or mirror images, by size and period.
@@ -132,6 +133,7 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndar
             cycles.swings * (2 if cycles.sign < 0 else 1),
             cycles,
             int(k),
+            middle=float(cycles.middle[k]),
         )
         for k in np.flatnonzero(cycles.attracting if which is None else which)
     ]
@@ -450,8 +452,8 @@ class Survey:
                 continue
             size, distance = float(repeats.size[k] / 2), float(ends.values[k, -1])
             slope = np.nan if self.prove else _slope(repeats.take(np.array([k])), ends.times[k])
-            motion = Swinging(int(owners[k]), size, time, period, distance, swings, seen=ends.states[k], slope=slope)
-            self.add([motion])
+            place = int(owners[k]), size, time, period, distance, swings
+            self.add([Swinging(*place, seen=ends.states[k], slope=slope, middle=float(repeats.middle[k]))])
 
 
 def _slope(repeats: Recurrence, times: np.ndarray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +69,11 @@ class Cycle:
     signals: Mapping[str, Any]
     swings: int = 2
 
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """Return the lowest and the highest deviation of the cycle from its reference [m]."""
+        return self.middle - self.amplitude, self.middle + self.amplitude
+
     @cached_property
     def trace(self) -> xr.Dataset:
         """Return the signals as a dataset over the time [s]."""
@@ -92,14 +97,20 @@ class Cycle:
 class Swing:
     """A lasting swing seen in a long simulation, without a closed stable orbit.
 
-    `amplitude` [m] is half of peak to peak. `period` [s] is approximate unless the swing is `regular`. `swings` counts
-    swings to either side in a period.
+    `amplitude` [m] is half of peak to peak, about the `middle` [m]. `period` [s] is approximate unless the swing is
+    `regular`. `swings` counts swings to either side in a period.
     """
 
     amplitude: float
     period: float
     regular: bool
     swings: int
+    middle: float = 0.0
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """Return the lowest and the highest deviation of the swing from its reference [m]."""
+        return self.middle - self.amplitude, self.middle + self.amplitude
 
 
 @dataclass(frozen=True)
@@ -168,12 +179,13 @@ def why_not(form: Structure) -> str:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hunting:
+def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf, side: float = 1.0) -> Hunting:
     """Find the limit cycles and other attractors of a stage, whatever its own motion.
 
     Cycles are closed to the relative tolerance `rtol`. The search may use so much `work` (see
-    `friso.engine.allowance`); anything open by then is not certain. Raises InputError for a tolerance that is not
-    usable.
+    `friso.engine.allowance`); anything open by then is not certain. Of an asymmetric swing of a symmetric stage
+    and its mirror image, the one with its middle on the `side` of that sign is returned. Raises InputError for a
+    tolerance that is not usable.
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
@@ -198,12 +210,14 @@ def hunting(stage: Stage, rtol: float = CYCLE_RTOL, work: float = np.inf) -> Hun
     far = far_beyond_a_limit(stages)
     reason = survey.families[0].reasons[0] if certain else doubt
     return Hunting(
-        cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),
+        cycles=tuple(_cycle(stages, _on_side(stages, cycle, side), rtol) for cycle in (*closed, *repelling)),
         reason="" if certain and (survey.motions or repelling) else reason,
         certain=certain,
         returns=return_map(stages, GUESS_RTOL),
         observed=tuple(
-            Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings) for m in survey.motions if not m.cycles
+            Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings, _middle(stages, m.middle, side))
+            for m in survey.motions
+            if not m.cycles
         ),
         target=survey.target.take(0) if survey.motions else None,
         surveyed=survey,
@@ -301,6 +315,19 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
     little = (deepest > settings.no_friction_fall) & (deepest < settings.least_friction_fall) & feeds
     fades = (last < settings.feeding_ratio_range[1]) & (most > np.maximum(settings.feeding_ratio_range[0], 1.2 * last))
     return np.any(little | fades, axis=1)
+
+
+def _middle(stages: Ensemble, middle: float, side: float) -> float:
+    """Return the middle [m] of a swing of a stage, or of its mirror image if that is a swing on the `side`."""
+    return -middle if stages.symmetric[0] and middle * side < 0 else middle
+
+
+def _on_side(stages: Ensemble, cycles: Cycles, side: float) -> Cycles:
+    """Return one cycle of a stage, or its mirror image if that is a cycle on the `side`."""
+    if _middle(stages, middle := float(cycles.middle[0]), side) == middle:
+        return cycles
+    mirrored = {name: -getattr(cycles, name) for name in ("states", "middle", "direction")}
+    return replace(cycles, **mirrored)
 
 
 def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:

@@ -21,15 +21,16 @@ from friso.identification.settings import experiment_settings
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import Axis, Figure, Limit, Markers, Panel, Series
 from friso.shown.drawing.palette import INK, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.prefixes import swing_with_unit, with_unit
 
 
 @dataclass(frozen=True)
 class PredictedCycle:
-    """Predicted limit cycle of a stage: amplitude [m] and period [s]."""
+    """Predicted limit cycle of a stage: amplitude [m], period [s], and middle between its peaks [m]."""
 
     amplitude: float
     period: float
+    middle: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +38,8 @@ class HuntingLog:
     """Swings of a stage about its reference.
 
     `count` is the number of whole cycles. `period` [s] and `amplitude` [m], half of peak to peak, are means over them,
-    with their standard deviations. `above` and `below` [m] are the mean peaks on either side of the reference.
+    with their standard deviations. `above` and `below` [m] are the mean peaks on either side of the reference, or of the
+    middle of the swing without one.
     `predicted` is the cycle predicted from the stage file (None: no file, or no hunting). `time` [s] and `deviation`
     [m] from the reference have the shape (n,); `peaks` are the sample numbers of the peaks.
     """
@@ -55,6 +57,16 @@ class HuntingLog:
     peaks: np.ndarray
     warnings: tuple[str, ...] = ()
 
+    @property
+    def middle(self) -> float:
+        """Return the middle between the mean peaks on either side of the reference [m]."""
+        return (self.above - self.below) / 2
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """Return the mean peaks below and above the reference [m], with their signs."""
+        return -self.below, self.above
+
 
 def swings_of(log: Log) -> HuntingLog:
     """Return the swings in a log, from the last change of its reference on.
@@ -65,15 +77,17 @@ def swings_of(log: Log) -> HuntingLog:
     """
     part = log.longest
     position = channel(log, "position")[part]
-    time, reference = log.time[part], np.zeros(len(position))
+    time, deviation = log.time[part], position
     if "reference" in log:
         reference = channel(log, "reference")[part]
         changes = np.flatnonzero(np.abs(np.diff(reference)) > np.finfo(np.float32).eps * np.ptp(reference))
         start = int(changes[-1]) + 1 if changes.size else 0
-        time, position, reference = time[start:], position[start:], reference[start:]
-    deviation = position - (reference if "reference" in log else np.median(position))
+        time, deviation = time[start:], (position - reference)[start:]
     low, high = np.percentile(deviation[len(deviation) // 2 :], [1, 99])  # the later part, after the transient
-    side = _sides(deviation - (low + high) / 2, experiment_settings.hysteresis_of_swings * (high - low) / 2)
+    middle = (low + high) / 2
+    if "reference" not in log:
+        deviation, middle = deviation - middle, 0.0
+    side = _sides(deviation - middle, experiment_settings.hysteresis_of_swings * (high - low) / 2)
     ups = np.flatnonzero((side[1:] > 0) & (side[:-1] < 0)) + 1
     if len(ups) < 3:
         actual = f"{max(len(ups) - 1, 0)} whole cycles after the reference stands"
@@ -127,13 +141,13 @@ class HuntingKind(ExperimentKind[HuntingLog]):
         if cycle is None:
             warning = "The stage file does not hunt, whatever the move: its friction or its controller is another."
             return replace(shown, warnings=(warning,))
-        return replace(shown, predicted=PredictedCycle(float(cycle.amplitude), float(cycle.period)))
+        return replace(shown, predicted=PredictedCycle(cycle.amplitude, cycle.period, cycle.middle))
 
     def facts(self, result: HuntingLog) -> Facts:
         """List count, period, amplitude and symmetry of the cycles, and the predicted cycle."""
         period = f"{result.period:.3g} s (standard deviation {result.period_deviation:.2g} s)"
         scatter = with_unit(result.amplitude_deviation, "m")
-        amplitude = f"±{with_unit(result.amplitude, 'm')} (standard deviation {scatter})"
+        amplitude = f"{swing_with_unit(result.amplitude, result.middle, 'm')} (standard deviation {scatter})"
         sides = f"{with_unit(result.above, 'm')} above the reference, {with_unit(result.below, 'm')} below"
         facts = [
             ("Whole cycles", str(result.count)),
@@ -143,7 +157,8 @@ class HuntingKind(ExperimentKind[HuntingLog]):
         ]
         if cycle := result.predicted:
             slower, larger = result.period / cycle.period, result.amplitude / cycle.amplitude
-            facts.append(("Predicted cycle", f"±{with_unit(cycle.amplitude, 'm')} every {cycle.period:.3g} s"))
+            predicted = swing_with_unit(cycle.amplitude, cycle.middle, "m")
+            facts.append(("Predicted cycle", f"{predicted} every {cycle.period:.3g} s"))
             facts.append(
                 ("Measured over predicted", f"{slower:.3g} times the period, {larger:.3g} times the amplitude")
             )
@@ -151,20 +166,25 @@ class HuntingKind(ExperimentKind[HuntingLog]):
 
     def headline(self, result: HuntingLog) -> str:
         """Say with which amplitude and period the stage hunts, and how many cycles were seen."""
-        return f"It hunts: ±{with_unit(result.amplitude, 'm')} every {result.period:.3g} s, {result.count} cycles."
+        size = swing_with_unit(result.amplitude, result.middle, "m")
+        return f"It hunts: {size} every {result.period:.3g} s, {result.count} cycles."
 
     def numbers(self, result: HuntingLog) -> dict[str, Any]:
         """Return the cycles and the predicted one, for the document."""
         numbers = entries(result, "period_s", "period_deviation_s", "amplitude_m", "amplitude_deviation_m", "warnings")
-        predicted = result.predicted and entries(result.predicted, "amplitude_m", "period_s")
-        return {**numbers, **entries(result, "above_m", "below_m"), "cycles": result.count, "predicted": predicted}
+        predicted = result.predicted and {
+            **entries(result.predicted, "amplitude_m", "period_s"),
+            "offset_m": result.predicted.middle,
+        }
+        sides = {**entries(result, "above_m", "below_m", "extremes_m"), "offset_m": result.middle}
+        return {**numbers, **sides, "cycles": result.count, "predicted": predicted}
 
     def figures(self, result: HuntingLog, logs: Sequence[Source], name: str) -> list[Figure]:
         """Draw the deviation over time with the peaks of the cycles, and the predicted amplitude."""
         limits = ()
         if result.predicted:
-            size = result.predicted.amplitude
-            limits = (Limit((-size, size), "predicted amplitude", VERMILLION, "dashed"),)
+            size, middle = result.predicted.amplitude, result.predicted.middle
+            limits = (Limit((middle - size, middle + size), "predicted extremes", VERMILLION, "dashed"),)
         panel = Panel(
             "",
             TIME,

@@ -12,7 +12,7 @@ import numpy as np
 from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Meeting, Plane, Space
 from friso.questions.map.words import friction_held
 from friso.shown.drawing.figure import Array
-from friso.shown.drawing.prefixes import listed, plus_minus, pretty, with_unit
+from friso.shown.drawing.prefixes import listed, pretty, swing_with_unit, with_unit
 from friso.studies import boundary
 from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line, PlaneEdge, StabilityChange
 
@@ -309,7 +309,7 @@ def _turn(line: Line, k: int, key: ShownKey) -> str:
     above = [j for j in (k - 1, k + 1) if 0 <= j < len(line.at) and line.at[j, 0] > value]
     goes_on = bool(above) if line.kinds[k] == "fold" else any(line.attracts[min(j, k)] for j in above)
     verb = _VERBS[line.kinds[k] == "fold", goes_on]
-    size = f"{plus_minus(line.amplitude[k], 'm')} every {with_unit(line.period[k], 's')}"
+    size = f"{swing_with_unit(line.amplitude[k], line.middle[k], 'm')} every {with_unit(line.period[k], 's')}"
     where = f"{key.key} = {key.uncertain(value, float(line.error[k, 0]))}"
     meaning = f"{line.kinds[k]}: {'below' if goes_on else 'above'}, {MEANINGS[line.kinds[k]]}"
     return f"{CYCLES[line.shape].capitalize()} ({size}) {verb} at {where} ({meaning})."

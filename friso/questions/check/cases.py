@@ -22,8 +22,8 @@ from friso.shown.drawing.prefixes import (
     NOTHING,
     listed,
     percent_range,
-    plus_minus,
     range_with_unit,
+    swing_with_unit,
     window_with_unit,
     with_unit,
 )
@@ -76,7 +76,7 @@ def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
 
 def _amplitude(cycle: Cycle) -> str:
     """Write the amplitude of a cycle, and whether it repels."""
-    return f"{plus_minus(cycle.amplitude, 'm', 4)}{'' if cycle.attracts else ' (repels)'}"
+    return f"{swing_with_unit(cycle.amplitude, cycle.middle, 'm', 4)}{'' if cycle.attracts else ' (repels)'}"
 
 
 def _time_constant(cycle: Cycle) -> str:
@@ -107,15 +107,18 @@ def _further_cycles(case: Case) -> str:
 
 def _further_cycle(cycle: Cycle) -> str:
     """Describe a cycle by symmetry, amplitude and stability."""
-    kind = "symmetric" if cycle.symmetric else "asymmetric"
-    return f"{kind}, {plus_minus(cycle.amplitude, 'm', 4)}, {'attracts' if cycle.attracts else 'repels'}"
+    kind, does = "symmetric" if cycle.symmetric else "asymmetric", "attracts" if cycle.attracts else "repels"
+    return f"{kind}, {swing_with_unit(cycle.amplitude, cycle.middle, 'm', 4)}, {does}"
 
 
 def _observed(case: Case) -> str:
     """List the swings that were observed in simulations."""
     swings = case.judgement.hunting.observed
     return (
-        "; ".join(f"{plus_minus(s.amplitude, 'm', 4)} every {with_unit(s.period, 's', 4)}" for s in swings) or NOTHING
+        "; ".join(
+            f"{swing_with_unit(s.amplitude, s.middle, 'm', 4)} every {with_unit(s.period, 's', 4)}" for s in swings
+        )
+        or NOTHING
     )
 
 
@@ -147,17 +150,23 @@ def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
     if not kick.windows:
         return UNKNOWN if kick.unknown else f"none from {searched}"
     lost = f" ({kick.unknown} run{'s were' if kick.unknown > 1 else ' was'} given up)" if kick.unknown else ""
-    return f"{_windows(kick, unit, searched)}{lost}"
+    if kick.symmetric:
+        return f"{_windows(kick, 1.0, unit, searched)}{lost}"
+    positive, negative = (_windows(kick, side, unit, searched) for side in (1.0, -1.0))
+    return f"{positive}; in the negative direction {negative}{lost}"
 
 
-def _windows(kick: Kick, unit: str, searched: str) -> str:
-    """Write the ranges of kicks that start hunting; `searched` is the range tried."""
-    if kick.windows == (kick.searched,):
+def _windows(kick: Kick, side: float, unit: str, searched: str) -> str:
+    """Write the ranges of kicks in one direction that start hunting; `searched` is the range tried."""
+    windows = kick.towards(side)
+    if not windows:
+        return f"none from {searched}"
+    if windows == (kick.searched,):
         return f"all that were tried, {searched}"
-    texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:MOST_WINDOWS]]
-    more = len(kick.windows) - len(texts)
+    texts = [window_with_unit(*window, kick.searched, unit) for window in windows[:MOST_WINDOWS]]
+    more = len(windows) - len(texts)
     text = ", ".join([*texts, *([f"and {more} more range{'s' * (more > 1)}"] if more else [])])
-    open_ended = kick.windows[0][0] == kick.searched[0] or kick.windows[-1][1] == kick.searched[1]
+    open_ended = windows[0][0] == kick.searched[0] or windows[-1][1] == kick.searched[1]
     return f"{text} (tried: {searched})" if open_ended else text
 
 
@@ -306,12 +315,17 @@ def case_document(case: hunting.Case) -> dict[str, Any]:
 def _cycle(cycle: hunting.Cycle) -> dict[str, Any]:
     """Return the properties of a hunting cycle."""
     names = ("amplitude_m", "period_s", "multiplier", "symmetric", "attracts", "slope", "growth", "residual")
-    return {**entries(cycle, *names, "time_constant_s"), "swings_per_period": cycle.swings}
+    return {**entries(cycle, *names, "time_constant_s", "extremes_m"), **_of_swing(cycle)}
 
 
 def _swing(swing: hunting.Swing) -> dict[str, Any]:
     """Return amplitude and period of a swing that was observed in a run."""
-    return {**entries(swing, "amplitude_m", "period_s", "regular"), "swings_per_period": swing.swings}
+    return {**entries(swing, "amplitude_m", "period_s", "regular", "extremes_m"), **_of_swing(swing)}
+
+
+def _of_swing(swing: hunting.Cycle | hunting.Swing) -> dict[str, Any]:
+    """Return the middle of a swing, and its number of swings."""
+    return {"offset_m": swing.middle, "swings_per_period": swing.swings}
 
 
 def _kick(judgement: hunting.Judgement) -> dict[str, Any] | None:

@@ -144,9 +144,9 @@ def _swings(fates: Fates) -> str:
         return ""
     far, slow = (
         range_with_unit(float(values.min()), float(values.max()), unit)
-        for values, unit in ((amplitudes, "m"), (periods, "s"))
+        for values, unit in ((2 * amplitudes, "m"), (periods, "s"))
     )
-    return f", by ± {far} every {slow}"
+    return f", by {far} peak to peak every {slow}"
 
 
 def _at_other_bandwidths(name: str, draws: Draws) -> str:

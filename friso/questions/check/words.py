@@ -27,10 +27,10 @@ from friso.shown.drawing.prefixes import (
     digits_that_differ,
     length_at_rest,
     listed,
-    plus_minus,
     range_with_unit,
     rounded_down,
     rounded_up,
+    swing_with_unit,
     with_unit,
 )
 from friso.shown.loop_words import unstable_where
@@ -256,8 +256,16 @@ def _too_much(what: str) -> str:
 
 def _kick(name: str, kick: Kick, unit: str) -> str:
     """Write the smallest kick that starts hunting, and whether a smaller one was tried."""
-    least = kick.windows[0][0]
-    return f"a {name} of {with_unit(least, unit)}{' (the smallest tried)' if least == kick.searched[0] else ''}"
+    least = kick.smallest or 0.0
+    tried = " (the smallest tried)" if abs(least) == kick.searched[0] else ""
+    return f"a {name} of {with_unit(abs(least), unit)}{_direction(kick)}{tried}"
+
+
+def _direction(kick: Kick) -> str:
+    """Say in which direction the smallest kick starts hunting; empty if directions are alike."""
+    if kick.symmetric:
+        return ""
+    return f" in the {'positive' if (kick.smallest or 0.0) > 0 else 'negative'} direction"
 
 
 def _transient(case: Case) -> list[str]:
@@ -395,15 +403,16 @@ def _running_away(case: Case) -> str:
     """Say that large motions grow without bound, or may do so, and what prevents it; empty if they do not."""
     cause = 'set controller.anti_windup, which is "none", to "clamp"'
     if (away := case.judgement.running_away) and away.windows:
-        return f"it runs away after a displacement of {with_unit(away.windows[0][0], 'm')}{_or_more(away)}: {cause}"
+        return f"it runs away after {_kick('displacement', away, 'm')}{_or_more(away)}: {cause}"
     may = {"unstable": "large motions may run away", "unknown": "it is not known whether large motions run away"}
     says = may.get(case.judgement.hunting.lower_gains or "")
     return f"{says}: {cause}" if says else ""
 
 
 def _or_more(kick: Kick) -> str:
-    """Add " or more" if all larger kicks searched start hunting as well; else nothing."""
-    return " or more" if kick.windows == ((kick.windows[0][0], kick.searched[1]),) else ""
+    """Add " or more" if all larger kicks searched in that direction do the same; else nothing."""
+    least = kick.smallest or 0.0
+    return " or more" if kick.towards(least) == ((abs(least), kick.searched[1]),) else ""
 
 
 def _outlook(case: Case) -> list[str]:
@@ -618,7 +627,7 @@ def _swing(case: Case) -> str:
     """Write the size and period of the hunting cycle, such as "±0.52 mm every 1.63 s"."""
     swing = case.judgement.swing
     assert swing  # the verdict implies an attracting cycle
-    turns, size = swing.swings / 2, plus_minus(swing.amplitude, "m")
+    turns, size = swing.swings / 2, swing_with_unit(swing.amplitude, swing.middle, "m")
     often = f"{size} every {with_unit(swing.period / turns, 's')}"
     if turns == 1:
         return often

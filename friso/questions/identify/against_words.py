@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from friso.quantities import plain_factor
-from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
+from friso.shown.drawing.prefixes import listed, swing_with_unit, with_unit
 from friso.stage import Stage
-from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange
+from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange, Standing
 from friso.studies.settings import settings
 
 
@@ -16,11 +16,11 @@ def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[st
     """Say what the log called `name` shows, whether the stage does so, and which change would explain a difference."""
     standing = result.standing
     machine = (
-        f"hunts, {_swing(standing.swing, standing.period)}"
+        f"hunts, {_swing(standing)}"
         if standing.hunts
         else f"rests for {with_unit(standing.time, 's')} while its reference stands"
     )
-    does = f"hunts, {_swing(result.swing, result.period)}" if result.attracts else "does not hunt"
+    does = f"hunts, {_swing(result)}" if result.attracts else "does not hunt"
     doubt = "" if result.certain else " (not certain: its values, or what attracts it, are not)"
     if not standing.hunts and not standing.rests:
         return [f"{name} does not tell: the machine neither rests nor swings evenly; the stage {does}{doubt}."]
@@ -38,9 +38,10 @@ def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[st
     return [says, f"One change would explain that, the smallest first: {changes}."]
 
 
-def _swing(swing: float | None, period: float | None) -> str:
-    """Write the size [m] and period [s] of a swing."""
-    return f"{plus_minus(swing or 0.0, 'm')} every {with_unit(period or 0.0, 's')}"
+def _swing(result: Standing | Contradiction) -> str:
+    """Write the size and period of the swing that a log shows, or of that in which a stage hunts."""
+    size = swing_with_unit(result.swing or 0.0, result.middle, "m")
+    return f"{size} every {with_unit(result.period or 0.0, 's')}"
 
 
 def _change(stage: Stage, change: ExplainingChange) -> str:
@@ -52,6 +53,11 @@ def _change(stage: Stage, change: ExplainingChange) -> str:
     return f"{times} ({with_unit(change.factor * flat[keys[0]], stage.numeric_keys()[keys[0]].unit)})"
 
 
+def _numbers(result: Standing | Contradiction) -> dict[str, Any]:
+    """Return size, middle and period of the swing that a log shows, or of that in which a stage hunts."""
+    return {"swing_m": result.swing, "offset_m": result.middle, "period_s": result.period}
+
+
 def against_document(name: str, result: Contradiction) -> dict[str, Any]:
     """Return what a log shows, what the stage does, and the changes that explain a difference."""
     changes: Sequence[dict[str, Any]] = [
@@ -61,14 +67,9 @@ def against_document(name: str, result: Contradiction) -> dict[str, Any]:
     standing = result.standing
     return {
         "log": name,
-        "machine": {"hunts": standing.hunts, "swing_m": standing.swing, "period_s": standing.period},
+        "machine": {"hunts": standing.hunts, **_numbers(standing)},
         "stands_s": standing.time,
-        "stage": {
-            "hunts": result.attracts,
-            "certain": result.certain,
-            "swing_m": result.swing,
-            "period_s": result.period,
-        },
+        "stage": {"hunts": result.attracts, "certain": result.certain, **_numbers(result)},
         "agrees": result.agrees,
         "explanations": changes,
     }

@@ -10,7 +10,7 @@ from friso.engine.arrays import Status
 from friso.hunting.criteria import CREEPS, OUTCOME_CRITERION, RESTS, SWINGS
 from friso.hunting.measures import LAST_QUARTER, Measures
 from friso.shown.documents import dwells_document, plain_json
-from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
+from friso.shown.drawing.prefixes import listed, swing_with_unit, with_unit
 from friso.shown.motion_words import off_its_reference
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
@@ -39,7 +39,7 @@ def conclusion(
     grows = bool(late.max() > GROWTH_RATIO * before.max(initial=0.0))
     clauses = {
         SWINGS: lambda: (
-            f"swings {plus_minus(_value(measures.peak_to_peak) / 2, 'm')} every "
+            f"swings {swing_with_unit(_value(measures.peak_to_peak) / 2, _value(measures.offset), 'm')} every "
             f"{with_unit(_value(measures.period), 's')} at the end of the run{', and ever farther' if grows else ''}"
         ),
         CREEPS: lambda: _restless(float(late.max()), float(late[-1]), _value(measures.peak_to_peak), grows),

@@ -140,11 +140,22 @@ def window_with_unit(low: float, high: float, searched: tuple[float, float], uni
     return f"from {with_unit(low, unit)} on" if high == searched[1] else range_with_unit(low, high, unit)
 
 
-def plus_minus(half: float, unit: str, digits: int = 3) -> str:
-    """Write half a range [unit] with the prefix that suits it, e.g. "±0.52 mm"."""
+_LOPSIDED = 0.1
+"""Smallest difference of the two ends of a swing, relative to the larger one, from which on both are written."""
+
+
+def swing_with_unit(half: float, middle: float, unit: str, digits: int = 3) -> str:
+    """Write a swing [unit] about a reference: "±0.52 mm", or "from −1.54 to +10.6 mm about its target".
+
+    `half` is half of peak to peak, and `middle` the middle between the peaks. Both ends are written if they differ.
+    """
     if unseen(half, unit):
         return f"less than ±{with_unit(finest_length(), unit)}"
     factor, text = choose(np.array([2 * half]), unit)
+    low, high = (factor * (middle + side * half) for side in (-1, 1))
+    if abs(low + high) > _LOPSIDED * max(abs(low), abs(high)):
+        first, last = (f"{'+' if end > 0 else '−'}{abs(end):.{digits}g}" for end in (low, high))
+        return f"from {first} to {last} {text} about its target"
     return f"±{half * factor:.{digits}g} {text}"
 
 

@@ -80,6 +80,9 @@ TABLE: dict[str, tuple[Metric, str]] = {
         "Multiplier of the cycle that attracts", "multiplier", "1", 60, limits=(-1.0, 1.0),
     ),
     "amplitude": of_attractor("Amplitude of the hunting cycle", "Amplitude of what attracts", "amplitude", "m", 61),
+    "offset": of_attractor(
+        "Middle of the hunting cycle, from the reference", "Offset of what attracts", "middle", "m", 61
+    ),
     "cycle_period": of_attractor("Period of the hunting cycle", "Period of what attracts", "period", "s", 62),
     "sketch": (_SKETCHED, "Whether the stage hunts, by coarse return maps, or by closed orbits if maps do not decide"),
 }  # fmt: skip
