@@ -106,13 +106,13 @@ def released(displacement: float) -> Stage:
 
 @RIGID
 def test_displacements_that_start_hunting() -> None:
-    """At 8 Hz there are three windows: 1.7 to 11.1 mm, 23.2 to 43.7 mm, and from 60.5 mm to the end searched.
+    """At 8 Hz there are three windows: 0.2 to 1.02 mm, 2.58 to 5.27 mm, and from 7.62 mm to the end searched.
 
     From the gaps between them, the stage lands near enough to its reference to rest after a first or second swing.
     """
     bands = windows()
     ends = [1e3 * end for window in bands.windows for end in window]
-    assert ends[:5] == pytest.approx([1.7, 11.1, 23.2, 43.7, 60.5], rel=0.02)
+    assert ends[:5] == pytest.approx([0.2, 1.02, 2.58, 5.27, 7.62], rel=0.02)
     assert len(ends) == 6
     assert bands.windows[-1][1] == bands.searched[1] == pytest.approx(300 * cycle().amplitude)
     assert bands.searched[0] == pytest.approx(cycle().amplitude / 30)

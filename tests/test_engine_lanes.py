@@ -26,7 +26,7 @@ def flat() -> Flat:
     return flat | {
         "controller.crossover": rng.uniform(2, 20, RUNS),
         "friction.static": rng.uniform(1, 4, RUNS),
-        "motion.displacement": rng.normal(size=RUNS) * 2e-3,
+        "motion.displacement": rng.normal(size=RUNS) * 2e-2,
         "motion.duration": 3.0,
     }
 

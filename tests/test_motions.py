@@ -11,8 +11,10 @@ from log_files import write_twincat
 from own_motion import Spiral as Spiral
 from scipy.integrate import solve_ivp
 from scipy.io import savemat
+from variants import gains, limit, lugre, release, stage
 
 import friso
+from benchmarks.truth.by_hand import by_hand
 from friso.engine.simulate import simulate
 from friso.equations import motion
 from friso.equations.motions.profile import LIMITS, plan
@@ -340,3 +342,37 @@ def test_moves_of_a_rotary_axis_are_in_its_units() -> None:
     )
     assert motion.reference(stage.flat(), np.array([1.0])) == pytest.approx(np.deg2rad(5))
     assert stage.numeric_keys()["motion.jerk"].unit == "rad/s^3"
+
+
+TUNED = 'kind="pid"\ncrossover="8 Hz"\nalpha=0.1\nbeta=2'
+ON_ERROR = gains(900, 7000, 33, 3e-3)
+LIMITED = gains(900, 7000, 33, 3e-3, extra=limit("1.5 N", "clamp"))
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [TUNED, ON_ERROR, f'{LIMITED}\nderivative_on = "measurement"', 'kind="adrc"\nbandwidth="8 Hz"'],
+    ids=["tuned", "on error", "limited", "observer"],
+)
+def test_a_release_begins_with_filters_at_rest(controller: str) -> None:
+    """A stage held by hand until its filters have settled, by equations written by hand."""
+    chosen = stage(release("-2 mm"), friction=lugre(2), controller=controller)
+    equations, time = by_hand(chosen.flat()), np.linspace(0.0, 1.0, 201)
+    theirs = equations.run(equations.start(-2e-3), time, 1e-9)[:, equations.measured]
+    ours = friso.simulate(chosen, 1e-8, sample_time=5e-3)["position"].values[: len(time)]
+    assert np.abs(ours - theirs).max() < 1e-9
+
+
+def test_a_release_does_not_depend_on_what_the_derivative_is_of() -> None:
+    """With a reference that stands the rates of error and position differ in sign alone."""
+    on_error = stage(release(), friction=lugre(2), controller=ON_ERROR)
+    on_position = on_error.replace({"controller.derivative_on": "measurement"})
+    one, other = (friso.simulate(chosen, 1e-9)["position"].values for chosen in (on_error, on_position))
+    assert np.abs(one - other).max() < 1e-9
+
+
+def test_a_release_as_built_begins_within_the_limit_of_the_force() -> None:
+    """With delay and current loop: what the drive has commanded before is what it exerts at rest."""
+    drive = {"drive": {"sample_time": "0.25 ms", "delay": "0.3 ms", "current_bandwidth": "300 Hz"}}
+    chosen = Stage(**{**stage(release("-2 mm"), friction=lugre(2), controller=LIMITED).as_written(), **drive})
+    assert friso.simulate(chosen)["force"].values[:9] == pytest.approx(1.5)

@@ -124,14 +124,20 @@ class ByHand:
         return ByHand(self.numbers, np.zeros((1, 4)))
 
     def start(self, displacement: float = 0.0) -> np.ndarray:
-        """Return a start at rest with a displacement [m].
+        """Return a start at rest, held by hand at a displacement [m] until filters have settled.
 
-        A filter of the position has followed it, a filter of the error has not.
+        The integral holds nothing of the error.
         """
         y = np.zeros(len(STATES))
         y[[X, XC, XP]] = displacement
         n = dict(zip(NAMES, self.numbers, strict=True))
-        y[LOW] = 0.0 if n["on_error"] or n["observer"] else displacement
+        error = -displacement - min(max(-displacement, -n["deadband"]), n["deadband"])
+        y[LOW] = error if n["on_error"] else displacement
+        if observer := n["observer"]:  # a held error winds the disturbance up at a constant rate, with a constant lag
+            feedback = n["feedback"]
+            lag = feedback**2 * error / (3 * observer**2 + 6 * observer * feedback + feedback**2)
+            y[LOW], y[RATE] = error - lag, -3 * observer * lag
+            y[INTEGRAL] = n["kp"] * error / n["believed"] - feedback**2 * y[LOW] - 2 * feedback * y[RATE]
         return y
 
     def run(self, y: np.ndarray, times: np.ndarray, rtol: float = 1e-9, most: int = 4_000_000) -> np.ndarray:

@@ -115,7 +115,8 @@ def prepare(
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """Return the initial states of stages from rest, (runs, states), displaced as the motion says."""
-    return kernel.at_rest({**flat, "motion.size": motion.size(flat)}, motion.initial_displacement(flat), runs)
+    place = motion.initial_displacement(flat)
+    return kernel.at_rest({**flat, "motion.size": motion.size(flat)}, place, runs, place)
 
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:

@@ -173,19 +173,35 @@ class Kernel:
         """
         return self.settled_at(self.values(flat, runs), steady, runs)
 
-    def at_rest(self, flat: Mapping[str, Any], place: Any, runs: int) -> np.ndarray:
+    def at_rest(self, flat: Mapping[str, Any], place: Any, runs: int, displacement: Any = 0.0) -> np.ndarray:
         """Return the states in which stages at rest at a place [m] begin, shape (runs, initial_size).
 
-        The controller has held them there, with its reference there, and friction bears nothing. The actuator carries
-        the constant forces of [bias], and of a cable with the drive as built, by the integral of its controller or,
-        without one, by an error; joint and transmission are deflected by what they carry of [bias]. `flat` has the
-        stages' keys in SI.
+        Friction bears nothing (see `steady_at_rest`).
         """
-        values, force = self.values(flat, runs), carrying_force(flat)
+        return self.settled(flat, self.steady_at_rest(flat, place, runs, displacement), runs)
+
+    def steady_at_rest(self, flat: Mapping[str, Any], place: Any, runs: int, displacement: Any = 0.0) -> Steady:
+        """Return the steady motion of stages at rest at a place [m], with arrays of shape (runs,) or numbers.
+
+        The controller has held them there, with its reference there. The actuator carries the constant forces of
+        [bias], and of a cable with the drive as built, by the integral of its controller or, without one, by an error;
+        joint and transmission are deflected by what they carry of [bias]. With a `displacement` [m], the place is that
+        far from the reference, where something else has held the stage: filters have settled on the error, and
+        integrals hold nothing of it. `flat` has the stages' keys in SI.
+        """
+        force = carrying_force(flat)
         if self.layout.clocked:
             force = (force + flat["cable.stiffness"] * place) / flat["drive.motor_constant_ratio"]
-        steady = Steady(0.0, place, force=force, deflected=1.0)
-        return self.settled_at(values, self._with_error(values, steady), runs)
+        values = self.values(flat, runs)
+        steady = self._with_error(values, Steady(-displacement, place, force=force, deflected=1.0))
+        if not np.any(displacement):
+            return steady
+        if not (integrals := self.having(Role.INTEGRAL)):
+            return steady._replace(force=self.module.stiffness(values)[0] * steady.error)
+        empty, one = (
+            self.settled_at(values, steady._replace(force=newton), runs)[:, integrals[-1]] for newton in (0.0, 1.0)
+        )
+        return steady._replace(force=force - empty / (one - empty))
 
     def _with_error(self, values: list[np.ndarray], steady: Steady) -> Steady:
         """Add to a steady motion the error at which a controller without integral exerts its force.
@@ -204,22 +220,6 @@ class Kernel:
         `values` are those of the parameters.
         """
         return columns(self.module.settled(steady, values), runs)
-
-    def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion whose integrals hold nothing but `steady.force`.
-
-        Any force due to the other states comes on top. `values` are those of the parameters, and the shape is (runs,
-        initial_size).
-        """
-        resting = self.settled_at(values, self._with_error(values, steady)._replace(force=0.0), runs)
-        if integrals := self.having(Role.INTEGRAL):
-            per_newton = self.settled_at(values, steady._replace(force=1.0), runs) - resting
-            inner = integrals[-1]
-            resting -= (resting[:, inner] / per_newton[:, inner])[:, None] * per_newton
-            resting[:, integrals] = 0.0
-            if np.any(steady.force):
-                resting += np.reshape(steady.force, (-1, 1)) * per_newton
-        return resting
 
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
         """Return on which side of each kink runs are: 1 beyond and 0 before it, shape (kinks, ...).

@@ -149,23 +149,26 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
     """
     from sympy import pi
 
-    from friso.equations.blocks import Controller
+    from friso.equations.blocks import Controller, force_limit
     from friso.equations.component import STEADY, Component, Held, Output, Role, State, key, state
     from friso.equations.model import loop_stiffness
+    from friso.equations.sampled import clipped
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
         loops.append(loop)
         reading, command, sampled = _command(form, loop)
         commanded, waiting = state(COMMANDED), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
-        held = [Held(state(READING), reading, STEADY.position), *sampled, Held(commanded, command, STEADY.force)]
-        held += [Held(new, old, STEADY.force) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
+        controller = form.structure.controller
+        begun = clipped(STEADY.force, force_limit()) if controller and controller.anti_windup else STEADY.force
+        held = [Held(state(READING), reading, STEADY.position), *sampled, Held(commanded, command, begun)]
+        held += [Held(new, old, begun) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
         acting = waiting[-1] if waiting else commanded
         force = key("drive.motor_constant_ratio") * state(MOTOR_FACTOR) * acting
         states: tuple[State, ...] = ()
         if form.current_loop:
             lagging, omega = state("motor_force"), 2 * pi * key("drive.current_bandwidth")
             scale = loop_stiffness(form.structure.controller) * length
-            settled = key("drive.motor_constant_ratio") * STEADY.force
+            settled = key("drive.motor_constant_ratio") * begun
             states = (State(lagging, omega * (force - lagging), "N", scale, Role.LAG, settled),)
             force = lagging
         return Controller(force, Component(states, (), {"force": Output(force, "N", "motor force")}), tuple(held))

@@ -304,8 +304,8 @@ def _is_smooth(
 
 def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Return the states in which stages begin their motion, shape (count, states)."""
-    sized = {**flat, "motion.size": size(flat)}
-    return stages.kernel.at_rest(sized, initial_displacement(flat), count)[:, : len(stages.kernel.states)]
+    sized, place = {**flat, "motion.size": size(flat)}, initial_displacement(flat)
+    return stages.kernel.at_rest(sized, place, count, place)[:, : len(stages.kernel.states)]
 
 
 def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:

@@ -36,7 +36,8 @@ class RecordedRuns:
 
     `numbers` are the numbers of the runs. `logged` are the signals that the drive knows, `true` the real motion, by the
     names of the roles of a log: SI, shape (runs, n), NaN after a failure. `statuses` tell of failures, shape (runs,);
-    `statistics` are those of the solver; `outputs` are all signals of the equations, if asked for.
+    `statistics` are those of the solver; `outputs` are all signals of the equations, if asked for. `begun` [N] is the
+    force with which the controllers begin, shape (runs,).
 
     All signals are those at the sample's instant, but "force" is the one that the drive commands from it, however late
     it acts. Where it acts at the next sample's instant, the motor's force among the outputs is the one just after the
@@ -50,6 +51,7 @@ class RecordedRuns:
     statuses: np.ndarray
     statistics: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     outputs: Mapping[str, np.ndarray] | None = None
+    begun: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def time(self) -> np.ndarray:
@@ -169,8 +171,8 @@ def _recorded(
     )  # fmt: skip
     pieces = task.pieces.reshape(-1, *task.pieces.shape[-2:])
     values = shape.values(flat | motion, len(seeds))
-    starts = shape.at_rest(flat | motion, pieces[:, 0, 1] + task.displacement, len(seeds))
-    batch = prepare(shape, flat | motion, len(seeds), options, starts)
+    held = shape.steady_at_rest(flat | motion, pieces[:, 0, 1] + task.displacement, len(seeds), task.displacement)
+    batch = prepare(shape, flat | motion, len(seeds), options, shape.settled_at(values, held, len(seeds)))
     end = np.zeros((len(pieces), 1, pieces.shape[2]))
     last = (count - 1) * interval + 2 * np.max(flat["drive.sample_time"])  # the last sample has acted by then
     end[:, 0, 0] = max(task.duration, last)
@@ -182,7 +184,8 @@ def _recorded(
     results = empty_results(len(seeds), 1, count, shape.sample_size)
     run_batch(shape, batch, options_of(options), results, threads)
     logged, true = _signals(shape, results.samples, flat, task, seeds, interval)
-    recorded = RecordedRuns(numbers, interval, logged, true, results.statuses, results.statistics)
+    begun = np.broadcast_to(held.force, (len(seeds),))
+    recorded = RecordedRuns(numbers, interval, logged, true, results.statuses, results.statistics, begun=begun)
     if not with_outputs:
         return recorded
     outputs = [_outputs(shape, results.samples[k], values, batch, interval, k) for k in range(len(seeds))]

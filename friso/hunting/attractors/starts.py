@@ -68,16 +68,16 @@ class Starts:
         limit = stages.flat[FORCE_LIMIT] / stages.number("stiffness")
         begin = side * np.minimum(np.tile(distances, which.size) * limit, settings.farthest_start * stages.length)
         for wound in times:
-            states = stages.displaced(begin)
+            states = stages.at_rest(begin, begin)
             states[:, stages.integral] -= wound * stages.relaxed * begin
             self._add(np.repeat(which, len(distances)), states)
 
     def remembering(self, thorough: bool) -> None:
         """Add runs of stages with several bristles, bent in the ways in which motions leave them.
 
-        Some runs are released at a distance, with the controller switched on before the release or at the release; some
-        are pushed. Others stick, after one of three pasts: a travel outward over the distance itself, a long travel out
-        or back, or random travels to and fro. A `thorough` survey gets more distances.
+        Some runs begin with a displacement, a jump of the reference, or a push. Others stick, after one of three pasts:
+        a travel outward over the distance itself, a long travel out or back, or random travels to and fro. A
+        `thorough` survey gets more distances.
         """
         units = spread_over(settings.remembering_starts[thorough])
         rng = np.random.default_rng(0)
@@ -92,7 +92,7 @@ class Starts:
                 stages = self.stages.take(owners)
                 distances = side * np.tile(units, which.size) * stages.length
                 to_and_fro = np.tile([way, -way * shares[0], way * shares.prod(axis=0)], which.size) * stages.length
-                self._add(owners, stages.displaced(distances))
+                self._add(owners, stages.at_rest(distances, distances))
                 self._add(owners, stages.at_rest(distances))
                 self._add(owners, pushed(stages, distances * stages.number("rate")))
                 for travels in ([distances], [np.inf * distances], [-np.inf * distances], to_and_fro):

@@ -160,19 +160,13 @@ class Ensemble:
         """Return the states in a steady motion after all transients, (count, states)."""
         return self.kernel.settled_at(self.values, steady, self.count)
 
-    def at_rest(self, place: np.ndarray | float) -> np.ndarray:
-        """Return the states in which stages at rest at a place [m] begin, (count, states)."""
-        sizes = {"motion.size": np.nan, "motion.duration": np.inf}
-        return self.kernel.at_rest({**self.flat, **sizes}, place, self.count)
+    def at_rest(self, place: np.ndarray | float, displacement: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return the states in which stages at rest at a place [m] begin, (count, states).
 
-    def displaced(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the states of stages displaced by hand, with the controller on, (count, states).
-
-        Filters have settled on the error, the `displacement` [m]; integrals hold the constant forces and nothing of the
-        error.
+        Their reference has been there, or a `displacement` [m] before it (see `Kernel.at_rest`).
         """
-        held = Steady(-displacement, displacement, force=carrying_force(self.flat), deflected=1.0)
-        return self.kernel.unwound_at(self.values, held, self.count)
+        sizes = {"motion.size": np.nan, "motion.duration": np.inf}
+        return self.kernel.at_rest({**self.flat, **sizes}, place, self.count, displacement)
 
     @cached_property
     def relaxed(self) -> np.ndarray:

@@ -25,7 +25,6 @@ from friso.engine.simd_math import gaussian, quantised, sine
 from friso.equations.as_built import VELOCITY_SEED_OFFSET
 from friso.equations.component import TIME
 from friso.equations.reference import declared
-from friso.equations.structure import carrying_force
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.virtual_rig.run import failures, run_flat
@@ -52,10 +51,10 @@ def replayed(stage: Stage, flat: Mapping[str, Any], program: Program, samples: i
     if MOTOR_POSITION in program.inputs:
         motor = recorded.outputs[f"{flat['encoder.velocity']}_position"][0]
         seen[MOTOR_POSITION] = _read(flat, motor)
-    place, per_newton = float(task.pieces[0, 1] + task.displacement), flat[str(PER_NEWTON)]
-    force = (float(carrying_force(flat)) + flat["cable.stiffness"] * place) / flat["drive.motor_constant_ratio"]
+    place, per_newton = float(task.pieces[0, 1]), flat[str(PER_NEWTON)]
     begun_at = {REFERENCE: place, POSITION: float(true[0]), MOTOR_POSITION: float(motor[0])}
-    start = {str(one): begun_at.get(one, 0.0) for one in program.inputs} | {"output": force * per_newton + 0.0}
+    start = {str(one): begun_at.get(one, 0.0) for one in program.inputs}
+    start["output"] = float(recorded.begun[0]) * per_newton + 0.0
     inputs = {str(one): seen[one] + 0.0 for one in program.inputs}
     return Vector(start, inputs, recorded.logged["force"][0] * per_newton + 0.0, true)
 
