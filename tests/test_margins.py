@@ -27,13 +27,14 @@ from friso.hunting import (
     check,
     edge_search,
     find_attractors,
+    hunting,
     joint_margins,
     path_search,
 )
 from friso.hunting.attractors import Attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.path import key_path
-from friso.hunting.stage_margins import _margin
+from friso.hunting.stage_margins import _margin, friction_margin
 from friso.hunting.what_attracts import Sketch
 from friso.questions.check.cases import joint_margins_document
 from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
@@ -66,6 +67,32 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) ->
     assert margin.above is not None
     assert (margin.below.kind, margin.above.kind) == ("fold", "flip")
     assert margin.below.inside < 1 < margin.above.inside
+
+
+@pytest.mark.inner
+def test_an_end_just_above_coulomb_friction_is_found() -> None:
+    """Hunting ended between 107 and 109 mN, closer to Coulomb friction than a step beyond an orbit's end."""
+    stage = Stage(
+        masses={"stage": "0.009115 kg"},
+        friction={
+            **{"model": "elasto_plastic", "static": "0.2222 N", "coulomb": "0.1056 N", "viscous": "0.007666 N*s/m"},
+            **{"stribeck_velocity": "0.001483 m/s", "stribeck_exponent": 1.3, "breakaway_deflection": "2.391e-07 m"},
+            **{"bristle_stiffness": "344200.0 N/m", "bristle_damping": "38.42 N*s/m"},
+        },
+        controller={
+            **{"kind": "pid", "kp": "75.98 N/m", "ki": "3380.0 N/(m*s)", "kd": "0.7714 N*s/m", "tau": "0.002126 s"},
+            **{"derivative_on": "measurement", "force_limit": "1.68 N"},
+            **{"anti_windup": "back_calculation", "anti_windup_time": "0.01169 s"},
+        },
+        motion={"kind": "release", "displacement": "1 mm", "duration": "4 s"},
+    )
+    margin = friction_margin(stage, hunts(hunting=hunting(stage)))
+    assert margin is not None
+    assert margin.below is not None
+    assert margin.below.certain
+    assert margin.range[0] <= margin.below.outside < 0.107 / 0.2222 < margin.below.inside < 0.112 / 0.2222
+    assert attracts(stage, 0.109 / 0.2222)
+    assert not attracts(stage, 0.107 / 0.2222)
 
 
 def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
@@ -250,6 +277,26 @@ def test_static_friction_is_never_told_below_coulomb_friction() -> None:
     (says,) = friction_sentences(FakeCase(stage, None, static_friction=margin))
     assert "11.308" not in says
     assert "11.3" in says or "12.5" in says
+
+
+@pytest.mark.parametrize(
+    ("below", "above", "range_", "wanted", "unwanted"),
+    [
+        (None, AttractionEnd(1.05, 1.0, True), (1.0, 3.0), "as yours", "12.7 to 12.6"),
+        (AttractionEnd(0.9, 0.93, True), AttractionEnd(1.05, 1.0, True), (0.5, 3.0), "up to yours", "to 12.6"),
+        (AttractionEnd(0.97, 1.0, True), AttractionEnd(1.4, 1.3, True), (0.5, 3.0), "16.4 N", "12.7 to"),
+        (AttractionEnd(0.97, 0.9995, True), AttractionEnd(1.05, 1.0005, True), (0.5, 3.0), "1.05 times", " to 12.6"),
+    ],
+)
+def test_a_range_of_static_friction_holds_that_of_the_stage(
+    below: AttractionEnd | None, above: AttractionEnd | None, range_: tuple[float, float], wanted: str, unwanted: str
+) -> None:
+    """12.65 N, at which nothing hunts, was rounded out of its own range; with ends on both sides that turned round."""
+    margin = ParameterMargin(False, below, above, range_)
+    says = margin_sentence("static friction", margin, 12.65, "N")
+    assert wanted in says
+    assert unwanted not in says
+    assert "yours" in says
 
 
 @pytest.mark.parametrize(

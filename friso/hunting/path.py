@@ -144,10 +144,7 @@ def key_path(flat: Mapping[str, Any], key: str) -> ParameterPath:
 
 
 def _path_of_factors(scaled: Callable[[np.ndarray], Mapping[str, Any]], lowest: float) -> ParameterPath:
-    """Return a path from the factor `lowest` to the highest one, whose steps grow outward.
-
-    A side narrower than a step is left out.
-    """
+    """Return a path from the factor `lowest`, at most 1, to the highest one; its steps grow outward."""
     steps = np.array(edge_settings.margin_steps)
-    below = lowest ** steps[::-1] if np.log(lowest) < -edge_settings.least_side_log else np.empty(0)
+    below = lowest ** steps[::-1] if lowest < 1 else np.empty(0)
     return ParameterPath.of(scaled, below, SEARCH_LIMITS.most_friction**steps, edge_settings.beyond_factors)

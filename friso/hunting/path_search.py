@@ -129,7 +129,7 @@ class PathSearch:
             raise Undecided
         before = numbers[side * np.log(self.factors[numbers] / end.outside) <= 0]
         hunting_side = edge_settings.inside_end_log * np.sign(np.log(end.inside / end.outside))
-        inside = float(end.inside * np.exp(hunting_side))
+        inside = float(np.clip(end.inside * np.exp(hunting_side), self.factors[0], self.factors[-1]))
         if hunts and side * np.log(inside) < 0:
             inside = end.inside
         return replace(end, inside=inside, certain=end.certain and bool(self.decided[before].all()))

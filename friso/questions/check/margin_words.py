@@ -11,6 +11,7 @@ from friso.equations.structure import carrying_force
 from friso.hunting import SEARCH_LIMITS, AttractionEnd, Case, ParameterMargin
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
+    listed,
     range_with_unit,
     rounded_down,
     rounded_up,
@@ -68,7 +69,9 @@ def margin_sentence(
     if len(open_ones) == 2:
         return f"Whether another {name} {'ends' if margin.attracts else 'starts'} hunting was not determined."
     least, most = 1.0 if -1 in open_ones else low, 1.0 if 1 in open_ones else high
-    return f"{does} for {name} {_extent(least, most, own, unit)}{remark}{doubt}."
+    extent, ways = _extent(least, most, own, unit), listed(margin_ways(margin), "or")
+    changes = f"; it {'ends' if margin.attracts else 'begins'} {ways}" if ways and extent.startswith("as yours") else ""
+    return f"{does} for {name} {extent}{remark}{changes}{doubt}."
 
 
 def _kept_to(margin: ParameterMargin, side: int) -> float:
@@ -80,10 +83,21 @@ def _kept_to(margin: ParameterMargin, side: int) -> float:
 
 
 def _extent(low: float, high: float, own: float | None, unit: str) -> str:
-    """Write a range of multiples of a parameter whose value is `own` [SI `unit`]; of multiples if that is None."""
-    if own is None:
-        return f"{plain_factor(low)} to {plain_factor(high)} times yours"
-    return range_with_unit(rounded_up(low * own), rounded_down(high * own), unit)
+    """Write a range of multiples of a parameter whose value is `own` [SI `unit`]; of multiples if that is None.
+
+    Ends are rounded towards the stage's own value. An end that rounds past it is that value, "yours".
+    """
+    one, (least, most) = own or 1.0, (low, high) if own is None else (rounded_up(low * own), rounded_down(high * own))
+    yours = "yours" if own is None else f"yours ({with_unit(own, unit)})"
+
+    def end(value: float) -> str:
+        return f"{plain_factor(value)} times yours" if own is None else with_unit(value, unit)
+
+    if least < one < most:
+        return f"{plain_factor(low)} to {end(high)}" if own is None else range_with_unit(least, most, unit)
+    if least < one:
+        return f"from {end(least)} up to {yours}"
+    return f"from {yours} up to {end(most)}" if most > one else f"as {yours}"
 
 
 def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
