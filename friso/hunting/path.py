@@ -54,6 +54,11 @@ class BandwidthWindow:
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
         return low <= factor <= high
 
+    def lies(self, side: int, factor: float) -> bool:
+        """Tell whether this window lies above (`side` 1) or below (-1) a factor of the stage's own bandwidth."""
+        near = self.low if side > 0 else self.high
+        return near is not None and side * (near.inside - factor) > 0
+
     def without(self, other: BandwidthWindow) -> tuple[BandwidthWindow, ...]:
         """Return the parts of this window below and above another one; where both overlap, the other counts.
 

@@ -71,7 +71,12 @@ def margin_sentence(
     least, most = 1.0 if -1 in open_ones else low, 1.0 if 1 in open_ones else high
     extent, ways = _extent(least, most, own, unit), listed(margin_ways(margin), "or")
     changes = f"; it {'ends' if margin.attracts else 'begins'} {ways}" if ways and extent.startswith("as yours") else ""
-    return f"{does} for {name} {extent}{remark}{changes}{doubt}."
+    again = [
+        f"again from {_value(begins.outside, own, unit)} {'up' if side > 0 else 'down'}"
+        for side, begins in margin.again.items()
+    ]
+    also = f", and {listed(again, 'and')}" if again else ""
+    return f"{does} for {name} {extent}{also}{remark}{changes}{doubt}."
 
 
 def _kept_to(margin: ParameterMargin, side: int) -> float:
@@ -87,17 +92,20 @@ def _extent(low: float, high: float, own: float | None, unit: str) -> str:
 
     Ends are rounded towards the stage's own value. An end that rounds past it is that value, "yours".
     """
-    one, (least, most) = own or 1.0, (low, high) if own is None else (rounded_up(low * own), rounded_down(high * own))
     yours = "yours" if own is None else f"yours ({with_unit(own, unit)})"
+    least, most = (low, high) if own is None else (rounded_up(low * own) / own, rounded_down(high * own) / own)
+    if least < 1 < most and own is not None:
+        return range_with_unit(least * own, most * own, unit)
+    if least < 1 < most:
+        return f"{plain_factor(least)} to {_value(most, own, unit)}"
+    if least < 1:
+        return f"from {_value(least, own, unit)} up to {yours}"
+    return f"from {yours} up to {_value(most, own, unit)}" if most > 1 else f"as {yours}"
 
-    def end(value: float) -> str:
-        return f"{plain_factor(value)} times yours" if own is None else with_unit(value, unit)
 
-    if least < one < most:
-        return f"{plain_factor(low)} to {end(high)}" if own is None else range_with_unit(least, most, unit)
-    if least < one:
-        return f"from {end(least)} up to {yours}"
-    return f"from {yours} up to {end(most)}" if most > one else f"as {yours}"
+def _value(factor: float, own: float | None, unit: str) -> str:
+    """Write a multiple of a parameter whose value is `own` [SI `unit`]; as a multiple if that is None."""
+    return f"{plain_factor(factor)} times yours" if own is None else with_unit(factor * own, unit)
 
 
 def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
@@ -134,6 +142,10 @@ def thin_margins(case: Case) -> list[str]:
     edge, friction = case.judgement.margin, case.static_friction
     if edge and edge.quiet * distance > 1:
         thin.append(f"a bandwidth that is lower by {percent(1 - edge.factor)}")
+    above = [window.low for window in case.judgement.windows if window.low and window.lies(1, 1.0)]
+    again = min(above, key=lambda end: end.inside, default=None)
+    if again and again.outside < distance:
+        thin.append(f"a bandwidth that is higher by {percent(again.inside - 1)}")
     for side in (-1, 1):
         end = friction.end(side) if friction and not friction.attracts else None
         if end and max(end.outside, 1 / end.outside) < distance:
