@@ -175,16 +175,16 @@ def test_each_case_has_its_own_bandwidths(rig: Stage, case: str) -> None:
     words = {"locked": "hunts", "free": "settles"}
     judged = {name: Fates(np.array([word] * 9, dtype=object), np.zeros(9, bool)) for name, word in words.items()}
     sample = Sample({"friction.coulomb": np.linspace(0.5, 1.5, 9)}, 9, 0, {})
-    factors = np.array([0.5, 1.0, 1.3, 2.0])
+    factors = np.array([0.5, 0.8, 1.0, 1.3, 2.0])
     tried = {
-        "locked": DrawnBandwidths(factors, np.tile([1.0, 1.0, 0.0, 0.0], (9, 1)), 8.0),
-        "free": DrawnBandwidths(factors, np.tile([1.0, 0.0, 0.0, 0.0], (9, 1)), 8.0),
+        "locked": DrawnBandwidths(factors, np.tile([1.0, 1.0, 1.0, 0.0, 0.0], (9, 1)), 8.0),
+        "free": DrawnBandwidths(factors, np.tile([1.0, 0.0, 0.0, 0.0, 0.0], (9, 1)), 8.0),
     }
     tried["given"], judged["given"] = tried[case], judged[case]
     locked_says, free_says = draws_sentences(Draws(stage, sample, 0, judged, 9, tried))
     assert "10.4 Hz, up to 16.0 Hz" in locked_says
     assert "free the joint" in locked_says
-    assert "4.00 Hz to 8.00 Hz" in free_says
+    assert "4.00 Hz to 6.40 Hz" in free_says
     assert "Cure" not in free_says
 
 
@@ -219,6 +219,37 @@ def test_verdicts_that_hang_on_uncertain_keys_are_not_certain(rig: Stage) -> Non
         assert escape(sentence) in answer._repr_html_()
     assert any(text.startswith("At the centre of the ranges") and text in page for text in answer.details())
     assert answer.tables()[0].title == f"{stage.name}, at the centre of its ranges"
+
+
+def test_machines_without_integral_action_cannot_hunt(rig: Stage) -> None:
+    """Their sentence is that of fixed numbers, with how far off they rest: friction over stiffness at most."""
+    gains = {"controller": {"kind": "pid", "kp": "3 N/mm", "kd": "60 N*s/m", "derivative_on": "measurement"}}
+    stage = rig.replace({**gains, "joint": None, "parasitic": None, "friction.static": "2 N .. 3 N"})
+    answer = friso.check(stage, draws=8)
+    (says,) = answer.sentences()
+    assert "cannot hunt, because the controller has no integral action" in says
+    assert "8 machines" in says
+    assert "%" not in says
+    off = answer.draws.fates["given"].offsets
+    assert len(off) == 8
+    assert np.all((off > 0) & (off < 3 / 3000))
+    alone = friso.check(stage.replace({"friction.static": "2.5 N"}))["given"]
+    assert off.min() <= abs(alone.offset) <= off.max()
+
+
+@pytest.mark.parametrize(
+    ("hunts", "says"),
+    [
+        ([1, 0, 0], "may hunt: none of 9 machines drawn does, but 9 of the 9 tried at other bandwidths do at 4.00 Hz."),
+        ([1, 1, 0], "may hunt: none of 9 machines drawn does, but 9 of the 9 tried at other bandwidths do at 8.00 Hz."),
+        ([0, 0, 0], "does not hunt: none of 9"),
+    ],
+)
+def test_hunting_that_begins_at_the_machines_own_controller_may_be_there(hunts: list[int], says: str) -> None:
+    tried = DrawnBandwidths(np.array([0.5, 1.0, 1.3]), np.tile(np.array(hunts, float), (9, 1)), 8.0)
+    shown = replace(draws(made(0, 9)), bandwidths={"given": tried})
+    assert says in draws_sentences(shown)[0]
+    assert shown.split("given") == says.startswith("may")
 
 
 def test_document_rows_and_sentences() -> None:

@@ -50,7 +50,7 @@ from friso.hunting.many_stages import (
     sketch_attractors,
 )
 from friso.hunting.margin import Margin, find_margin
-from friso.hunting.motions import Motions
+from friso.hunting.motions import Motions, rests_off
 from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
@@ -143,6 +143,7 @@ __all__ = [
     "needed_kernels",
     "plane",
     "pushes_that_hunt",
+    "rests_off",
     "sketch_attractors",
     "stuck",
     "tracking",

@@ -19,7 +19,7 @@ from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import COUNTED_ABOVE, lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
-from friso.hunting.measures import Measures, measure_runs
+from friso.hunting.measures import Measures, measure_runs, measuring_options, swing_of
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import check_settings
 from friso.hunting.turning import LAST_HALF, LAST_QUARTER
@@ -59,6 +59,21 @@ def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) ->
         for column, values in zip(columns, part._arrays, strict=True):
             column[runs.numbers] = values
     return Motions(*columns)
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
+def rests_off(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
+    """Return how far off their references stages rest at the end of their own motions [m], shape (count,).
+
+    `flat` has the keys of stages of one structure in SI; they are run to the relative tolerance `rtol`. The distance
+    is NaN for a motion that was not completed or has not come to rest.
+    """
+    off = np.full(count, np.nan)
+    for runs in run_chunks(kernel(shared_structure(flat)), flat, count, measuring_options(rtol)):
+        still = np.equal(runs.results.statuses, Status.DONE) & (swing_of(runs) <= COUNTED_ABOVE)
+        middle = (runs.statistic("deviation_max") + runs.statistic("deviation_min")) / 2
+        off[runs.numbers] = np.where(still, np.abs(middle), np.nan)
+    return off
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,18 @@ from friso.engine.allowance import allowance
 from friso.engine.arrays import ArrayColumns
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import at_bandwidth, bandwidth
+from friso.equations.motion import rests
 from friso.equations.structure import shared_structure
-from friso.hunting import can_hunt, find_attractors, judge_many, kernels_to_judge, loops_unstable, sketch_attractors
+from friso.hunting import (
+    can_hunt,
+    cannot_hunt,
+    find_attractors,
+    judge_many,
+    kernels_to_judge,
+    loops_unstable,
+    rests_off,
+    sketch_attractors,
+)
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, separation, share
@@ -28,13 +38,16 @@ class Fates(ArrayColumns):
 
     Verdicts are words of `friso.hunting.criteria.VERDICTS`. A loop counts as `unstable` if it is so while the stage
     sticks, or while it slides. `amplitudes` [m], half of peak to peak, and `periods` [s] have the shape (count,) too,
-    or are empty if they are not known. They are NaN for a stage that has no attractor, or an uncertain one.
+    or are empty if they are not known. They are NaN for a stage that has no attractor, or an uncertain one. `offsets`
+    [m] are how far off their references stages rest that cannot hunt; NaN for one that has not come to rest, and empty
+    if stages may hunt.
     """
 
     verdicts: np.ndarray
     unstable: np.ndarray
     amplitudes: np.ndarray = field(default_factory=lambda: np.zeros(0))
     periods: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    offsets: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -122,6 +135,17 @@ class DrawnBandwidths:
             if run and high >= low * settings.step_of_bandwidths * (1 - settings.finest_step):
                 return float(low), float(high)
         return None
+
+    @property
+    def hunting_reaches(self) -> tuple[int, float] | None:
+        """Return how many stages hunt next to their own bandwidth, and at which factor; None if none does.
+
+        At their own bandwidth none of them may hunt: hunting begins somewhere between both.
+        """
+        own = int(np.argmin(abs(np.log(self.factors))))
+        hunt = self.hunts[:, max(own - 1, 0) : own + 1] == 1
+        near = np.flatnonzero(hunt.any(axis=0))
+        return (int(hunt[:, near[-1]].sum()), float(self.factors[max(own - 1, 0) + near[-1]])) if near.size else None
 
     @property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
@@ -283,11 +307,17 @@ class Draws:
         return cls(stage, replace(sample, keys=keys, count=count), seed, judged, sample.count, bandwidths)
 
     def split(self, name: str) -> bool:
-        """Tell whether the drawn stages of a variant differ in whether they hunt, or are not decided for certain."""
+        """Tell whether the drawn stages of a variant differ in whether they hunt, or are not decided for certain.
+
+        They differ, too, if none hunts but hunting of some begins between their own bandwidth and the next one tried.
+        """
         fates = self.fates[name]
         attracted = np.isin(fates.verdicts, ATTRACTED)
         open_ones = np.isin(fates.verdicts, UNDECIDED)
-        return bool(open_ones.mean() > settings.most_open_draws or len({*attracted[~open_ones].tolist()}) > 1)
+        tried = self.bandwidths.get(name)
+        next_to = tried is not None and not attracted.any() and tried.hunting_reaches is not None
+        differ = next_to or len({*attracted[~open_ones].tolist()}) > 1
+        return bool(open_ones.mean() > settings.most_open_draws or differ)
 
     def unit(self, key: str) -> str:
         """Return the SI unit of a key."""
@@ -318,6 +348,7 @@ def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally
     attracted = find_attractors(flat, count)
     verdicts = judge_many(flat, count, rtol, attracted)
     sure = attracted.certain & np.isin(verdicts, ATTRACTED)
-    swings = (np.where(sure, values, np.nan) for values in (attracted.amplitude, attracted.period))
+    swings = np.where(sure, attracted.amplitude, np.nan), np.where(sure, attracted.period, np.nan)
+    offsets = rests_off(flat, count, rtol) if cannot_hunt(stage) and rests(stage.flat()) else np.zeros(0)
     tally.add(count, "machines drawn")
-    return Fates(verdicts, loops_unstable(flat, count), *swings)
+    return Fates(verdicts, loops_unstable(flat, count), *swings, offsets)

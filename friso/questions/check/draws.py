@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.hunting import cannot_hunt
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.quantities import plain_factor
@@ -17,6 +18,7 @@ from friso.shown.drawing.figure import Axis, Band, Figure, Panel
 from friso.shown.drawing.palette import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION
 from friso.shown.drawing.prefixes import (
     NOTHING,
+    length_at_rest,
     percentage,
     range_with_unit,
     share_with_interval,
@@ -48,9 +50,17 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
     A row has its name, and a text for the joint as given, locked and free.
     """
     fates = [draws.fates[name] for name in case_labels(draws.stage)]
+    cannot = [bool(_cannot_hunt(name, draws)) for name in case_labels(draws.stage)]
+
+    def shares(words: tuple[str, ...]) -> list[str]:
+        return [
+            "none: it cannot" if never else share_with_interval(fate.share(words))
+            for fate, never in zip(fates, cannot, strict=True)
+        ]
+
     rows = [
-        ("Hunts after this move", [share_with_interval(fate.share(("hunts",))) for fate in fates]),
-        ("A cycle attracts", [share_with_interval(fate.share(ATTRACTED)) for fate in fates]),
+        ("Hunts after this move", shares(("hunts",))),
+        ("A cycle attracts", shares(ATTRACTED)),
         *((f"Verdict {word}", [str(fate.counts[word]) for fate in fates]) for word in VERDICTS),
     ]
     separations = [fate.separations(draws.sample.keys) for fate in fates]
@@ -106,8 +116,15 @@ def _verdict(name: str, draws: Draws) -> str:
     lost, open_ones = int(np.count_nonzero(fates.unstable)), sum(fates.counts[word] for word in UNDECIDED)
     loop = f"the loop of {lost} of {count} machines drawn is unstable, whatever the friction; " if lost else ""
     doubt = f", {open_ones} of them not for certain" if open_ones else ""
+    if cannot := _cannot_hunt(name, draws):
+        return f"{loop}{cannot}."
     if open_ones == count:
         return f"{loop}what {count} machines drawn do is not certain."
+    tried = draws.bandwidths.get(name)
+    if tried and tried.hunting_reaches and not attracted.probability:
+        some, factor = tried.hunting_reaches
+        tell = f"{some} of the {len(tried.hunts)} tried at other bandwidths {'does' if some == 1 else 'do'} at"
+        return f"{loop}may hunt: none of {count} machines drawn does{doubt}, but {tell} {_bandwidth(tried, factor)}."
     if draws.split(name) and not attracted.probability:
         return f"{loop}none of {count} machines drawn surely hunts{doubt.replace(' of them', '')}."
     if draws.split(name):
@@ -121,6 +138,26 @@ def _verdict(name: str, draws: Draws) -> str:
     does = "hunts" if always else f"can hunt, and {share_with_interval(after_this)} of the machines do after this move"
     does = does if after_this.probability else never
     return f"{loop}{does}{_swings(fates)} (all of {count} machines drawn{doubt})."
+
+
+def _cannot_hunt(name: str, draws: Draws) -> str:
+    """Say why no machine drawn can hunt, and how far off the reference they rest; "" if one may hunt.
+
+    `name` is the case: "given", "locked" or "free".
+    """
+    fates, count = draws.fates[name], draws.sample.count
+    reason = cannot_hunt(draws.stage.variants()[name])
+    if not reason or not fates.offsets.size or np.isin(fates.verdicts, (*UNDECIDED, *ATTRACTED)).any():
+        return ""
+    off, within = fates.offsets[np.isfinite(fates.offsets)], float(draws.stage.flat().get("tolerance.within", 0.0))
+    cannot = f"cannot hunt, because {reason}"
+    if not off.size:
+        return f"{cannot}; none of {count} machines drawn has come to rest at the end of this motion"
+    least, most = (length_at_rest(float(end), within) for end in (off.min(), off.max()))
+    far = range_with_unit(float(off.min()), float(off.max()), "m") if least[0] != "<" else most
+    far = f"up to {far}" if least[0] == "<" != most[0] else far
+    drawn = f"{count} machines drawn{f', {count - off.size} of them still moving' if off.size < count else ''}"
+    return f"{cannot}; after this motion it rests {far} off its reference ({drawn})"
 
 
 def _hangs_on(fates: Fates, draws: Draws) -> str:
@@ -171,7 +208,8 @@ def _at_other_bandwidths(name: str, draws: Draws) -> str:
         return f" None of {count} hunts at {bandwidth(float(tried.factors[0]))} either."
     never = int(np.isnan(tried.edges[0]).sum())
     beyond = f" ({never} of {count} at none tried, or not for certain)" if never else ""
-    return f" Hunting begins below {bandwidth(edge[0])} to {bandwidth(edge[1])}{beyond}."
+    least = plain_factor(edge[0]) if tried.own is None else bandwidth(edge[0])
+    return f" Hunting begins below {least} to {bandwidth(edge[1])}{beyond}."
 
 
 def _freed(name: str, draws: Draws, text: str) -> str:
