@@ -38,10 +38,10 @@ class HuntingLog:
     """Swings of a stage about its reference.
 
     `count` is the number of whole cycles. `period` [s] and `amplitude` [m], half of peak to peak, are means over them,
-    with their standard deviations. `above` and `below` [m] are the mean peaks on either side of the reference, or of the
-    middle of the swing without one.
-    `predicted` is the cycle predicted from the stage file (None: no file, or no hunting). `time` [s] and `deviation`
-    [m] from the reference have the shape (n,); `peaks` are the sample numbers of the peaks.
+    with their standard deviations. `above` and `below` [m] are the mean peaks on either side of the reference, or of
+    the middle of the swing without one. `predicted` is the cycle predicted from the stage file (None: no file, or no
+    hunting). `time` [s] and `deviation` [m] from the reference have the shape (n,); `peaks` are the sample numbers of
+    the peaks.
     """
 
     count: int
