@@ -89,7 +89,7 @@ LONG_WAIT = VARIANTS["free, parasitic"].replace(
 DAMPED = VARIANTS["rigid"].replace({"controller.alpha": 0.4, "controller.crossover": "8 Hz"})
 """With much phase lead the symmetric cycle attracts, and creeps through its reversals."""
 
-HUNTING = {  # stage, release that hunts [m], amplitude [m], period [s]
+HUNTING = {  # stage, jump that hunts [m], amplitude [m], period [s]
     "long wait": (LONG_WAIT, 16.6e-3, 22.3e-3, 56.6),
     "creeping": (CREEPING, 1.1043e-3, 0.876e-3, 2.13),
     "light": (LIGHT, 0.2, 16.5e-3, 0.786),
@@ -118,10 +118,10 @@ def test_what_attracts_beside_cycles_that_repel(name: str) -> None:
 
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])
 @pytest.mark.parametrize("name", HUNTING)
-def test_releases_swing_on(name: str, rtol: float) -> None:
-    """Released from far off, the stage still swings like that after 60 of these periods."""
-    chosen, release, amplitude, period = HUNTING[name]
-    motion = {"kind": "release", "displacement": f"{release} m", "duration": f"{60 * period} s"}
+def test_jumps_swing_on(name: str, rtol: float) -> None:
+    """After a jump of the reference, the stage still swings like that after 60 of these periods."""
+    chosen, jump, amplitude, period = HUNTING[name]
+    motion = {"kind": "step", "size": f"{jump} m", "duration": f"{60 * period} s"}
     response = friso.simulate(chosen.replace({"motion": motion}), rtol=rtol, sample_time=period / 400)
     late = response.position.sel(time=slice(57 * period, None))
     assert np.ptp(late.to_numpy()) / 2 == pytest.approx(amplitude, rel=0.02)

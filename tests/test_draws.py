@@ -147,7 +147,7 @@ def test_ranges_of_what_hunts_are_told_first_with_what_narrows_them() -> None:
     shown = draws(Fates(words, stable, **swings))
     shown = replace(shown, sample=Sample(keys, count, 0, {}))
     (first,) = draws_sentences(shown)
-    for text in ("± 250 to 300 µm", "1.40 to 1.90 s", "all of 30"):
+    for text in ("500 to 600 µm peak to peak", "1.40 to 1.90 s", "all of 30"):
         assert text in first
     assert "measure friction.coulomb" in draws_details(shown)[0]
     assert draws_document(shown, "given")["amplitude_m"] == [2.5e-4, 3e-4]

@@ -204,7 +204,7 @@ def test_the_last_sample_is_taken(duration: float) -> None:
 @pytest.mark.xdist_group("rigid")
 def test_turning_points_against_a_tighter_run() -> None:
     """On a stretch with stops, at rtol 1e-6 they agree to about 1e-6 with those at 1e-11."""
-    flat = VARIANTS["rigid"].flat() | {"motion.duration": 8.0}
+    flat = VARIANTS["rigid"].replace({"motion": {"kind": "step", "size": "-2 mm", "duration": "8 s"}}).flat()
     shape = kernel(structure(flat))
     rough, fine = (next(iter(run_chunks(shape, flat, 1, RunOptions(rtol=rtol)))).results for rtol in (1e-6, 1e-11))
     count = int(fine.turn_counts[0])

@@ -90,6 +90,7 @@ def run_to(settling: float, swing: float = 0.0) -> Any:
         status=np.array([Status.DONE]),
         peaks=np.zeros(1),
         peak_to_peak=np.array([swing]),
+        offset=np.zeros(1),
         in_the_end=(np.array([settling]), np.array([settling])),
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from cycles import return_map, swings
-from variants import LOCKED, PARASITIC, VARIANTS, free, lugre, release, stage, there_and_back, van_dijk
+from variants import LOCKED, PARASITIC, VARIANTS, free, lugre, stage, step, there_and_back, van_dijk
 
 import friso
 from friso.stage import Stage
@@ -84,7 +84,8 @@ def test_break_away_force_falls_with_the_rate_of_force(rate: float, force: float
 @RIGID
 def test_cycle_of_a_rigid_mass_at_4_hz() -> None:
     """T 3.15031069 s, A 2.0166608 mm, half-period multiplier -0.8172509 (shooting at rtol 1e-12)."""
-    times, heights = swings(VARIANTS["rigid"].replace({"motion.duration": "300 s"}), rtol=1e-10)
+    motion = {"kind": "step", "size": "-2 mm", "duration": "300 s"}
+    times, heights = swings(VARIANTS["rigid"].replace({"motion": motion}), rtol=1e-10)
     assert (times[-1] - times[-21]) / 10 == pytest.approx(3.15031069, abs=0.6e-8)
     assert heights[-4:] == pytest.approx(2.0166608e-3, abs=0.6e-10)
     amplitude, multiplier = return_map(heights)
@@ -98,9 +99,9 @@ def rig(crossover: float, motion: str, joint: str = LOCKED) -> Stage:
     return stage(motion, friction=lugre(2), joint=joint, parasitic=PARASITIC, controller=control)
 
 
-def released(crossover: float, displacement: float, joint: str = LOCKED) -> Stage:
-    """The thesis's rig, let go at the displacement [mm]."""
-    return rig(crossover, release(f"{displacement} mm", "100 s"), joint)
+def jumping(crossover: float, size: float, joint: str = LOCKED) -> Stage:
+    """The thesis's rig, with a reference that jumps by a size [mm]."""
+    return rig(crossover, step(f"{size} mm", "100 s"), joint)
 
 
 @LOCKED_RIG
@@ -110,7 +111,7 @@ def released(crossover: float, displacement: float, joint: str = LOCKED) -> Stag
 )
 def test_cycles_of_the_locked_rig(crossover: float, displacement: float, amplitude: float, multiplier: float) -> None:
     """Amplitudes and multipliers that were fitted in the same way elsewhere (about 1 %)."""
-    _, heights = swings(released(crossover, displacement), rtol=1e-8)
+    _, heights = swings(jumping(crossover, displacement), rtol=1e-8)
     fixed_point, slope = return_map(heights)
     assert fixed_point == pytest.approx(amplitude, abs=1e-6)
     assert slope == pytest.approx(multiplier, rel=0.01)
@@ -118,14 +119,14 @@ def test_cycles_of_the_locked_rig(crossover: float, displacement: float, amplitu
 
 @LOCKED_RIG
 @pytest.mark.parametrize(("crossover", "dies", "hunts"), [(4, 0.23, 0.26), (8, 1.65, 1.8)])
-def test_release_that_starts_hunting(crossover: float, dies: float, hunts: float) -> None:
-    """Bistable: it takes about 0.25 mm at 4 Hz and 1.75 mm at 8 Hz to start hunting from rest.
+def test_jump_that_starts_hunting(crossover: float, dies: float, hunts: float) -> None:
+    """Bistable: it takes a jump of about 0.25 mm at 4 Hz and 1.75 mm at 8 Hz to start hunting from rest.
 
     references.md has 0.29 and 1.8 mm; SciPy Radau on the equations of plain.py hunts from 0.25 mm but not from 0.24 mm.
     """
-    times, heights = swings(released(crossover, dies), rtol=1e-8)
+    times, heights = swings(jumping(crossover, dies), rtol=1e-8)
     assert np.all(heights[times > 50] < 1e-9)  # none, or of rounding
-    times, heights = swings(released(crossover, hunts), rtol=1e-8)
+    times, heights = swings(jumping(crossover, hunts), rtol=1e-8)
     assert np.all(heights[times > 50] > 0.4e-3)
     assert times[-1] > 95
 
@@ -135,7 +136,7 @@ def test_cycles_of_the_free_rig() -> None:
     """At 3 Hz, to the digits given, where only a hard move starts it, and at 5 Hz."""
     for moving, amplitude, multiplier, off in (
         (rig(3, there_and_back("100 s"), free()), 4.28e-3, -0.82, (1e-5, 0.01)),
-        (released(5, 6, free()), 1.99e-3, -0.96, (0.5e-5, 0.0096)),
+        (jumping(5, 6, free()), 1.99e-3, -0.96, (0.5e-5, 0.0096)),
     ):
         fixed_point, slope = return_map(swings(moving, rtol=1e-8)[1])
         assert fixed_point == pytest.approx(amplitude, abs=off[0])

@@ -178,7 +178,7 @@ class Kernel:
 
         Friction bears nothing (see `steady_at_rest`).
         """
-        return self.settled(flat, self.steady_at_rest(flat, place, runs, displacement), runs)
+        return self.settled_at(self.values(flat, runs), self.steady_at_rest(flat, place, runs, displacement), runs)
 
     def steady_at_rest(self, flat: Mapping[str, Any], place: Any, runs: int, displacement: Any = 0.0) -> Steady:
         """Return the steady motion of stages at rest at a place [m], with arrays of shape (runs,) or numbers.

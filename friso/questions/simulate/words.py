@@ -36,10 +36,11 @@ def conclusion(
     evenly timed samples of the deviation from the reference [m], shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(LAST_QUARTER * len(deviation))])
+    middle = 0.0 if moves_on else _value(measures.offset)
     grows = bool(late.max() > GROWTH_RATIO * before.max(initial=0.0))
     clauses = {
         SWINGS: lambda: (
-            f"swings {swing_with_unit(_value(measures.peak_to_peak) / 2, _value(measures.offset), 'm')} every "
+            f"swings {swing_with_unit(_value(measures.peak_to_peak) / 2, middle, 'm')} every "
             f"{with_unit(_value(measures.period), 's')} at the end of the run{', and ever farther' if grows else ''}"
         ),
         CREEPS: lambda: _restless(float(late.max()), float(late[-1]), _value(measures.peak_to_peak), grows),
