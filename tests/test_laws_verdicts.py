@@ -10,6 +10,7 @@ import pytest
 from inside import friso_inside
 from variants import VARIANTS, gains, lugre, release, stage
 
+from friso.hunting import AttractionEnd, BandwidthWindow
 from friso.questions.check.laws import laws_document, laws_rows, laws_sentences
 from friso.shown.drawing.prefixes import NOTHING
 from friso.stage import violations
@@ -30,7 +31,8 @@ def case(
     quiet = None if edge is None else edge / (4 if edge_certain else 3)
     margin = edge and SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=1e-5)
     hunting = SimpleNamespace(certain=certain, target=cycle, reason="")
-    judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, given_up=given_up, observed=False)
+    said = {"given_up": given_up, "observed": False, "windows": ()}
+    judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, **said)
     loop = {"runs_away": False, "unstable": (), "unstable_as_built": (), "stick_slip": None}
     return SimpleNamespace(verdict=verdict, judgement=judgement, **loop)
 
@@ -115,6 +117,13 @@ def test_what_decides_between_laws() -> None:
     said = " ".join(laws_sentences(alike))
     assert "dahl (break-away)" in said
     assert "misses the virgin curve by 12 %" in said
+
+
+def test_hunting_beyond_the_edge_is_told_under_any_law() -> None:
+    laws = across(under("lugre", FAST), under("gms", ("hunts", 9.1)))
+    begins = AttractionEnd(5.0, 4.9, True)
+    laws.verdicts[1].trials[0].cases["given"].judgement.windows = (BandwidthWindow(begins, None),)
+    assert "edge 9.10 to 9.70 Hz, and hunting again from 19.6 Hz" in laws_sentences(laws)[0]
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,9 @@ from systems import posix
 from friso.errors import InputError, LogError
 from friso.identification.logs import confined
 from friso.identification.logs import format as reading
+from friso.identification.logs.assemble import read_log
 from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.mapping import Mapping
 from friso.identification.logs.preamble import preamble
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
 from friso.identification.logs.settings import LogSettings
@@ -89,6 +91,8 @@ TIMED = "\n".join(
 SECONDS = "\n".join(f"{t:.9g},{x:.9g},{f:.9g}" for t, x, f in zip(M["time"], M["position"], M["force"], strict=True))
 ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], strict=True))
 
+COMMAS = ROWS.replace(";", ",")
+
 
 @pytest.mark.parametrize(
     "text",
@@ -103,6 +107,13 @@ ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], s
         f"# dt = 1e-3 s\n# units: mm, N\npos;force\n{ROWS}",
         f"Sampling rate [Hz];1000\npos unit;mm\nforce unit;N\n\npos;force\n{ROWS}",
         f"Model,MSO24,,\nHorizontal Units,s,,\nVertical Units,mm,N,\nTIME,CH1,CH2\n{SECONDS}",
+        f"Sample Period:,1 ms\npos [mm],force [N]\n{COMMAS}",
+        f"Sampling rate:,1,kHz,\npos [mm],force [N]\n{COMMAS}",
+        f"Device:,A3,Interval:,1,msec,Samples:,{len(M['time'])}\npos [mm],force [N]\n{COMMAS}",
+        f'"Interval","1,0 ms"\npos [mm],force [N]\n{COMMAS}',
+        f"Sample Period:;1,0;ms\npos [mm];force [N]\n{ROWS.replace('.', ',')}",
+        f"Sampling rate:|1 kHz\npos [mm]|force [N]\n{ROWS.replace(';', '|')}",
+        f"Sampling rate:\t1\tkHz\npos [mm]\tforce [N]\n{ROWS.replace(';', chr(9))}",
     ],
 )
 def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
@@ -183,12 +194,25 @@ def test_files_of_other_kinds_are_named(tmp_path: Path, mark: bytes) -> None:
     assert "known format" not in raised.value.actual
 
 
-@pytest.mark.parametrize("line", ["dt: 1", "dt: 1 ms\nfs: 500 Hz", "dt: none", "fs: 10,000 Hz"])
+@pytest.mark.parametrize(
+    "line", ["dt: 1", "dt: 1 ms\nfs: 500 Hz", "dt: none", "fs: 10,000 Hz", "dt:,1 ms", "dt: 1,5 ms"]
+)
 def test_no_interval_is_made_up(tmp_path: Path, line: str) -> None:
-    """Without a unit, where two lines contradict each other, or without a number, there are no instants."""
-    path = tmp_path / "a.csv"
-    path.write_text(f"{line}\npos [mm];force [N]\n{ROWS}", encoding="utf-8")
+    """Without a unit or a number, where two lines contradict each other, or digits have two meanings, none is read."""
+    path, sign = tmp_path / "a.csv", "," if line == "dt: 1,5 ms" else ";"
+    path.write_text(f"{line}\npos [mm]{sign}force [N]\n{ROWS.replace(';', sign)}", encoding="utf-8")
     assert all(channel.time is None for channel in read_table(path).channels)
+
+
+@pytest.mark.parametrize(("time", "unit", "step"), [("", "", 1e-3), ("t,", "", 1e-3), ("t,", "s", 2e-3)])
+def test_a_unit_of_the_user_leaves_the_sample_time_of_the_file(
+    tmp_path: Path, time: str, unit: str, step: float
+) -> None:
+    """Only a column of times whose unit the user states counts before it."""
+    rows = [f"{2e-3 * i:.9g}," * bool(time) + row for i, row in enumerate(COMMAS.split("\n"))]
+    (tmp_path / "a.csv").write_text("\n".join(["Sample Period:,1 ms", f"{time}pos,force [N]", *rows]))
+    units = {"pos": "mm"} | ({"t": unit} if unit else {})
+    assert read_log(tmp_path / "a.csv", Mapping(units=units)).sample_time == pytest.approx(step, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["pos_s", "acc_rms", "x_ref", "ms", "pos_in", "pos_min", "mm/s", "on/off", "[m]"])

@@ -21,23 +21,28 @@ from friso.equations.scaled_friction import (
 )
 from friso.hunting import (
     AttractionEnd,
+    BandwidthAdvice,
     BandwidthWindow,
+    Margin,
     ParameterMargin,
     advised,
     check,
     edge_search,
     find_attractors,
+    hunting,
     joint_margins,
     path_search,
 )
 from friso.hunting.attractors import Attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.path import key_path
-from friso.hunting.stage_margins import _margin
+from friso.hunting.stage_margins import _margin, friction_margin
 from friso.hunting.what_attracts import Sketch
 from friso.questions.check.cases import joint_margins_document
 from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
 from friso.questions.check.question import CheckAnswer
+from friso.questions.check.words import details_sentences, verdict_sentence
+from friso.shown.cases import ShownCase
 from friso.stage import Stage
 
 
@@ -68,7 +73,33 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) ->
     assert margin.below.inside < 1 < margin.above.inside
 
 
-def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
+@pytest.mark.inner
+def test_an_end_just_above_coulomb_friction_is_found() -> None:
+    """Hunting ended between 107 and 109 mN, closer to Coulomb friction than a step beyond an orbit's end."""
+    stage = Stage(
+        masses={"stage": "0.009115 kg"},
+        friction={
+            **{"model": "elasto_plastic", "static": "0.2222 N", "coulomb": "0.1056 N", "viscous": "0.007666 N*s/m"},
+            **{"stribeck_velocity": "0.001483 m/s", "stribeck_exponent": 1.3, "breakaway_deflection": "2.391e-07 m"},
+            **{"bristle_stiffness": "344200.0 N/m", "bristle_damping": "38.42 N*s/m"},
+        },
+        controller={
+            **{"kind": "pid", "kp": "75.98 N/m", "ki": "3380.0 N/(m*s)", "kd": "0.7714 N*s/m", "tau": "0.002126 s"},
+            **{"derivative_on": "measurement", "force_limit": "1.68 N"},
+            **{"anti_windup": "back_calculation", "anti_windup_time": "0.01169 s"},
+        },
+        motion={"kind": "release", "displacement": "1 mm", "duration": "4 s"},
+    )
+    margin = friction_margin(stage, hunts(hunting=hunting(stage)))
+    assert margin is not None
+    assert margin.below is not None
+    assert margin.below.certain
+    assert margin.range[0] <= margin.below.outside < 0.107 / 0.2222 < margin.below.inside < 0.112 / 0.2222
+    assert attracts(stage, 0.109 / 0.2222)
+    assert not attracts(stage, 0.107 / 0.2222)
+
+
+def test_where_judgementbegins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
     """At half its static friction the locked rig settles; with a little more it hunts. The first lines say so."""
     case = check(rig.replace({"friction.static": "1.4 N", "joint.locked": True}))["locked"]
     margin = case.static_friction
@@ -154,7 +185,29 @@ def test_the_lower_bandwidth_advised_keeps_a_factor_from_hunting() -> None:
     assert slower(hunts(lower=AttractionEnd(0.29, 0.28, True))).just_beyond  # below the bandwidths searched
 
 
-def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:
+def test_judgementagain_on_the_side_advised_is_in_the_first_sentences() -> None:
+    """A stage hunts below 0.7 times its bandwidth and from 1.16 to 2.57 times: whoever makes it faster has to know."""
+    again = BandwidthWindow(AttractionEnd(1.1597, 1.1487, True), AttractionEnd(2.57, 2.59, True))
+    far = BandwidthWindow(AttractionEnd(0.3, 0.29, True), AttractionEnd(0.4, 0.41, True))
+    edge = Margin(0.7, None, True, 0.707)
+    barely = ShownCase(
+        "given", "As given", "", FakeCase(fake_stage(), None, settles(margin=edge, windows=(far, again)))
+    )
+    first = verdict_sentence(barely, {})
+    assert "below 0.7 times" in first
+    assert "1.16 to 2.57 times" in first
+    assert "barely" in first
+    assert "0.3 to" not in first
+    advice = BandwidthAdvice(1.05, AttractionEnd(1.02, 1.03, True), True, None)
+    judgement = hunts(margin=Margin(1.02, None, True, 1.03), windows=(far, again))
+    cured = replace(barely, case=replace(barely.case, judgement=judgement, faster=advice))
+    assert "1.16 to 2.57 times" in verdict_sentence(cured, {})
+    (rest,) = (text for text in details_sentences(barely, {}) if "again" in text)
+    assert "0.3 to 0.4" in rest
+    assert "1.16" not in rest
+
+
+def test_little_reserve_is_told_with_what_brings_judgementback() -> None:
     near = ParameterMargin(False, None, AttractionEnd(1.1, 1.05, True), (1 / 3, 3.0))
     far = ParameterMargin(False, None, AttractionEnd(1.6, 1.5, True), (1 / 3, 3.0))
     assert any("1.1 times" in text for text in thin_margins(made_up_case(near, settles())))
@@ -189,7 +242,7 @@ def margin_of(attracts: bool, roughly: Callable[..., Any], thoroughly: Callable[
 
 
 @pytest.mark.inner
-def test_where_hunting_begins_is_found_between_the_factors_tried_first() -> None:
+def test_where_judgementbegins_is_found_between_the_factors_tried_first() -> None:
     """A swing lasts only from 0.8 to 0.9 times a parameter: the nearest end below is that of this window."""
 
     def hunts(factors: np.ndarray) -> np.ndarray:
@@ -201,6 +254,22 @@ def test_where_hunting_begins_is_found_between_the_factors_tried_first() -> None
     assert margin.below.certain
     assert margin.above is None
     assert not margin.open_sides
+
+
+@pytest.mark.inner
+def test_judgementbeyond_an_end_is_told() -> None:
+    """More than 1.3 times a parameter stops the hunting, but from 2.2 times on it is there again."""
+
+    def hunts(factors: np.ndarray) -> np.ndarray:
+        return (factors > 0.4) & (factors < 1.3) | (factors > 2.2)
+
+    margin = margin_of(True, hunts, hunts)
+    assert margin.above is not None
+    assert margin.above.inside < 1.3 < margin.above.outside < 1.4
+    assert set(margin.again) == {1}
+    assert margin.again[1].outside < 2.2 < margin.again[1].inside < 2.3
+    assert "and again from 21" in margin_sentence("static friction", margin, 10.0, "N")
+    assert not margin_of(True, lambda factors: factors < 1.3, lambda factors: factors < 1.3).again
 
 
 @pytest.mark.inner
@@ -220,7 +289,7 @@ def test_scarce_work_leaves_a_side_open() -> None:
 
 
 @pytest.mark.inner
-def test_a_rough_survey_alone_does_not_tell_that_hunting_has_no_end() -> None:
+def test_a_rough_survey_alone_does_not_tell_that_judgementhas_no_end() -> None:
     """On a drawn axis with a leaking integral rough surveys saw hunting up to 3 times the friction; it ends at 2.2."""
     margin = margin_of(True, lambda factors: factors > 0, lambda factors: factors < 2.2)
     assert margin.below is None
@@ -229,7 +298,7 @@ def test_a_rough_survey_alone_does_not_tell_that_hunting_has_no_end() -> None:
 
 
 @pytest.mark.inner
-def test_hunting_that_only_a_thorough_search_sees_has_its_end_found() -> None:
+def test_judgementthat_only_a_thorough_search_sees_has_its_end_found() -> None:
     margin = margin_of(False, lambda factors: factors > 5, lambda factors: factors > 2.2)
     assert margin.above is not None
     assert margin.above.outside <= 2.2 <= margin.above.inside
@@ -250,6 +319,26 @@ def test_static_friction_is_never_told_below_coulomb_friction() -> None:
     (says,) = friction_sentences(FakeCase(stage, None, static_friction=margin))
     assert "11.308" not in says
     assert "11.3" in says or "12.5" in says
+
+
+@pytest.mark.parametrize(
+    ("below", "above", "range_", "wanted", "unwanted"),
+    [
+        (None, AttractionEnd(1.05, 1.0, True), (1.0, 3.0), "as yours", "12.7 to 12.6"),
+        (AttractionEnd(0.9, 0.93, True), AttractionEnd(1.05, 1.0, True), (0.5, 3.0), "up to yours", "to 12.6"),
+        (AttractionEnd(0.97, 1.0, True), AttractionEnd(1.4, 1.3, True), (0.5, 3.0), "16.4 N", "12.7 to"),
+        (AttractionEnd(0.97, 0.9995, True), AttractionEnd(1.05, 1.0005, True), (0.5, 3.0), "1.05 times", " to 12.6"),
+    ],
+)
+def test_a_range_of_static_friction_holds_that_of_the_stage(
+    below: AttractionEnd | None, above: AttractionEnd | None, range_: tuple[float, float], wanted: str, unwanted: str
+) -> None:
+    """12.65 N, at which nothing hunts, was rounded out of its own range; with ends on both sides that turned round."""
+    margin = ParameterMargin(False, below, above, range_)
+    says = margin_sentence("static friction", margin, 12.65, "N")
+    assert wanted in says
+    assert unwanted not in says
+    assert "yours" in says
 
 
 @pytest.mark.parametrize(

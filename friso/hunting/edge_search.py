@@ -83,10 +83,14 @@ class EdgeSearch:
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:
                 if again := self._stable_again(end, next_to, last):
+                    if next_to == self.farthest:
+                        raise Beyond
                     place.at, place.motions, place.outside = next_to, again, self._still_ahead(next_to, place.outside)
                     continue
                 return AttractionEnd(end, next_to, bool(survey.decided.all()), place.kind)
             place.at, place.motions = float(beyond[attracts[-1]]), survey.take(attracts[-1:]).motions
+            if place.at == self.farthest:
+                raise Beyond
             place.outside = self._still_ahead(place.at, place.outside)
         return self._bracketed(place)
 
@@ -108,8 +112,8 @@ class EdgeSearch:
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
         """Return the factors beyond an orbit's end at which to look for attractors.
 
-        The first result is the factor next to the end; the second, shape (n,), has factors farther off and may be
-        empty. Raises Beyond if the first is beyond the end of the search.
+        The first result is the factor next to the end, or the end of the search if that is nearer. The second, shape
+        (n,), has factors farther off and may be empty.
         """
         ahead = self._ahead(end)
         next_to, farther = (
@@ -118,8 +122,7 @@ class EdgeSearch:
         )
         if self.settled is not None and ahead * (self.settled - end) > 0:
             next_to = _nearer(ahead, next_to, self.settled)
-        if ahead * (next_to - self.farthest) > 0:
-            raise Beyond
+        next_to = _nearer(ahead, next_to, self.farthest)
         within = ahead * (self.farthest - farther) >= 0
         if self.settled is not None:
             within &= (farther < self.settled) == (end < self.settled)

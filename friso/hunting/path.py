@@ -54,6 +54,11 @@ class BandwidthWindow:
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
         return low <= factor <= high
 
+    def lies(self, side: int, factor: float) -> bool:
+        """Tell whether this window lies above (`side` 1) or below (-1) a factor of the stage's own bandwidth."""
+        near = self.low if side > 0 else self.high
+        return near is not None and side * (near.inside - factor) > 0
+
     def without(self, other: BandwidthWindow) -> tuple[BandwidthWindow, ...]:
         """Return the parts of this window below and above another one; where both overlap, the other counts.
 
@@ -144,10 +149,7 @@ def key_path(flat: Mapping[str, Any], key: str) -> ParameterPath:
 
 
 def _path_of_factors(scaled: Callable[[np.ndarray], Mapping[str, Any]], lowest: float) -> ParameterPath:
-    """Return a path from the factor `lowest` to the highest one, whose steps grow outward.
-
-    A side narrower than a step is left out.
-    """
+    """Return a path from the factor `lowest`, at most 1, to the highest one; its steps grow outward."""
     steps = np.array(edge_settings.margin_steps)
-    below = lowest ** steps[::-1] if np.log(lowest) < -edge_settings.least_side_log else np.empty(0)
+    below = lowest ** steps[::-1] if lowest < 1 else np.empty(0)
     return ParameterPath.of(scaled, below, SEARCH_LIMITS.most_friction**steps, edge_settings.beyond_factors)

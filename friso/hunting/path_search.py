@@ -129,10 +129,27 @@ class PathSearch:
             raise Undecided
         before = numbers[side * np.log(self.factors[numbers] / end.outside) <= 0]
         hunting_side = edge_settings.inside_end_log * np.sign(np.log(end.inside / end.outside))
-        inside = float(end.inside * np.exp(hunting_side))
+        inside = float(np.clip(end.inside * np.exp(hunting_side), self.factors[0], self.factors[-1]))
         if hunts and side * np.log(inside) < 0:
             inside = end.inside
         return replace(end, inside=inside, certain=end.certain and bool(self.decided[before].all()))
+
+    def again(self, side: int, end: AttractionEnd) -> AttractionEnd | None:
+        """Find where hunting begins again beyond its `end` above (`side` 1) or below (-1) the stage itself.
+
+        Returns None if no factor surveyed shows it. Raises Undecided if that attraction reaches back to the end, which
+        is none then, and Exhausted if an allowance of work is used up.
+        """
+        numbers = self.path.numbers(side)
+        beyond = numbers[side * np.log(self.factors[numbers] / end.outside) > 0]
+        while (hunts := beyond[self.attracts[beyond]]).size:
+            begins = self.end(int(hunts[0]), -side)
+            if begins is None and not self.attracts[hunts[0]]:
+                continue
+            if begins is None or side * (begins.outside - end.outside) < 0:
+                raise Undecided
+            return begins
+        return None
 
     def _beginning(self, numbers: np.ndarray, side: int) -> AttractionEnd | None:
         """Find where hunting begins on a side; `numbers` are those of its factors, outward.

@@ -177,9 +177,6 @@ class EdgeSettings(Settings):
     """Distance from an end on the hunting side at which hunting is told. Nearer, a cycle attracts from hardly anywhere,
     and motions take too long to decay."""
 
-    least_side_log: float = setting(0.03, "log of factor")
-    """Narrowest side of a parameter's own value that is searched: margins are shown with three digits at most."""
-
     most_proofs: int = setting(6, "")
     """Rounds of searches after which a side stays open because rough surveys were wrong."""
 

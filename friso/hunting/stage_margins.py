@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,8 +29,8 @@ class ParameterMargin:
     """Range of a parameter over which a stage keeps hunting, or keeps not hunting.
 
     `attracts` is true if it hunts. `below` and `above` are the nearest ends of attraction, in factors of the parameter
-    (None: there is none up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known. Nothing of it
-    is certain unless the values of the stage are `sure`.
+    (None: there is none up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known. A stage that
+    hunts does so `again` beyond an end, by the side. Nothing of it is certain unless the stage's values are `sure`.
     """
 
     attracts: bool
@@ -38,6 +39,7 @@ class ParameterMargin:
     range: tuple[float, float]
     open_sides: tuple[int, ...] = ()
     sure: bool = True
+    again: Mapping[int, AttractionEnd] = field(default_factory=dict)
 
     @property
     def certain(self) -> bool:
@@ -107,7 +109,7 @@ def _margin(path: ParameterPath, judgement: Judgement) -> ParameterMargin:
     survey, factors = judgement.hunting.surveyed, path.factors
     assert survey is not None
     attracts, span = bool(survey.attracts[0]), (float(factors[0]), float(factors[-1]))
-    ends, open_sides = dict[int, AttractionEnd | None](), list[int]()
+    ends, open_sides, again = dict[int, AttractionEnd | None](), list[int](), dict[int, AttractionEnd]()
     try:
         search = PathSearch(path)
     except Exhausted:
@@ -115,10 +117,18 @@ def _margin(path: ParameterPath, judgement: Judgement) -> ParameterMargin:
     search.record(survey)
     for side in (-1, 1):
         try:
-            ends[side] = search.nearest(side)
+            ends[side] = end = search.nearest(side)
         except (Exhausted, Undecided):
             open_sides.append(side)
-    return ParameterMargin(attracts, ends.get(-1), ends.get(1), span, tuple(open_sides))
+            continue
+        try:
+            if attracts and end and (begins := search.again(side, end)):
+                again[side] = begins
+        except Exhausted:
+            continue
+        except Undecided:
+            ends[side] = end and replace(end, certain=False)
+    return ParameterMargin(attracts, ends.get(-1), ends.get(1), span, tuple(open_sides), again=again)
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:

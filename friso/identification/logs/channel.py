@@ -36,12 +36,14 @@ class ChannelTable:
     """The channels of a file, under unique names (`unique`).
 
     `scalars` are single numbers of the file by name, and `read` has lines on how the file was read (format, delimiter,
-    decimal sign, rows left out and why).
+    decimal sign, rows left out and why). `interval` is the sampling interval [s] that the file states above its
+    columns, or None.
     """
 
     channels: tuple[Channel, ...]
     scalars: Mapping[str, float] = field(default_factory=dict)
     read: tuple[str, ...] = ()
+    interval: float | None = None
 
     def __post_init__(self) -> None:
         """Make the names unique, and escape the texts."""

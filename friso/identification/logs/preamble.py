@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from friso.identification.logs.settings import settings
+from friso.identification.logs.sniff import csv_cells
 from friso.identification.logs.units import is_unit, split_heading, unit_factor
 from friso.identification.logs.word_lists import channel_words
 
@@ -15,7 +16,8 @@ RATES, STEPS = (channel_words()[name] for name in ("sample_rate", "sample_time")
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """Characters around a key and its value that belong to neither."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
-_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
+_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
+"""Pattern of a number and its unit. A comma in front of all digits is no decimal sign: it may end a field."""
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<sign>[.,])\d{3}")
 """Pattern of digits in which a sign may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNITS = re.compile(r"(?:vertical |y )?units?|einheit(?:en)?", re.IGNORECASE)
@@ -43,12 +45,13 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str, decimal
     if it has a point, and so have the decimals of the table.
     """
     lines = [line for line in lines if line.strip()]
-    pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
-    pairs |= {f"{name} {value}": (name, value) for name, value in _below_names(lines[-2:], delimiter)}
-    units = _row_of_units(lines, names, delimiter) or _units_by_name(pairs.values(), names)
+    units = _row_of_units(lines, names, delimiter)
+    units = units or _units_by_name([pair for line in lines if (pair := _pair(line))], names)
+    pairs = [(line.strip(), *pair) for line in lines for pair in _pairs_of_fields(line, delimiter)]
+    pairs += [(f"{name} {value}", name, value) for name, value in _below_names(lines[-2:], delimiter)]
     read = [f"units from the lines above the table: {', '.join(units.values())}"] if units else []
-    intervals, scalars = {}, {}
-    for line, (stated, value) in pairs.items():
+    intervals, scalars = list[tuple[float, str]](), {}
+    for line, stated, value in pairs:
         name, unit = split_heading(stated)
         key = re.sub(r"[\W\d_]+", "", name.lower())
         asked = key in RATES | STEPS and len(value) < settings.characters_of_an_amount
@@ -59,11 +62,11 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str, decimal
         number = float(amount["number"].replace(",", "."))
         seconds = _seconds(number, amount["unit"].strip("[]()") or unit)
         if seconds is not None:
-            intervals[line] = seconds
+            intervals.append((seconds, line))
         else:
             scalars[name] = number
-    if intervals and max(intervals.values()) <= min(intervals.values()) * (1 + 1e-9):
-        line, interval = next(iter(intervals.items()))
+    if intervals and max(intervals)[0] <= min(intervals)[0] * (1 + 1e-9):
+        interval, line = intervals[0]
         return Preamble(interval, scalars, units, (*read, f"sample time {interval:g} s, from the line {line!r}"))
     return Preamble(None, scalars, units, tuple(read))
 
@@ -77,6 +80,27 @@ def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
         return []
     names, values = ([cell.strip() for cell in line.split(delimiter)] for line in lines)
     return [(name, value) for name, value in zip(names, values, strict=False) if name and _AMOUNT.fullmatch(value)]
+
+
+def _pairs_of_fields(line: str, delimiter: str) -> list[tuple[str, str]]:
+    """Return keys and values of a line that is split into fields as its table is: "key:,1,ms" or "key: 1 ms,...".
+
+    A value is what stands behind its key, in the same field or the next ones, up to a field that is no unit. A line
+    without the delimiter may have one pair, with any sign between key and value.
+    """
+    fields = csv_cells(line, delimiter) if delimiter != " " else [line]
+    fields = [cell for part in fields if (cell := part.strip(_BEFORE + _BEHIND)).strip(":=")]
+    if len(fields) < 2:
+        return [pair] if (pair := _pair(line)) else []
+    pairs = []
+    for i, cell in enumerate(fields):
+        key, value = _pair(cell) or (cell.rstrip(" :="), "")
+        behind = fields[i + 1 :] if value else fields[i + 2 :]
+        value = value or "".join(fields[i + 1 : i + 2])
+        unit = behind[0] if behind and _seconds(1.0, behind[0].strip("[]()")) is not None else ""
+        goes_on = not unit and bool(behind) and behind[0][0].isdigit()  # decimals or thousands behind a comma
+        pairs += [] if goes_on else [(key, f"{value} {unit}".strip())]
+    return pairs
 
 
 def _pair(line: str) -> tuple[str, str] | None:

@@ -85,7 +85,7 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
     channels = [replace(channel, unit=units.get(id(channel), channel.unit)) for channel in table.channels]
     if not times:  # times come from the table's columns
         channels = [replace(channel, time=None) for channel in channels]
-    timed = zip(channels, with_times(channels), strict=True)
+    timed = zip(channels, with_times(channels, table.interval), strict=True)
     timed_channels = tuple(new if old.time is None else old for old, new in timed)
     return replace(table, channels=timed_channels)
 

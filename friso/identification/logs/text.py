@@ -48,11 +48,9 @@ def read_text(path: Path) -> ChannelTable:
             columns.append(Channel(name or f"column {i + 1}", unit, values[0], None, f"column {i + 1}"))
     if blanks:
         notes.append(f"{blanks} empty lines left out")
-    channels = with_times(_same_ends(path, form, columns, frame))
-    if heading.interval is not None and all(channel.time is None for channel in channels):
-        channels = tuple(replace(c, time=heading.interval * np.arange(c.values.size)) for c in channels)
+    channels = with_times(_same_ends(path, form, columns, frame), heading.interval)
     read = (f"format: text, {form.in_words}", f"{len(frame)} rows, {len(columns)} columns", *notes)
-    return ChannelTable(channels, heading.scalars, read)
+    return ChannelTable(channels, heading.scalars, read, heading.interval)
 
 
 def _such_as(cells: Any) -> str:
@@ -166,11 +164,11 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
     return out
 
 
-def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
+def with_times(columns: list[Channel], interval: float | None = None) -> tuple[Channel, ...]:
     """Give each column the instants of the nearest time column to its left with equal length.
 
     If there is none to the left, the file's only time column is used, which may be longer. A time column has a name of
-    time and a unit of time.
+    time and a unit of time. If no column has instants, samples are an `interval` [s] apart, which the file may state.
     """
     clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name, c.unit) or ("",))[0] == "time"]
     clocks = [(i, c, unit_factor(c.unit, "s")) for i, c in clocks if c.unit]
@@ -186,4 +184,6 @@ def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
             out.append(replace(column, time=clock.values[:size] * (seconds or 1.0)))
         else:
             out.append(column)
+    if interval is not None and all(column.time is None for column in out):
+        out = [replace(column, time=interval * np.arange(column.values.size)) for column in out]
     return tuple(out)

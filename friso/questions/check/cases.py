@@ -388,12 +388,15 @@ def _parameter_margin(margin: hunting.ParameterMargin) -> dict[str, Any]:
         factors = {"same_at_factor": margin.same(one), "other_at_factor": margin.other(one)}
         return {**factors, **entries(one, "certain", "kind")}
 
+    sides = {-1: "below", 1: "above"}
+    again = {sides[side]: _end(begins) for side, begins in margin.again.items()}
     return {
         "hunts": margin.attracts,
         "below": end(margin.below),
         "above": end(margin.above),
         "searched": margin.range,
-        "not_determined": [{-1: "below", 1: "above"}[side] for side in margin.open_sides],
+        "not_determined": [sides[side] for side in margin.open_sides],
+        **({"again": again} if again else {}),
     }
 
 

@@ -166,7 +166,9 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
         return f"its edge of hunting {missing}" if missing else none
     low, high = min(edge[0] for edge in edges), max(edge[1] for edge in edges)
     doubt = "" if all(verdict.edges_certain(case) for verdict in laws.verdicts) else " (not certain)"
-    return f"edge {_span(laws, (low, high))}{doubt}{', ' + missing if missing else ''}"
+    begins = [begin for verdict in laws.verdicts if (begin := verdict.again(case))]
+    again = f", and hunting again from {_span(laws, (min(begins), min(begins))).removeprefix('at ')}" if begins else ""
+    return f"edge {_span(laws, (low, high))}{doubt}{again}{', ' + missing if missing else ''}"
 
 
 def _beyond(laws: VerdictsByLaw, case: str) -> str:

@@ -11,6 +11,7 @@ from friso.equations.structure import carrying_force
 from friso.hunting import SEARCH_LIMITS, AttractionEnd, Case, ParameterMargin
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
+    listed,
     range_with_unit,
     rounded_down,
     rounded_up,
@@ -68,7 +69,14 @@ def margin_sentence(
     if len(open_ones) == 2:
         return f"Whether another {name} {'ends' if margin.attracts else 'starts'} hunting was not determined."
     least, most = 1.0 if -1 in open_ones else low, 1.0 if 1 in open_ones else high
-    return f"{does} for {name} {_extent(least, most, own, unit)}{remark}{doubt}."
+    extent, ways = _extent(least, most, own, unit), listed(margin_ways(margin), "or")
+    changes = f"; it {'ends' if margin.attracts else 'begins'} {ways}" if ways and extent.startswith("as yours") else ""
+    again = [
+        f"again from {_value(begins.outside, own, unit)} {'up' if side > 0 else 'down'}"
+        for side, begins in margin.again.items()
+    ]
+    also = f", and {listed(again, 'and')}" if again else ""
+    return f"{does} for {name} {extent}{also}{remark}{changes}{doubt}."
 
 
 def _kept_to(margin: ParameterMargin, side: int) -> float:
@@ -80,10 +88,24 @@ def _kept_to(margin: ParameterMargin, side: int) -> float:
 
 
 def _extent(low: float, high: float, own: float | None, unit: str) -> str:
-    """Write a range of multiples of a parameter whose value is `own` [SI `unit`]; of multiples if that is None."""
-    if own is None:
-        return f"{plain_factor(low)} to {plain_factor(high)} times yours"
-    return range_with_unit(rounded_up(low * own), rounded_down(high * own), unit)
+    """Write a range of multiples of a parameter whose value is `own` [SI `unit`]; of multiples if that is None.
+
+    Ends are rounded towards the stage's own value. An end that rounds past it is that value, "yours".
+    """
+    yours = "yours" if own is None else f"yours ({with_unit(own, unit)})"
+    least, most = (low, high) if own is None else (rounded_up(low * own) / own, rounded_down(high * own) / own)
+    if least < 1 < most and own is not None:
+        return range_with_unit(least * own, most * own, unit)
+    if least < 1 < most:
+        return f"{plain_factor(least)} to {_value(most, own, unit)}"
+    if least < 1:
+        return f"from {_value(least, own, unit)} up to {yours}"
+    return f"from {yours} up to {_value(most, own, unit)}" if most > 1 else f"as {yours}"
+
+
+def _value(factor: float, own: float | None, unit: str) -> str:
+    """Write a multiple of a parameter whose value is `own` [SI `unit`]; as a multiple if that is None."""
+    return f"{plain_factor(factor)} times yours" if own is None else with_unit(factor * own, unit)
 
 
 def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
@@ -120,6 +142,10 @@ def thin_margins(case: Case) -> list[str]:
     edge, friction = case.judgement.margin, case.static_friction
     if edge and edge.quiet * distance > 1:
         thin.append(f"a bandwidth that is lower by {percent(1 - edge.factor)}")
+    above = [window.low for window in case.judgement.windows if window.low and window.lies(1, 1.0)]
+    again = min(above, key=lambda end: end.inside, default=None)
+    if again and again.outside < distance:
+        thin.append(f"a bandwidth that is higher by {percent(again.inside - 1)}")
     for side in (-1, 1):
         end = friction.end(side) if friction and not friction.attracts else None
         if end and max(end.outside, 1 / end.outside) < distance:

@@ -64,6 +64,9 @@ IN_SHORT: Mapping[Verdict, str] = {
 ROUGH_EDGE = 5e-4
 """Relative uncertainty of an edge above which it is mentioned, because the shown digits are not certain."""
 
+TIMES = " times this bandwidth"
+"""Unit of a bandwidth where the controller states none."""
+
 ROUGHER = 10 * ROUGH_EDGE
 """Relative uncertainty of an edge above which one digit less is shown."""
 
@@ -419,16 +422,21 @@ def _outlook(case: Case) -> list[str]:
     """Say at which other bandwidths the stage hunts, or that none was found, and what makes a thin margin wider."""
     judgement, away = case.judgement, _running_away(case)
     says: list[str] = []
+    above, below = (_places(case, side, 1.0) for side in (1, -1))
     if judgement.margin and not _holds(case.unstable_bandwidths, judgement.margin.factor):
         up_to = "below" if judgement.margin.certain else "up to"
-        says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
+        again = f", and again {listed(above, 'and')}" if above else ""
+        says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}{again}.")
     elif not judgement.margin and judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
-        says.append(f"No hunting was found down to {percent(SEARCH_LIMITS.lowest_bandwidth)} of this bandwidth.")
+        but = f", but it is possible {listed(above, 'and')}" if above else ""
+        says.append(f"No hunting was found down to {percent(SEARCH_LIMITS.lowest_bandwidth)} of this bandwidth{but}.")
+    else:
+        below = [*below, *above]
     if case.verdict == "settles" and case.faster and case.faster.keeps_friction:
         says.insert(0, f"{_capital(_to(case, case.faster))} gives it reserve.")
     if away:
         says.insert(0, f"{_capital(away)}.")
-    return [*says, *_windows(case), *_unsearched(case)]
+    return [*says, *_possible_again(below), *_unsearched(case)]
 
 
 def _unsearched(case: Case) -> list[str]:
@@ -451,12 +459,23 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
         ends = sorted((end.inside, end.outside))
         low, high = _bandwidth(case, ends[0], up=False, digits=4), _bandwidth(case, ends[1], digits=4)
         return f"somewhere between {low} and {high}"
+    text, error = _edge_and_error(case, end)
+    return f"{text}{_within(error)}"
+
+
+def _edge_and_error(case: Case, end: AttractionEnd) -> tuple[str, float]:
+    """Write the bandwidth at a certain end of hunting, and return its relative error (0: less than its last digit)."""
     if end.reserve < ROUGH_EDGE:
-        return _bandwidth(case, end.inside, up=None, digits=4)
+        return _bandwidth(case, end.inside, up=None, digits=4), 0.0
     value, digits = end.inside * (_present_bandwidth(case) or 1.0), 4 if end.reserve < ROUGHER else 3
     stated = float(f"{value:.{digits}g}")
     bound = (end.reserve * value + abs(stated - value)) / stated
-    return f"{_bandwidth(case, end.inside, up=None, digits=digits)} (± {percent(rounded_up(bound, 1), 1)})"
+    return _bandwidth(case, end.inside, up=None, digits=digits), bound
+
+
+def _within(error: float) -> str:
+    """Write the relative error of a bandwidth, such as " (± 2 %)"; empty for none."""
+    return f" (± {percent(rounded_up(error, 1), 1)})" if error else ""
 
 
 def _present_bandwidth(case: Case) -> float | None:
@@ -475,7 +494,7 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
     if up is not None:
         value = (rounded_up if up else rounded_down)(value, digits)
     if crossover is None:
-        return f"{value:.{digits}g} times this bandwidth"
+        return f"{value:.{digits}g}{TIMES}"
     key = _elsewhere(case)
     return f"{key} = {with_unit(value, 'Hz', digits)}" if key else with_unit(value, "Hz", digits)
 
@@ -489,15 +508,21 @@ def _elsewhere(case: Case) -> str | None:
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
 
-def _windows(case: Case) -> list[str]:
-    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again, and its loop is stable.
-
-    The list is empty if there are no such ranges.
-    """
+def _hunting_windows(case: Case) -> list[BandwidthWindow]:
+    """Return the ranges of the bandwidth, beside that of the edge, in which the stage hunts and its loop is stable."""
     windows = list(case.judgement.windows)
     for lost in case.unstable_bandwidths:
         windows = [part for window in windows for part in window.without(lost)]
-    places = [_window(case, window) for window in windows]
+    return windows
+
+
+def _places(case: Case, side: int, factor: float) -> list[str]:
+    """Write in which ranges of the bandwidth the stage hunts again, above (`side` 1) or below (-1) a factor of it."""
+    return [_window(case, window) for window in _hunting_windows(case) if window.lies(side, factor)]
+
+
+def _possible_again(places: Sequence[str]) -> list[str]:
+    """Say in which ranges of the bandwidth hunting is possible again; empty without any."""
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
@@ -518,6 +543,9 @@ def _window(case: Case, window: BandwidthWindow) -> str:
         f"{_bandwidth(case, factor, up=None)} (the {name} searched)"
         for factor, name in ((SEARCH_LIMITS.lowest_bandwidth, "lowest"), (SEARCH_LIMITS.highest_bandwidth, "highest"))
     )
+    if low and high and low.certain and high.certain:
+        (first, error), (last, other) = _edge_and_error(case, low), _edge_and_error(case, high)
+        return f"from {first.removesuffix(TIMES)} to {last}{_within(max(error, other))}"
     return f"from {edge_text(case, low) if low else lowest} to {edge_text(case, high) if high else highest}"
 
 
@@ -556,7 +584,9 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     away = _running_away(case)
     cure = [f"Cure: {listed(ways, 'or')}{away and f'; {away}'}."] if ways else [f"{_capital(away)}."] if away else []
     if judgement.margin or CheckPart.BANDWIDTHS in judgement.given_up:
-        return [*cure, *_windows(case), *_unsearched(case)]
+        told = [place for advice in (case.faster, case.slower) if advice for place in _beyond(case, advice)]
+        others = [place for window in _hunting_windows(case) if (place := _window(case, window)) not in told]
+        return [*cure, *_possible_again(others), *_unsearched(case)]
     if judgement.hunting.target is None:
         return cure
     still = "is still possible" if judgement.hunting.certain else "was still found"
@@ -586,6 +616,8 @@ def _to(case: Case, advice: BandwidthAdvice) -> str:
         remarks.append(f"not certain: hunting was found {'up' if up else 'down'} to {seen}")
     if advice.just_beyond:
         remarks.append("just beyond it, as more would not be safe")
+    if again := _beyond(case, advice):
+        remarks.append(f"hunting is possible again {listed(again, 'and')}")
     if advice.keeps_friction is not None:
         friction = other_static_friction(case.stage.flat())
         remarks.append(f"also {friction}" if advice.keeps_friction else f"but hunting returns there {friction}")
@@ -593,6 +625,11 @@ def _to(case: Case, advice: BandwidthAdvice) -> str:
         remarks.append("not examined with other static friction")
     remark = f" ({'; '.join(remarks)})" if remarks else ""
     return f"{speed_text(case.stage.controller, crossover, advice.factor, up)}{remark}"
+
+
+def _beyond(case: Case, advice: BandwidthAdvice) -> list[str]:
+    """Write in which ranges of the bandwidth the stage hunts again on the side to which an advice leads."""
+    return _places(case, 1 if advice.factor >= 1 else -1, advice.edge.outside)
 
 
 def speed_text(controller: ControllerSection, own: float | None, factor: float, up: bool = True) -> str:

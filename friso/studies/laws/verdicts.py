@@ -109,6 +109,18 @@ class LawVerdict:
         highest = [high * unit for (_, high), unit in zip(ends, units, strict=True)]
         return (min(lowest), max(highest)) if margins else None
 
+    def again(self, case: str) -> float | None:
+        """Return the lowest bandwidth beyond the edge at which the stage hunts again, in the unit of `edges`."""
+        judgements = [trial.cases[case].judgement for trial in self.trials]
+        begins = [
+            window.low.outside * (1.0 if edge.crossover is None else edge.crossover / edge.factor)
+            for judgement in judgements
+            if (edge := judgement.margin)
+            for window in judgement.windows
+            if window.low and window.lies(1, edge.factor)
+        ]
+        return min(begins, default=None)
+
     def edges_certain(self, case: str) -> bool:
         """Tell whether all edges of hunting that were found in a case are certain."""
         margins = [trial.cases[case].judgement.margin for trial in self.trials]
