@@ -85,7 +85,7 @@ def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
         seconds = process_time() - begun
         with file.open("a") as written:
             for outcome in advice.outcomes:
-                unknown = outcome.certainty not in ("works", "large moves", "unsure") or outcome.measured is None
+                unknown = outcome.certainty not in ("works", "unsure") or outcome.measured is None
                 if unknown or outcome.remedy.makes or outcome.stage is None:
                     continue
                 assert outcome.measured is not None
@@ -98,7 +98,6 @@ def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
                     "changes": str(changes(advice.stage, outcome.stage)),
                     "told": [share.probability, share.low, share.high],
                     "slowest": [outcome.measured.slowest(advice.goal), *outcome.measured.slowest_interval(advice.goal)],
-                    "moves_from": outcome.moves_from,
                     "within": advice.goal.within,
                     "seconds": seconds,
                     "flat": {
@@ -138,7 +137,7 @@ def table(file: Path) -> None:
         settled = np.isfinite(times)
         by_size = []
         for low, high in pairwise(SIZES):
-            some = (sizes >= max(low, row["moves_from"] or 0.0)) & (sizes < high)
+            some = (sizes >= low) & (sizes < high)
             by_size.append(f"{settled[some].sum()} of {some.sum()}")
         in_time = f"{np.count_nonzero(settled & (times <= row['slowest'][2]))} of {len(runs)}"
         shares = "{:.1%} ({:.1%} to {:.1%})".format(*row["told"])

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from friso.questions.rig.question import rig
     from friso.questions.simulate.question import simulate
     from friso.questions.tune.question import tune
-    from friso.remedies.sensitivities import Sensitivities, sensitivity
     from friso.stage import Stage, load, loads, save
     from friso.studies.axes import Samples
     from friso.studies.harmonic_balance import harmonic_balance
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "friso.interface.starting": ("example", "init", "schema"),
-    "friso.remedies.sensitivities": ("Sensitivities", "sensitivity"),
     "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
     "friso.frequency.analysis": ("linear",),
     "friso.frequency.describing.function": ("describing",),
@@ -60,7 +58,6 @@ __all__ = [
     "LogError",
     "Members",
     "Samples",
-    "Sensitivities",
     "SpecError",
     "Stage",
     "StageError",
@@ -91,7 +88,6 @@ __all__ = [
     "rig",
     "save",
     "schema",
-    "sensitivity",
     "simulate",
     "sweep",
     "tune",

@@ -23,18 +23,14 @@ from friso.app import questions
 from friso.cli.asking import Shown, show
 from friso.design_method.prepare import isolated
 from friso.engine.allowance import allowance
-from friso.engine.batch import RunOptions, run_chunks
-from friso.engine.kernel import kernel
 from friso.engine.simulate import simulate
 from friso.equations.bandwidth import sped_up
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.equations.motion import size
 from friso.equations.settings import settings_named
-from friso.equations.structure import shared_structure
 from friso.frequency.crossover import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth, settled_margin
 from friso.frequency.family import controller_response
-from friso.hunting import Ensemble, check_given, find_cycles, find_margin
-from friso.hunting.criteria import settling_of_runs
+from friso.hunting import check_given, find_margin
 from friso.hunting.measures import measured_run
 from friso.progress import Progress
 from friso.questions.check.isolator_words import isolator_sentence
@@ -43,7 +39,6 @@ from friso.questions.tune.figures import drawn_stages, tune_figures
 from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.present_words import DOUBTS, as_it_is
 from friso.questions.tune.question import TuneAnswer
-from friso.questions.tune.sensitivity_words import ranked_sentences
 from friso.questions.tune.words import (
     answer,
     assumptions,
@@ -58,7 +53,6 @@ from friso.questions.tune.words import (
 )
 from friso.remedies import method
 from friso.remedies import search as search_module
-from friso.remedies import sensitivities as sensitivities_module
 from friso.remedies import verified as verified_module
 from friso.remedies.caps import SpeedCap, speed_cap
 from friso.remedies.catalogue import BANDWIDTH, Remedy, of_key, remedies, suggestion
@@ -66,7 +60,6 @@ from friso.remedies.least import ChangeSize, change_size, least_factors
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import Advice, pairs, tune
 from friso.remedies.search import Budget, Search, TriedPoints
-from friso.remedies.sensitivities import Sensitivities, sensitivity
 from friso.remedies.settings import RemedySettings, settings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.verified import (
@@ -80,7 +73,7 @@ from friso.remedies.verified import (
 )
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.prefixes import NOTHING, with_unit
-from friso.stage.controllers import as_tuned, controller_of
+from friso.stage.controllers import controller_of
 from friso.stage.correlations import Correlations
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -684,7 +677,7 @@ def test_what_attracts_is_surveyed_only_where_the_rest_of_the_goal_is_met(
 
 def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Stage, goal: Goal) -> None:
     limit = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "integral limit")
-    points = TriedPoints(np.zeros((1, 1)), *np.full((9, 1), np.inf))
+    points = TriedPoints(np.zeros((1, 1)), *np.full((8, 1), np.inf))
     closest = RemedyOutcome(limit, None, None, None, (), points)
     assert [pair.name for pair in pairs([closest], goal)] == ["integral limit, and bandwidth"]
     assert not pairs([closest, working(Remedy.settled_on("bandwidth", rigid), rigid)], goal)
@@ -810,9 +803,6 @@ def test_moves_fill_their_range_evenly_and_are_what_the_stage_makes(rigid: Stage
     assert np.asarray(size(flat)) == pytest.approx(np.tile(fleet.sizes, 2))
     assert flat["motion.acceleration"][:25] == pytest.approx(fleet.accelerations)
     assert (fleet.accelerations.min(), fleet.accelerations.max()) == pytest.approx((1, 10), rel=0.2)
-    large = fleet.with_moves_from(1e-3)
-    assert large.sizes.argsort().tolist() == fleet.sizes.argsort().tolist()
-    assert (large.sizes.min() >= 1e-3, large.moves.smallest) == (True, 1e-3)
     own = MoveRange.of_stage(rigid, 1e-6)
     assert (own.smallest, own.largest) == pytest.approx((1e-5, 0.09))
     step = rigid.replace({"motion": {"kind": "step", "size": "-1 mm", "duration": "1 s"}})
@@ -838,20 +828,11 @@ REFUSED: list[tuple[str | None, Callable[[Stage], object]]] = [
         ("margin", lambda rig, margin=margin: friso.tune(rig, margin=margin))
         for margin in ("1.2", "0", "a half", "nan")
     ),
-    ("within", lambda rig: sensitivity(rig, within=0.0)),
-    ("keys", lambda rig: sensitivity(rig, ["friction.statik"])),
-    ("keys", lambda rig: sensitivity(rig.with_numbers({"friction.viscous": 0.0}), ["friction.viscous"])),
-    (
-        "keys",
-        lambda rig: sensitivity(load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True}), ["joint.stroke"]),
-    ),
-    ("keys", lambda rig: sensitivity(rig.replace({"motion": STEP}), ["motion.size"], within=1e-6)),
-    ("keys", lambda rig: sensitivity(rig.replace({"motion": RELEASE}), ["motion.duration"], within=1e-6)),
 ]
 
 
 @pytest.mark.parametrize(("key", "asked"), REFUSED)
-def test_what_cannot_be_searched_or_differentiated_is_refused(
+def test_what_cannot_be_searched_is_refused(
     rigid: Stage, key: str | None, asked: Callable[[Stage], object]
 ) -> None:
     with refused(key):
@@ -885,30 +866,6 @@ def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: A
     ends = {0: 1e-5, 99: 1e-1}
     expected = held and tuple(ends.get(end, sizes[end] if isinstance(end, int) else end) for end in held)
     assert between == (None if held is None else pytest.approx(expected))
-
-
-def test_settings_for_large_moves_alone_are_told_as_that(tuning: Advice, works: Any) -> None:
-    """Such settings are neither refused nor praised: they are no least change, and their file states their purpose.
-
-    They are those that serve the smallest of these moves.
-    """
-    large = replace(works.outcome, moves_from=2e-3)
-    advice = replace(tuning, outcomes=(large,), interrupted=False)
-    assert (large.certainty, advice.working, advice.least) == ("large moves", (), None)
-    assert answer(advice)[0].startswith("For moves of 2.00 mm and more alone: set")
-    files = TuneAnswer(advice).files()
-    assert "tuned-bandwidth-for-large-moves.toml" in files
-    assert files["tuned.toml"] is None
-    assert "for large ones alone" in str(TuneAnswer(advice, stage=advice.stage).failure)
-    inf = np.inf
-    points = points_of(
-        [0.0] * 4,
-        settling=[inf, inf, inf, 1.0],
-        slower=[inf] * 4,
-        margin=[0.6, 0.6, 0.4, 0.6],
-        moves_from=[2e-3, 1e-3, 1e-4, inf],
-    )
-    assert points.for_large_moves(Goal(), 0.09).tolist() == [1, 0]
 
 
 DRIVE = {"sample_time": "1 ms", "delay": "3 ms", "current_bandwidth": "40 Hz .. 400 Hz"}
@@ -985,7 +942,7 @@ def test_a_force_that_is_not_finite_warns_of_nothing() -> None:
 
 def test_reasons_say_nothing_of_settings_that_were_left_out_before(tuning: Advice) -> None:
     """One setting settles without the margin, the other has the margin and does not settle."""
-    late = {name: [1.0, np.inf] for name in ("settling", "looser", "slower", "moves_from")}
+    late = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
     points = points_of([0.0] * 2, **late, margin=[0.4, 0.6], nearness=[1.0, 0.0])
 
     def reason(some: TriedPoints, **parts: Any) -> str:
@@ -1069,116 +1026,6 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     assert "it would not hunt" in isolator_sentence(tried)
     assert "would not surely stop hunting" in isolator_sentence(none)
     assert suggestion(load(EXAMPLES / "thesis_rig.toml")) is None
-
-
-@pytest.fixture(scope="module")
-def sensitivities(rigid: Stage) -> Sensitivities:
-    """Return the sensitivities of the thesis's rig without its joint, along several keys."""
-    return sensitivity(rigid, KEYS, edge=find_margin(rigid, True))
-
-
-KEYS = (
-    "friction.static",
-    "friction.bristle_stiffness",
-    "masses.cart",
-    "controller.alpha",
-    "friction.stribeck_exponent",  # 2: the equations are written with it as a number
-)
-
-
-@pytest.mark.parametrize("name", KEYS)
-def test_a_cycle_s_derivatives_are_those_of_finite_differences(
-    rigid: Stage, sensitivities: Sensitivities, name: str
-) -> None:
-    """Both agree to 1e-6; the reference closes cycles of slightly changed stages, through kinks and sticking."""
-    flat = {**rigid.flat(), **as_tuned(rigid.flat())}
-    nearby = Ensemble.held({**flat, name: flat[name] * (1 + SHARE * np.array([-2, -1, 1, 2]))}, 4)
-    cycles = find_cycles(nearby, rtol=1e-11)
-    exact, k = sensitivities.cycle, KEYS.index(name)
-    assert exact is not None
-    for values, by in ((cycles.amplitude, exact.amplitude_by[k]), (cycles.period, exact.period_by[k])):
-        difference = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * SHARE)
-        size = exact.amplitude if values is cycles.amplitude else exact.period
-        assert difference / size == pytest.approx(by * flat[name] / size, rel=1e-6, abs=1e-6)
-
-
-SHARE = 2e-3
-
-
-def test_derivatives_of_edge_and_margin_are_those_of_stages_nearby(rigid: Stage, sensitivities: Sensitivities) -> None:
-    assert sensitivities.edge is not None
-    static = rigid.flat()["friction.static"]
-    edges = [
-        find_margin(rigid.with_numbers({"friction.static": static * (1 + change)}), True) for change in (-0.01, 0.01)
-    ]
-    low, high = (edge.crossover for edge in edges if edge and edge.crossover)
-    assert (high - low) / (0.02 * static) == pytest.approx(sensitivities.edge.by[0], rel=0.02)
-    assert sensitivities.ranked()[0][0] in KEYS
-    assert KEYS[0] in ranked_sentences(sensitivities)[0]
-    flat, name = rigid.flat(), "controller.alpha"
-    assert sensitivities.margin is not None
-    low, high = (settled_margin({**flat, name: flat[name] * (1 + change)}) for change in (-1e-3, 1e-3))
-    exact = sensitivities.margin.by[KEYS.index(name)]
-    assert (high - low) / (2e-3 * flat[name]) == pytest.approx(exact, rel=1e-4)
-
-
-@pytest.mark.parametrize(("motion", "more"), [(None, ()), (RELEASE, ("motion.displacement",))])
-def test_a_settling_time_s_derivative_is_that_of_finite_differences(rigid: Stage, motion: Any, more: Any) -> None:
-    """Both agree to 1e-6 of the time, for a move and a release, whose start depends on keys.
-
-    Jumps are as far away as stated. A stage that hunts has no settling time.
-    """
-    settles = rigid.replace({"controller.crossover": "20 Hz", **({"motion": motion} if motion else {})})
-    names = ("friction.bristle_stiffness", "masses.cart", *more)
-    edge = find_margin(rigid, True)
-    exact = sensitivity(settles, names, edge=edge, within=1e-6).settling
-    assert exact is not None
-    assert exact.jump > 1e-3
-    flat = {**settles.flat(), **as_tuned(settles.flat())}
-    for name, by in zip(names, exact.by, strict=True):
-        times = settling_times({**flat, name: flat[name] * (1 + 1e-4 * np.array([-2, -1, 1, 2]))})
-        difference = (times[0] - 8 * times[1] + 8 * times[2] - times[3]) / 12e-4
-        assert difference / exact.time == pytest.approx(by * flat[name] / exact.time, abs=1e-6)
-    assert sensitivity(rigid, names[:1], edge=edge, within=1e-6).settling is None
-
-
-def test_a_settling_time_jumps_with_the_band_where_it_is_said_to(rigid: Stage) -> None:
-    """The move ends elsewhere than it began: the turning point that is named is one of the deviation."""
-    stage = rigid.replace({"motion": STEP, "controller.crossover": "20 Hz"})
-    flat = {**stage.flat(), **as_tuned(stage.flat())}
-    exact = sensitivity(stage, KEYS[:1], edge=find_margin(rigid, True), within=1e-6).settling
-    assert exact is not None
-    wide = 1e-6 * (1 + exact.jump)
-    (before,), (after,) = (settling_times(flat, 1, wide * (1 + side)) for side in (-1e-6, 1e-6))
-    assert before - after > 0.01
-
-
-def test_a_settling_time_may_be_off_by_a_share_of_itself(rigid: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A derivative that does not predict how the time changes is none."""
-    stage, edge = rigid.replace({"motion": STEP, "controller.crossover": "20 Hz"}), find_margin(rigid, True)
-    exact = sensitivity(stage, KEYS[:1], edge=edge, within=1e-6).settling
-    assert exact is not None
-    slack = RemedySettings.current().smooth_share * exact.time / stage.flat()[KEYS[0]]
-    flow = sensitivities_module.flow_derivatives
-
-    def shifted(off: float) -> Any:
-        def derivatives(stages: Ensemble, *how: Any) -> Any:
-            end, by_states, by_keys = flow(stages, *how)
-            by_keys[stages.kernel.position] += off * slack * end[stages.kernel.velocity]
-            return end, by_states, by_keys
-
-        return derivatives
-
-    for off, follows in ((0.5, True), (2.0, False)):
-        monkeypatch.setattr(sensitivities_module, "flow_derivatives", shifted(off))
-        assert (sensitivity(stage, KEYS[:1], edge=edge, within=1e-6).settling is not None) == follows
-
-
-def settling_times(flat: dict[str, Any], stages: int = 4, within: float = 1e-6) -> np.ndarray:
-    """Return how long each stage takes to settle into a band."""
-    options = RunOptions(rtol=1e-11, bands=(within, within))
-    (runs,) = run_chunks(kernel(shared_structure(flat)), flat, stages, options)
-    return settling_of_runs(flat, runs, "inner")
 
 
 def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: Any) -> tuple[Any, Performance]:

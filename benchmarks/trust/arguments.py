@@ -54,7 +54,6 @@ CALLS: dict[str, dict[str, Any]] = {
     "rig": {"experiment": "stiffness", "stage": DRIVE},
     "save": {"stage": RIG, "path": "saved.toml"},
     "schema": {},
-    "sensitivity": {"stage": RIG},
     "sweep": {"stage": RIG, "x": "controller.crossover=2 Hz..16 Hz:3"},
     "tuning": {"crossover": 8.0, "alpha": 0.1, "beta": 2.0, "mass": 1.7},
 }

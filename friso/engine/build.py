@@ -40,7 +40,7 @@ def build(folder: Path, task: bytes) -> str:
         _load(plug_in)
     request = pickle.loads(pickled)
     model = _model(request.structure)
-    model = variational(model, request.along) if request.variational else model
+    model = variational(model) if request.variational else model
     source = write_module(model, TABLEAUS[request.method], repr(request), request.lanes)
     return keep(folder, source, _code)
 

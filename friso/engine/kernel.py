@@ -266,15 +266,13 @@ class Kernel:
 class KernelRequest:
     """Request for a kernel: a structure, the solver's method, and how many runs to do at once.
 
-    With `variational`, small deviations from a run are integrated too. Deviations of the keys `along` (names in the
-    stage file) then lead to deviations of the run.
+    With `variational`, small deviations from a run are integrated too.
     """
 
     structure: KernelForm
     variational: bool = False
     method: str = "Rodas5P"
     lanes: int = LANES
-    along: tuple[str, ...] = ()
 
     @property
     def sections(self) -> tuple[type[Section], ...]:
@@ -290,7 +288,6 @@ class KernelRequest:
         words = [form.title if isinstance(form, Structure) else f"{form.friction} friction"]
         words += [_CIRCUMSTANCES[type(self.structure)]] if type(self.structure) in _CIRCUMSTANCES else []
         words += ["variational equations"] if self.variational else []
-        words += [f"along {len(self.along)} keys"] if self.along else []
         words += [f"{self.lanes} lane{'s' * (self.lanes > 1)}"] if self.lanes != LANES else []
         return ", ".join(words)
 
@@ -309,15 +306,13 @@ def kernel(
     variational: bool = False,
     method: str = "Rodas5P",
     lanes: int = LANES,
-    along: tuple[str, ...] = (),
 ) -> Kernel:
     """Return the compiled code that integrates stages of a structure by a step method.
 
     The code integrates `lanes` runs at once. With `variational`, it also integrates how a small deviation of each state
-    grows. `along` names keys of the stage file whose small deviations are followed, too
-    (`friso.equations.variational`).
+    grows (`friso.equations.variational`).
     """
-    return kernels([KernelRequest(structure, variational, method, lanes, along)])[0]
+    return kernels([KernelRequest(structure, variational, method, lanes)])[0]
 
 
 def kernels(requests: Iterable[KernelRequest]) -> list[Kernel]:

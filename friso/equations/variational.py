@@ -7,7 +7,7 @@ jump is the saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -15,26 +15,19 @@ import sympy as sp
 from mpmath import mp
 from sympy import prime
 
-from friso.equations.component import TIME, Kink, Role, State, Switch, key, state
+from friso.equations.component import TIME, Kink, Role, State, Switch, state
 from friso.equations.model import Model
 
 PREFIX = "small_"
 """Prefix of the names of deviations."""
 
 
-def along(name: str) -> str:
-    """Return the parameter that holds the difference of a key in a neighbouring motion."""
-    return f"along.{name}"
-
-
-def variational(model: Model, keys: Sequence[str] = ()) -> Model:
+def variational(model: Model) -> Model:
     """Return the model extended by a small deviation of each state, after the states.
 
-    Deviations do not influence the step size. They are those of a neighbouring motion with other initial states and,
-    with `keys`, with other values of these keys: key k differs by the new parameter `along(k)`.
+    Deviations do not influence the step size. They are those of a neighbouring motion with other initial states.
     """
-    beside = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
-    small = beside | {key(name): key(along(name)) for name in keys}
+    small = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
     deviations = tuple(
         State(
             small[part.symbol],

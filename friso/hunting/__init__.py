@@ -34,7 +34,6 @@ from friso.hunting.cycle.multipliers import Multipliers, multipliers
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap
 from friso.hunting.cycle.shooting import Orbits
-from friso.hunting.derivatives import CycleDerivatives, cycle_derivatives, edge_derivatives, flow_derivatives
 from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.feeding import Decline, Feeding
 from friso.hunting.loop import LoopState, LowerGains, unstable
@@ -76,7 +75,6 @@ __all__ = [
     "CheckPart",
     "Curve",
     "Cycle",
-    "CycleDerivatives",
     "Cycles",
     "Decline",
     "Diagram",
@@ -118,18 +116,15 @@ __all__ = [
     "cannot_hunt",
     "check",
     "check_given",
-    "cycle_derivatives",
     "diagram",
     "displacements_that_hunt",
     "dwells",
     "dwells_of_trace",
     "edge_curves",
-    "edge_derivatives",
     "find_attractors",
     "find_cycles",
     "find_margin",
     "find_swings",
-    "flow_derivatives",
     "hunting",
     "is_moved_evenly",
     "joint_margins",

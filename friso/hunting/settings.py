@@ -183,12 +183,6 @@ class EdgeSettings(Settings):
     joint_margin_work: float = setting(2e8, "")
     """Work for the margins of a joint, which only --details needs: a quarter of a check's time."""
 
-    key_nudge_share: float = setting(1e-3, "")
-    """Relative change of a key for numerical derivatives. Smaller ones drown in the error of multipliers."""
-
-    inside_edge_share: float = setting(1e-3, "of the bandwidth")
-    """Distance inside the edge at which the cycle is analysed, because it exists there."""
-
     flip_multiplier: float = setting(0.8, "")
     """Magnitude of the multiplier next to an edge above which the cycle flips there."""
 

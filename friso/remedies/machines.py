@@ -114,13 +114,6 @@ class Fleet:
         faster = None if self.accelerations is None else self.accelerations[numbers]
         return replace(self, ratios=ratios, shifts=shifts, sizes=self.sizes[numbers], accelerations=faster)
 
-    def with_moves_from(self, smallest: float) -> Fleet:
-        """Return the machines with moves rescaled to begin at `smallest` [m], in the same order."""
-        low, high = np.log([self.moves.smallest, self.moves.largest])
-        share = (np.log(self.sizes) - low) / (high - low) if high > low else np.ones(self.count)
-        sizes = smallest * (self.moves.largest / smallest) ** share
-        return replace(self, sizes=sizes, moves=replace(self.moves, smallest=smallest))
-
     def laid_over(self, stage: Stage, changes: Mapping[str, Any], points: int) -> dict[str, Any]:
         """Return flat keys, such as friction.static with SI values, of all machines at all `points`.
 

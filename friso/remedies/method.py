@@ -25,8 +25,7 @@ from friso.remedies.caps import SpeedCap, speed_cap
 from friso.remedies.catalogue import BANDWIDTH, Remedy, remedies, with_bandwidth
 from friso.remedies.least import ChangeSize, change_size, least_factors
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
-from friso.remedies.search import Budget, Search, TriedPoints
-from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
+from friso.remedies.search import Budget, Search
 from friso.remedies.settings import settings
 from friso.remedies.trials import modulus_margins
 from friso.remedies.verified import (
@@ -55,8 +54,7 @@ class Advice:
 
     `case` is the check of the stage, and `present` the performance of the stage as it is on machines. `unmet` are the
     parts of the goal that it misses or may miss, by names of `friso.questions.tune.present_words.DOUBTS`. `limits`
-    gives the bandwidths with enough margin, and `sensitivities` the derivatives of the edge of hunting. `interrupted`
-    is true if the search was ended early.
+    gives the bandwidths with enough margin. `interrupted` is true if the search was ended early.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `cap` is how much faster the controller could become. `unmade` gives the reason why no leaf springs make
@@ -72,7 +70,6 @@ class Advice:
     machines: Fleet
     seed: int
     interrupted: bool = False
-    sensitivities: Sensitivities | None = None
     as_built: Mapping[str, Any] = field(default_factory=dict)
     correlations: Correlations = field(default_factory=Correlations)
     unmade: Mapping[str, Unmade] = field(default_factory=dict)
@@ -103,12 +100,6 @@ class Advice:
         """Return how large the change by a remedy is, for an outcome that has settings."""
         assert outcome.stage is not None
         return change_size(self.stage, outcome.stage)
-
-    @property
-    def for_large_moves(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that work for large moves only, the one for the smallest moves first."""
-        some = (outcome for outcome in self.outcomes if outcome.certainty == "large moves")
-        return tuple(sorted(some, key=lambda outcome: outcome.moves_from or 0.0))
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
@@ -201,7 +192,6 @@ def tune(
     progress(0, 0, "the stage as it is")
     present, case = moving(ideal, unseen, goal, stage), None
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report, answered)
-    sensitivities: Sensitivities | None = None
     work = settings.tuning_work
     interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
@@ -225,10 +215,6 @@ def tune(
                 several = [remedy for remedy in listed if remedy.buys_joint == joint]
                 session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
         session.makes_leaves()
-        if not session.works:
-            with allowance(settings.large_moves_work):
-                session.tries_large_moves()
-        sensitivities = edge_sensitivities(ideal, case.judgement.margin)
     except KeyboardInterrupt:
         interrupted = True
         session.interrupted()
@@ -242,7 +228,6 @@ def tune(
         machines=fresh,
         seed=seed,
         interrupted=interrupted,
-        sensitivities=sensitivities,
         as_built={name: table for name, table in stage.as_written().items() if name in AS_BUILT},
         correlations=correlations,
         unmade=session.unmade,
@@ -368,29 +353,6 @@ class _Session:
             made = Remedy(f"{remedy.name}, of leaf springs", stage, (), True, remedy.name)
             self.tries(made)
 
-    def tries_large_moves(self) -> None:
-        """Verify settings that serve large moves only, first those that begin at the smallest move.
-
-        If an allowance of work is used up, the remaining settings are left out.
-        """
-        largest, listed = self.unseen.moves.largest, list[tuple[float, int, np.ndarray, TriedPoints]]()
-        for place, outcome in enumerate(self.outcomes):
-            points = outcome.points if outcome.remedy.verifiable else None
-            if points is None:
-                continue
-            for number in points.for_large_moves(self.goal, largest)[:1]:
-                listed.append((float(points.moves_from[number]), place, points.shares[number], points))
-        for smallest, place, shares, points in sorted(listed, key=lambda item: item[:2])[: settings.most_tries]:
-            remedy = self.outcomes[place].remedy
-            search = Search(remedy, self.goal, self.machines, self.fresh, self.drive, self.budget, self.report)
-            search.tried.append(points)
-            try:
-                outcome = self._verified(search, shares, smallest)
-            except Exhausted:
-                return
-            if outcome.certainty == "large moves":
-                self.outcomes[place] = outcome
-
     def interrupted(self) -> None:
         """Record the best settings so far of the current remedy, which are not verified."""
         if self.searching is not None and self.outcomes[-1].interrupted:
@@ -446,37 +408,33 @@ class _Session:
             if one.remedy.buys_joint:
                 self._made_of_leaves(one)
 
-    def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
+    def _verified(self, search: Search, shares: np.ndarray) -> RemedyOutcome:
         """Measure settings on fresh machines; verify them by limit cycles if enough meet the goal.
 
-        `shares` are the coordinates of the settings. The machines make all moves, or those from `moves_from` [m] on.
-        The interval of the fraction of machines that meet the goal must lie at the required fraction or above. While
-        the interval leaves that open, further machines are measured.
+        `shares` are the coordinates of the settings. The interval of the fraction of machines that meet the goal must
+        lie at the required fraction or above. While the interval leaves that open, further machines are measured.
         """
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
-        unseen, further = (
-            fleet if moves_from is None else fleet.with_moves_from(moves_from) for fleet in (self.unseen, self.further)
-        )
         self.report(f"{remedy.name}: verified on machines not tuned for")
-        measured, confirmation = moving(tuned, unseen, goal, self.drive), None
+        measured, confirmation = moving(tuned, self.unseen, goal, self.drive), None
         doubted = missed_parts(measured, goal)
         if not doubted:
             self.report(f"{remedy.name}: verified by its hunting cycles")
             confirmation = confirmed(tuned, goal)
             doubted = unsettled_parts(confirmation, measured, goal)
         if not doubted:
-            measured = measured.surveyed(tuned, unseen, goal)
+            measured = measured.surveyed(tuned, self.unseen, goal)
             doubted = missed_parts(measured, goal)
         if not doubted:
             self.report(f"{remedy.name}: verified on more machines", settings.progress_steps)
-            ends = [round(part * further.count) for part in settings.further_parts]
-            for part in np.split(np.arange(further.count), ends):
+            ends = [round(part * self.further.count) for part in settings.further_parts]
+            for part in np.split(np.arange(self.further.count), ends):
                 if measured.decides(goal) is None:
-                    measured = measured.with_further(tuned, further.take(part), goal, self.drive)
+                    measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)
             doubted = () if measured.decides(goal) else ("together",)
         parts = remedy, tuned, measured, confirmation, doubted, search.points, search.attracted
-        return RemedyOutcome(*parts, shares=shares, moves_from=moves_from)
+        return RemedyOutcome(*parts, shares=shares)
 
 
 def _factors(search: Search) -> Iterator[np.ndarray]:

@@ -58,8 +58,7 @@ class TriedPoints(ArrayColumns):
     force [N] and least modulus margin hold for this fraction, too.
 
     The bandwidth [Hz] is that of the stage file's machine, where its loop last crosses 0 dB. `nearness`, from 0 to 1,
-    grows with the number of machines that settle or nearly settle. `moves_from` [m] is the smallest move from which all
-    machines settle; infinite if the largest move does not settle.
+    grows with the number of machines that settle or nearly settle.
 
     Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """
@@ -73,13 +72,12 @@ class TriedPoints(ArrayColumns):
     bandwidth: np.ndarray
     nearness: np.ndarray
     whole: np.ndarray
-    moves_from: np.ndarray
 
     @classmethod
     def none(cls, variables: int) -> TriedPoints:
         """Return a table without any points, for `variables` variables."""
         none = np.zeros(0)
-        return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool), none)
+        return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool))
 
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
         """Return for each part of the goal, by name, which points break it, shape (n,)."""
@@ -95,17 +93,6 @@ class TriedPoints(ArrayColumns):
     def meets(self, goal: Goal) -> np.ndarray:
         """Return which settings meet every part of the goal, shape (n,)."""
         return ~np.any([*self.broken(goal).values()], axis=0)
-
-    def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
-        """Return the indices of points that serve only the larger moves, up to `largest` [m].
-
-        Such points break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes
-        first.
-        """
-        broken = self.broken(goal)
-        some = self.moves_from <= largest / settings.large_share
-        some &= ~np.any([broken[name] for name in ("bandwidth", "margin", "force")], axis=0) & ~self.meets(goal)
-        return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
     def cost(self, goal: Goal) -> np.ndarray:
         """Return the cost of points, (n,): the settling time.
@@ -294,9 +281,7 @@ class Search:
         def so_far() -> TriedPoints:
             nearness = np.mean(np.isfinite(columns[:3]), axis=(0, 2))
             times, loosely, slowly, forces = (quantile(column, goal.share) for column in columns)
-            settles = np.isfinite(settling) & (settling <= _most(goal.settle)) & np.isfinite(slower)
-            reach = _smallest_move(settles, self.machines.sizes)
-            return TriedPoints(shares, times, loosely, slowly, forces, margin, bandwidth, nearness, whole, reach)
+            return TriedPoints(shares, times, loosely, slowly, forces, margin, bandwidth, nearness, whole)
 
         def worth_it(left: np.ndarray) -> np.ndarray:
             goes_on = (so_far().cost(goal) <= most)[left]
@@ -442,17 +427,6 @@ class Search:
             point, cost = taken, costs[_same(taken[None], drawn)[0]][0]
             closer.insert(0, point)
         return closer
-
-
-def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the smallest move [m] from which all larger ones settle too, shape (points,).
-
-    `settles` has shape (points, machines), and `sizes` [m] are the machines' moves. The result is infinite if the
-    largest move does not settle.
-    """
-    order = np.argsort(-sizes, kind="stable")
-    count = np.logical_and.accumulate(settles[:, order], axis=1).sum(axis=1)
-    return np.where(count > 0, sizes[order][count - 1], np.inf)
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -48,9 +48,6 @@ class RemedySettings(Settings):
     smallest_move: float = setting(10.0, "")
     """Smallest move without [moves], in tolerances. A stage in position hardly leaves its place for shorter ones."""
 
-    large_share: float = setting(4.0, "")
-    """Least ratio of largest to smallest move for settings that serve large moves only."""
-
     most_tries: int = setting(3, "")
     """Best points of a remedy that are verified. If all fail on fresh machines, it does not work."""
 
@@ -98,9 +95,6 @@ class RemedySettings(Settings):
 
     few_share: float = setting(0.2, "")
     """Fraction, of the machines that may miss the goal, whose margins lie below what is usual."""
-
-    large_moves_work: float = setting(8e8, "")
-    """Work to verify settings that serve large moves only, about 10 s on one core."""
 
     optimiser_seed: int = setting(27, "")
     """Seed of the optimiser. A fixed one gives equal answers for equal input."""
@@ -191,12 +185,6 @@ class RemedySettings(Settings):
 
     widened_factor: float = setting(1.5, "")
     """Factor on the distance of the next points after a batch with hunting."""
-
-    loop_change: float = setting(1e-5, "")
-    """Relative change of a key for the derivative of the loop. Smaller ones drown in rounding."""
-
-    smooth_share: float = setting(1e-2, "")
-    """Largest difference between the change of a settling time and its derivative. With more, the time jumps."""
 
     suggested_strokes: tuple[float, ...] = setting((1e-4, 3e-4, 1e-3, 3e-3), "m")
     """Strokes tried for a suggested joint, the shortest first. Longer ones are not leaf springs."""

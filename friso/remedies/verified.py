@@ -114,7 +114,7 @@ def confirmed(stage: Stage, goal: Goal) -> Confirmation:
 NO_VARIABLES = np.zeros((1, 0))
 """Coordinates of the only point of a remedy without variables."""
 
-Certainty = Literal["works", "large moves", "unsure", "given up", "does not work"]
+Certainty = Literal["works", "unsure", "given up", "does not work"]
 
 
 @dataclass(frozen=True)
@@ -314,8 +314,7 @@ class RemedyOutcome:
 
     `points` are all settings tried; `attracted` counts the settings dropped because machines hunted. `shares` are the
     coordinates of the stage in the remedy's ranges. `cut` is true if the search took too much work, and `untried` if
-    other remedies had taken all of it. `moves_from` [m] is the smallest move for which the stage was verified, if it
-    serves large moves only.
+    other remedies had taken all of it.
     """
 
     remedy: Remedy
@@ -329,11 +328,10 @@ class RemedyOutcome:
     shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
     cut: bool = False
     untried: bool = False
-    moves_from: float | None = None
 
     @property
     def certainty(self) -> Certainty:
-        """Return whether the remedy works: surely, for large moves only, not surely, or not at all.
+        """Return whether the remedy works: surely, not surely, or not at all.
 
         The result is "given up" if a search without result ran out of work.
         """
@@ -341,7 +339,7 @@ class RemedyOutcome:
             return "unsure"
         if self.stage is None:
             return "given up" if self.cut or self.points is None else "does not work"
-        return "unsure" if self.doubts else "works" if self.moves_from is None else "large moves"
+        return "unsure" if self.doubts else "works"
 
     @property
     def factor(self) -> float:

@@ -227,21 +227,19 @@ class Ensemble:
         rtol: float,
         variational: bool = False,
         with_modes: bool = False,
-        along: tuple[str, ...] = (),
         **run_options: Any,
     ) -> Results:
         """Run each stage from its state in `starts` for its duration [s].
 
         A run begins in the modes with memory that belong to its state. The `ends` of the result are states alone, or
-        with the modes if `with_modes`. With `variational`, small deviations from the run are integrated too. With keys
-        `along`, these deviations lead to a motion in which the keys differ, by differences that stand in `flat` (see
-        `KernelRequest`). Turning points are kept only with `least_swing`, because a limiter that chatters makes too
-        many. `run_options` are fields of `RunOptions`.
+        with the modes if `with_modes`. With `variational`, small deviations from the run are integrated too.
+        Turning points are kept only with `least_swing`, because a limiter that chatters makes too many. `run_options`
+        are fields of `RunOptions`.
         """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
-        runs_by = kernel(self.structure, variational, along=along) if variational or along else self.kernel
+        runs_by = kernel(self.structure, variational) if variational else self.kernel
         parts = list(run_chunks(runs_by, flat, self.count, options, starts))
         room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
         rooms = [_with_room(part.results, room) for part in parts]

@@ -10,7 +10,6 @@ from typing import Any
 from friso.axis import axis_shown
 from friso.questions.tune.figures import tune_figures
 from friso.questions.tune.gain_words import gain_lines
-from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.questions.tune.words import (
     COLUMNS,
     answer,
@@ -33,8 +32,8 @@ from friso.stage.correlations import correlations_file, correlations_text
 TUNED = "tuned.toml"
 """Name of the stage file of the cheapest remedy that works."""
 
-NOT_SURE, LARGE_MOVES = "-not-sure", "-for-large-moves"
-"""Suffixes of stage files whose remedies are not sure to work, or work for large moves only."""
+NOT_SURE = "-not-sure"
+"""Suffix of stage files whose remedies are not sure to work."""
 
 OF_LEAVES = "-of-leaf-springs"
 """Suffix of stage files with joints made of leaf springs."""
@@ -49,7 +48,6 @@ def blocks(tuning: Advice) -> list[AnswerBlock]:
     """Return the blocks: what to change, what that brings, what does not work, and everything behind that."""
     behind = {
         "The numbers to type in, in the terms of drives (friso export)": gain_lines(tuning),
-        "What matters for the edge of hunting": sensitivity_sentences(tuning),
         "What is assumed, and how machines were drawn": assumptions(tuning),
     }
     return [
@@ -75,7 +73,7 @@ def further_files(tuning: Advice) -> dict[str, Content]:
         if outcome.stage is None:
             continue
         slug = outcome.remedy.name.replace(",", "").replace(" ", "-")
-        unsure = {"works": "", "large moves": LARGE_MOVES}.get(outcome.certainty, NOT_SURE)
+        unsure = "" if outcome.certainty == "works" else NOT_SURE
         files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
     least = tuning.least
     return {**_stage_file(tuning, TUNED, least.stage if least else None), **files}
@@ -116,7 +114,6 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
             },
             "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict, "doubts": [*tuning.unmet]},
             "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
-            "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
         }
     )
 

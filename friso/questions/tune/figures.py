@@ -91,8 +91,7 @@ def _shown(tuning: Advice) -> list[RemedyOutcome]:
 
 def _name(outcome: RemedyOutcome) -> str:
     """Return the name of a remedy, marked if it is not sure to work."""
-    marks = {"works": "", "large moves": " (large moves)"}
-    return f"{outcome.remedy.name}{marks.get(outcome.certainty, ' (not sure)')}"
+    return f"{outcome.remedy.name}{'' if outcome.certainty == 'works' else ' (not sure)'}"
 
 
 def _response(tuning: Advice, lines: Lines) -> Panel:

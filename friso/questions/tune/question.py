@@ -53,8 +53,6 @@ class TuneAnswer(Answer):
         if not self.result.needed or self.result.working:
             return ""
         so_far = "before it was interrupted, " if self.result.interrupted else ""
-        if self.result.for_large_moves:
-            return f"{so_far}no change that was tried works for all moves, for large ones alone some do"
         return f"{so_far}no change that was tried works for certain"
 
     @property

@@ -124,11 +124,8 @@ def explained(tuning: Advice) -> list[str]:
 
 
 def _rest(tuning: Advice) -> str:
-    """Say what the remedies for large moves bring, and which remedies might work and why that is not sure."""
-    large = [text for outcome in tuning.for_large_moves for text in _works(outcome, tuning, outcome.remedy.name)]
-    return " ".join(
-        [*large, *(f"{outcome.remedy.name} might work, but {unsure_why(outcome)}." for outcome in _unsure(tuning))]
-    )
+    """Say which remedies might work, and why that is not sure."""
+    return " ".join(f"{outcome.remedy.name} might work, but {unsure_why(outcome)}." for outcome in _unsure(tuning))
 
 
 def _unsure(tuning: Advice) -> list[RemedyOutcome]:
@@ -200,8 +197,8 @@ def _drive_timed(tuning: Advice) -> bool:
 
 
 def _first(tuning: Advice) -> RemedyOutcome:
-    """Return the remedy that the answer names: the least change, or the one that might work or works for some moves."""
-    return (*tuning.working[:1], *tuning.for_large_moves, *_unsure(tuning))[0]
+    """Return the remedy that the answer names: the least change, or the one that might work."""
+    return (*tuning.working[:1], *_unsure(tuning))[0]
 
 
 def _measured(tuning: Advice) -> Performance:
@@ -215,7 +212,6 @@ _WORDS: Words[Advice] = {
     "unstable": lambda of: unstable_where(of.case.unstable),
     "changes": lambda of: listed(changes(of.stage, _stage_of(_first(of))), "and"),
     "name": lambda of: _first(of).remedy.name,
-    "from": lambda of: length_from(_first(of)),
     "why": lambda of: unsure_why(_first(of)),
     "for_all": lambda of: " for all moves" if _some_moves_alone(of) else "",
     "so_far": lambda of: " so far" if of.interrupted else "",
@@ -252,10 +248,6 @@ _SAYS: Sequence[Alternatives[Advice]] = (
             "{changes}.",
         ),
         (lambda of: of.working, "Set {changes}: the cheapest change that works{for_all}{so_far} ({name})."),
-        (
-            lambda of: of.for_large_moves,
-            "For moves of {from} and more alone: set {changes} ({name}); no change works for all moves.",
-        ),
         (_unsure, "No change was found that surely works; {name} might ({changes}), but {why}."),
         (always, "No change was found that surely meets the goal."),
     ),
@@ -444,11 +436,6 @@ def factor_text(factor: float) -> str:
     return f"{float(f'{factor:.3g}'):.15g}"
 
 
-def length_from(outcome: RemedyOutcome) -> str:
-    """Write the smallest move [m] that a remedy serves, if it serves large moves only."""
-    return with_unit(outcome.moves_from or 0.0, "m")
-
-
 def unsure_why(outcome: RemedyOutcome) -> str:
     """Say why a remedy is not sure to work."""
     if outcome.interrupted and not outcome.doubts:
@@ -483,10 +470,6 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
         return "Its motions take too much computing."
     points, goal = outcome.points, tuning.goal
     sentence = _reason(points, outcome, goal)
-    largest = goal.moves.largest if goal.moves else np.inf
-    for number in points.for_large_moves(goal, largest)[:1]:
-        smallest = with_unit(float(points.moves_from[number]), "m")
-        sentence += f" For moves of {smallest} and more alone, one does on the machines of the search."
     cut = " The search was given up there, as it takes too much computing: others may work." if outcome.cut else ""
     return f"{sentence}{cut}"
 
@@ -550,7 +533,6 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
 
 _WORKS = {
     "works": "yes",
-    "large moves": "large moves",
     "unsure": "not sure",
     NONE_FOUND: "none found",
     "does not work": "no",
