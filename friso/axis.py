@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any
 
 AXIS_KIND = "axis.kind"
@@ -97,16 +98,17 @@ class AxisKind:
         """Return a JSON key with the unit of this axis: "force_n" becomes "force_n_m"."""
         if self.plain:
             return key
-        name, unit = _SUFFIX.fullmatch(key).group("name", "unit")  # type: ignore[union-attr]
+        name, *parts = key.split("_")
+        unit = [*takewhile(_IN_SUFFIXES.__contains__, reversed(parts))][::-1]
         length, force, mass = (_in_key(text) for text in (self.length, self.force, self.mass))
         names = {"m": length, "n": force, "ns": f"{force}_s", "kg": mass}
-        return name + "".join(names.get(part, part) for part in re.split("(_)", unit))
+        return "_".join([name, *parts[: len(parts) - len(unit)], *(names.get(part, part) for part in unit)])
 
 
 _TURNED = re.compile(r"rad|N[*· ]m|kg[*· ]m")
 _PARTS = re.compile(r"(?<![A-Za-zµ^])(?P<prefix>[numµkM]??)(?P<base>kg|N|m)(?![A-Za-z])")
 _NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z]|[*·]m)(?:[*·]s/m|/m?s|/m)?(?![A-Za-z])")
-_SUFFIX = re.compile(r"(?P<name>.*?)(?P<unit>(?:_(?:m|n|ns|kg|s|s2|per|hz))*)")
+_IN_SUFFIXES = frozenset(("m", "n", "ns", "kg", "s", "s2", "per", "hz"))
 
 
 def _in_key(unit: str) -> str:

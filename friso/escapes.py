@@ -24,6 +24,10 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff2
 The last four are wide forms of the first four, which Excel accepts in East Asian languages."""
 
 
+_MARKUP = re.compile(r"[\\`*\[\]<>&|~$#]|(?<![^\W_])_|_(?![^\W_])")
+"""Pattern of characters with a meaning in Markdown, where they have one."""
+
+
 def escaped(text: str) -> str:
     r"""Return a text with every unsafe character written out, such as "\x1b" or "\u202e"; lines are kept."""
     return _STEERING.sub(_written_out, text)
@@ -37,6 +41,11 @@ def one_line(text: str) -> str:
 def table_cell(text: str) -> str:
     """Return a text escaped as a cell of a CSV file; a formula gets a leading apostrophe."""
     return f"'{escaped(text)}" if text.startswith(_FORMULA) else escaped(text)
+
+
+def markdown(text: str) -> str:
+    """Return a text as Markdown that shows it as it is: what would be markup, HTML or a formula gets a backslash."""
+    return _MARKUP.sub(r"\\\g<0>", text)
 
 
 def toml_text(text: str) -> str:

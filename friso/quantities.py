@@ -273,8 +273,9 @@ class _Refused(Exception):
 # A strict grammar before pint sees anything: its parser would compute "m^(9^9^9)" and take "N;N" for N^2.
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _FACTOR = r"(?:%|[^\W\d_]\w*)(?: ?(?:\^|\*\*) ?-?[0-9]|⁻?[¹²³⁴])?"
-_GROUP = rf"(?:{_FACTOR}|\({_FACTOR}(?: ?[*/·. ] ?{_FACTOR})*\))"
-_UNIT = re.compile(rf"(?:1 ?/ ?)?{_GROUP}(?: ?[*/·. ] ?{_GROUP})*")
+_BETWEEN = "(?: ?[*/·.] ?| {1,3})"
+_GROUP = rf"(?:{_FACTOR}|\({_FACTOR}(?:{_BETWEEN}{_FACTOR})*\))"
+_UNIT = re.compile(rf"(?:1 ?/ ?)?{_GROUP}(?:{_BETWEEN}{_GROUP})*")
 LONGEST_QUANTITY = 100
 
 

@@ -123,6 +123,15 @@ def test_the_command(bare: Path, tmp_path: Path) -> None:
     assert "left out: column 4 (load)" in friso_inside(tmp_path, "logs", "bare.csv").stdout
 
 
+@pytest.mark.parametrize("columns", [{}, {"x": np.full(1200, np.nan)}, {"x": np.full(1200, np.nan), "u": M["time"]}])
+def test_a_file_is_drawn_as_far_as_it_holds_something(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", ["t", *columns], [M["time"], *columns.values()])
+    done = friso_inside(tmp_path, "logs", path.name, "--out", "out")
+    assert done.returncode == 0
+    assert (tmp_path / "out" / "logs.html").exists()
+    assert (tmp_path / "out" / "logs_1.png").exists() == ("u" in columns)
+
+
 @pytest.mark.parametrize("full", [False, True])
 def test_one_bad_file_does_not_hide_the_others(
     bare: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, full: bool

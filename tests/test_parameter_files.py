@@ -353,6 +353,7 @@ def test_an_odrive_exerts_the_force_of_its_torque(tmp_path: Path) -> None:
             for text in ("8.27 / kv", "0.16 Nm", "1 / 0", "2 ** 9999", "True", "0x10", "1_0", "1,5", "", "'3'")
         ),
         *((text, None) for text in ("__import__('os')", "f(1)", "1 if 2 else 3", "(" * 150, "9" * 201, "1\\", "1j")),
+        *((text, None) for text in ("(-8)**0.5", "2 * (-8)**(1/3) + 1", "-(-8)**0.5", "9**9**9**9", "0**-1")),
     ],
 )
 def test_arithmetic_of_numbers_is_worked_out_and_nothing_else(text: str, number: float | None) -> None:

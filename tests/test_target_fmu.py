@@ -8,7 +8,6 @@ import sys
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -214,17 +213,6 @@ def test_the_remark_names_the_folders_that_there_are(
     remark = TARGETS["fmu"].remark()
     assert [one for one in folders if one] == names == [one for one in names if one in remark]
     assert ("Not compiled" in remark) is (not names)
-
-
-def test_a_name_of_a_stage_stays_a_comment_of_the_test() -> None:
-    """It ends no text and no comment, whatever it is."""
-    lines = ['say """; raise SystemExit', "\\u12 \\N{x}", 'ends in "', "*/ int evil; /* x"]
-    files = TARGETS["fmu"].files(replace(parcel(), header=lines))
-    compile(files["axis_test.py"], "axis_test.py", "exec")
-    assert all(f"# {line}\n" in files["axis_test.py"] for line in lines)
-    code = TARGETS["c"].files(replace(parcel(), header=lines))["axis.c"]
-    assert code.count("/*") == code.count("*/")
-    assert "* / int evil; / * x" in code
 
 
 def test_an_fmu_keeps_its_clock() -> None:

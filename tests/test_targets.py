@@ -11,6 +11,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +23,7 @@ import pytest
 import structured_text
 import sympy as sp
 from inside import friso_inside
+from markdown_it import MarkdownIt
 from target_stages import CONTROLLERS, EXAMPLES, MACHINES, stage_of
 
 import friso
@@ -437,6 +439,27 @@ def test_what_is_written_stands_in_the_header(tmp_path: Path) -> None:
     assert document["sure_not_to_hunt"] is True
     rows = np.loadtxt(tmp_path / "out" / "twincat_cascade_vector.csv", delimiter=",", skiprows=1)
     assert np.abs(rows[:, -1]).max() == pytest.approx(200 / 30)
+
+
+def test_a_name_of_a_stage_stays_a_text_in_every_file() -> None:
+    """It ends no text and no comment, is no markup, and tells Python no encoding, whatever it is."""
+    lines = ['coding: say """; raise SystemExit', "\\u12 \\N{x}", 'ends in "', "*/ int evil; /* x", "*) x (* ]]> y"]
+    lines += ["<script>alert(1)</script> &amp; <a@b.c>", "[a](b) *c* __d__ `e` ~~f~~ | $g$ # h", "# i"]
+    parcel = replace(parcel_of("van_dijk_notch", "rigid_lugre", 10), header=lines)
+    files = TARGETS["fmu"].files(parcel)
+    compile(files["axis_test.py"].encode(), "axis_test.py", "exec")
+    assert all(f"# {line}\n" in files["axis_test.py"] for line in lines)
+    code = TARGETS["c"].files(parcel)["axis.c"]
+    assert code.count("/*") == code.count("*/")
+    assert "* / int evil; / * x" in code
+    code = TARGETS["st"].files(parcel)["FB_axis.TcPOU"]
+    declaration = ElementTree.fromstring(code.encode()).findtext("POU/Declaration", "")
+    assert declaration.count("(*") == declaration.count("*)")
+    page = TARGETS["difference"].files(parcel)["axis.md"]
+    shown = MarkdownIt("gfm-like", {"linkify": False}).parse(page)
+    (header,) = (one.children for one in shown if one.children and "coding" in one.content)
+    shown_lines = "".join("\n" if one.type.endswith("break") else one.content for one in header)
+    assert shown_lines.split("\n") == lines
 
 
 RIG = EXAMPLES / "thesis_rig.toml"

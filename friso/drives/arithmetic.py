@@ -39,13 +39,16 @@ def number_in(text: str) -> float | None:
 def _worked_out(node: ast.expr) -> float:
     """Return the value of an arithmetic expression.
 
-    Raises ValueError for anything but arithmetic of numbers.
+    Raises ValueError for anything but arithmetic of numbers, and for a root of a negative number.
     """
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return float(value)
         case ast.BinOp(left, sign, right) if type(sign) in _PAIRS:
-            return float(_PAIRS[type(sign)](_worked_out(left), _worked_out(right)))
+            value = _PAIRS[type(sign)](_worked_out(left), _worked_out(right))
+            if isinstance(value, complex):
+                raise ValueError(value)
+            return value
         case ast.UnaryOp(sign, operand) if type(sign) in _SIGNS:
             return _SIGNS[type(sign)](_worked_out(operand))
     name = ast.unparse(node)

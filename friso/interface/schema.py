@@ -153,7 +153,7 @@ def _attributes(cls: type[Section]) -> dict[str, str]:
     return texts
 
 
-_ENTRY = re.compile(r"^(?:# )?(?:\[(?P<table>\w+)\]|(?P<key>\w+) = .*?)(?:\s{2,}# (?P<text>.*))?$")
+_ENTRY = re.compile(r"^(?:# )?(?:\[(?P<table>\w+)\]|(?P<key>\w+) = .*?)(?:(?<!\s)\s{2,}# (?P<text>.*))?$")
 
 
 @cache

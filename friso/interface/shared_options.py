@@ -91,7 +91,7 @@ def meaning(function: Callable[..., Any], name: str) -> str:
         return shared.help
     _, _, lines = own[name].partition("\n")
     text = " ".join(lines.partition("\n\n")[0].split()).replace("``", "").replace("`", "")
-    return re.sub(r",? or (a number|two numbers) \[[^]]*\]", "", text)
+    return re.sub(r",? or (a number|two numbers) \[[^][]*\]", "", text)
 
 
 def _parts(text: str) -> tuple[str, list[tuple[list[str], str]], str]:

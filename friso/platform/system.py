@@ -139,7 +139,7 @@ if sys.platform == "win32":
         """
         if re.fullmatch(r"[\w.:/\\=+-]+", word):
             return word
-        return _quoted(re.sub(r'(\\*)(?="|\Z)', r"\1\1", word).replace('"', '\\"'))
+        return _quoted(re.sub(r'(?<!\\)(\\+)(?="|\Z)', r"\1\1", word).replace('"', '\\"'))
 
     @contextmanager
     def closed_pipes_told() -> Iterator[None]:

@@ -153,7 +153,7 @@ def _plain(svg: str) -> str:
     return _PATH.sub(_shortened, element).translate(_IN_ADDRESSES)
 
 
-_UNSEEN = re.compile(r'<!--.*?-->|<metadata>.*?</metadata>|(?<=<g) id="[^"]*"', re.DOTALL)
+_UNSEEN = re.compile(r'<!--.*?(?:-->|\Z)|<metadata>.*?(?:</metadata>|\Z)|(?<=<g) id="[^"]*"', re.DOTALL)
 """Parts of an SVG that are neither shown nor referred to, such as names of groups."""
 
 _PATH, _SPACED = re.compile(r'(?<= d=")[^"]*'), re.compile(r" ?([A-Za-z]) ?")

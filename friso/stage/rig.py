@@ -236,7 +236,7 @@ class Cable(UncertainSection):
     drag: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = Value(0, "0 N*s/m")
 
 
-_PER_ROOT_HERTZ = re.compile(r"\s*/\s*(Hz(\^|\*\*)0\.5|sqrt\(Hz\)|√Hz)\s*$")
+_PER_ROOT_HERTZ = re.compile(r"(?<!\s)\s*/\s*(Hz(\^|\*\*)0\.5|sqrt\(Hz\)|√Hz)\s*$")
 
 
 @dataclass(frozen=True)

@@ -234,7 +234,8 @@ def _syntax_error(text: str, message: str) -> str:
         return message
     number, column = int(place[1]), int(place[2])
     line = text.split("\n")[number - 1].rstrip("\r")
-    why = re.sub(r"\('(.*)',\)", r"\1", message[: place.start()])  # a key in the message is a tuple with one part
+    # a key in the message is a tuple with one part
+    why = re.sub(r"^([^(]*)\('(.*)',\)", r"\1\2", message[: place.start()])
     if (opened := _open_quote(line)) is not None:
         column, why = opened + 1, "a quote that is not closed"
     elif line[column - 1 : column] in _TYPOGRAPHIC:

@@ -32,8 +32,8 @@ CURRENT, TIME, PER_AMPERE = "MOT_VELO_KP", "MOT_VELO_TI", "MOT_TRQ_CONST_MNM_P_A
 LIMIT = "MOT_I_MAX_MA"
 TURN = "what one turn of the motor moves"
 
-_YAML = re.compile(r"( *)([A-Za-z_]\w*):[ \t]*([^#\n]*?)[ \t]*(?:#.*)?")
-_COMMAND = re.compile(r"[ \t]*epicsEnvSet\([ \t]*\"?(\w+)\"?[ \t]*,[ \t]*\"?([^\"),]*)\"?[ \t]*\)[ \t]*(?:#.*)?")
+_YAML = re.compile(r"( *)([A-Za-z_]\w*):([^#\n]*)(?:#.*)?")
+_COMMAND = re.compile(r"[ \t]*epicsEnvSet\([ \t]*\"?(\w+)\"?[ \t]*,[ \t]*+\"?([^\"),]*+)\"?[ \t]*\)[ \t]*(?:#.*)?")
 
 
 def recognises(name: str, text: str) -> bool:
@@ -53,7 +53,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
             values[command[1]] = command[2].strip()
         elif entry := _YAML.fullmatch(line.rstrip()):
             above = [one for one in above if one[0] < len(entry[1])]
-            values[".".join([*(name for _, name in above), entry[2]])] = entry[3].strip("\"'")
+            values[".".join([*(name for _, name in above), entry[2]])] = entry[3].strip().strip("\"'")
             above.append((len(entry[1]), entry[2]))
         elif not re.match(r"[ \t]*(?:-|<|\$|require|iocsh|ecmc|dbLoad|\w+\()", line):
             raise InputError(f"line {number}", quoted(line.strip()), "a key and its value", "Kp: 15.0")

@@ -36,10 +36,10 @@ OUTPUT, COUNT = "an output of 1", "one count of the encoder"
 NO_SERVO = ("STEP", "NO_OUTPUT")
 """Parts of the names of output modes without a servo loop of the program's own."""
 
-_SETTING = re.compile(r"ch([0-7])[ \t]*->[ \t]*([\w.\[\]]{1,40})[ \t]*=(?!=)[ \t]*([^;\n]{0,100});")
+_SETTING = re.compile(r"ch([0-7])[ \t]*->[ \t]*([\w.\[\]]{1,40})[ \t]*=(?!=)[ \t]*+([^;\n]{0,100});")
 """Pattern of a statement that sets a parameter of an axis."""
 
-_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 BIQUAD = {"numerator": ("B0", "B1", "B2"), "denominator": ("A1", "A2")}
 _SIDE = {"FFVel": "a feedforward of the velocity", "FFAccel": "a feedforward of the acceleration"}
 

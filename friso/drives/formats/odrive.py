@@ -99,11 +99,11 @@ FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
 """Names in [controller] that parameters hold if the drive's own trajectories are fed forward."""
 
 
-_LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)[ \t]*([^#]*?)(?:(?:#|//).*)?")
+_LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)((?:(?!//)[^#])*+)(?:[#/].*)?")
 """Pattern of a line for odrivetool that sets a parameter; a comment after it is ignored."""
 
 _OTHER_LINE = re.compile(
-    r"[ \t]*(?:$|#|import |from |odrv[0-9]{1,3}(?:[ \t]*=[ \t]*odrive\.\w+|(?:\.\w+)+)\([^()#]*\)[ \t]*(?:#|//|$)"
+    r"[ \t]*+(?:$|#|import |from |odrv[0-9]{1,3}(?:[ \t]*=[ \t]*odrive\.\w+|(?:\.\w+)+)\([^()#]*\)[ \t]*(?:#|//|$)"
     r"|(?=[^_=]*$)[^\w]*\w+(?:[^\w]+[^\W\d]\w*){2})"
 )
 """Pattern of a line that sets no parameter.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from friso.drives.languages import PYTHON
 from friso.drives.program import OUTPUT, LinearController, identifier
 from friso.drives.settings import settings
 from friso.drives.target import CodeTarget, Parcel
+from friso.escapes import markdown
 
 _WORDS = """False None True and as assert async await break class continue def del elif else except finally for from
 global if import in is lambda nonlocal not or pass raise return try while with yield abs sqrt floor exp
@@ -182,9 +183,14 @@ def _of_sections(sections: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def _table(heading: list[str], rows: list[list[str]]) -> list[str]:
-    """Return a table in Markdown."""
+    """Return a table in Markdown, of cells in Markdown."""
     lines = [heading, ["---"] * len(heading), *rows]
-    return ["", *(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |" for line in lines), ""]
+    return ["", *(f"| {' | '.join(line)} |" for line in lines), ""]
+
+
+def _codes(names: Iterable[str]) -> str:
+    """Return names as code in Markdown."""
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def _equations(pairs: list[tuple[str, Any]], written: Callable[[Any], str]) -> list[list[str]]:
@@ -202,10 +208,12 @@ def _markdown(parcel: Parcel) -> str:
     """Return the controller as tables for people."""
     linear, parts = parcel.linear, _parts(parcel)
     heading = ["Name", "Value", "If (the first row that holds)"]
-    lines = [f"# {parcel.name}: difference equations", "", *(line + "  " if line else "" for line in parcel.header)]
-    lines += ["", f"Every {parcel.program.period!r} s. The output is in {parcel.unit}."]
-    lines += _table(["Input", "Meaning"], [[f"`{name}`", meaning] for name, meaning in parcel.meanings.items()])
-    parameters = [[f"`{name}`", repr(value), unit] for name, (value, unit) in parcel.parameters.items()]
+    lines = [f"# {parcel.name}: difference equations", "", *(markdown(line) + "  " for line in parcel.header)]
+    lines += ["", f"Every {parcel.program.period!r} s. The output is in {markdown(parcel.unit)}."]
+    lines += _table(
+        ["Input", "Meaning"], [[f"`{name}`", markdown(meaning)] for name, meaning in parcel.meanings.items()]
+    )
+    parameters = [[f"`{name}`", repr(value), markdown(unit)] for name, (value, unit) in parcel.parameters.items()]
     lines += _table(["Parameter", "Value", "Unit"], parameters)
     titles = {
         "prepare": "Constants",
@@ -216,7 +224,7 @@ def _markdown(parcel: Parcel) -> str:
     for part, title in titles.items():
         lines += [f"## {title}", *_table(heading, _equations(parts[part], str))]
     lines += ["## State space", "", "Without limits and settings against friction: x' = a x + b u, y = c x + d u."]
-    lines += ["", f"States: {', '.join(linear.states)}.  ", f"Inputs: {', '.join(linear.inputs)}."]
+    lines += ["", f"States: {_codes(linear.states)}.  ", f"Inputs: {_codes(linear.inputs)}."]
     for k, matrices in enumerate(linear.samples):
         lines += ["", *([f"Sample {k} of {len(linear.samples)}:", ""] if len(linear.samples) > 1 else []), "```"]
         lines += [f"{letter} = {matrix.tolist()}" for letter, matrix in zip("abcd", matrices, strict=True)] + ["```"]

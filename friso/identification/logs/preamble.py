@@ -16,7 +16,7 @@ RATES, STEPS = (channel_words()[name] for name in ("sample_rate", "sample_time")
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """Characters around a key and its value that belong to neither."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
-_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
+_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d++(?:[.,]\d*+)?+|\.\d++)(?:[eE][+-]?\d++)?+)[\s;,]*(?P<unit>[^\s;,]*)")
 """Pattern of a number and its unit. A comma in front of all digits is no decimal sign: it may end a field."""
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<sign>[.,])\d{3}")
 """Pattern of digits in which a sign may group thousands or begin the decimals: 10,000 Hz."""

@@ -195,7 +195,8 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
     The factor leads to the SI unit of the role on that axis. A channel without a unit gets the unit after the slash.
     Raises LogError for units that do not fit role and channel.
     """
-    match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*(\([^()]+\)|[^/]+)\s*", text)
+    number = r"[+-]?[0-9.]++(?:[eE][+-]?[0-9]++)?+"
+    match = re.fullmatch(rf"\s*({number})\s*(\S.*?)(?<!\s)\s*/\s*+(\([^()]+\)|[^/]++)\s*", text)
     role_unit = axis.unit(ROLES[role])
     example = f'--scale {role}="35.1507 {role_unit}/V"'
     if match is None:

@@ -17,13 +17,14 @@ MOST_CHANNELS = 12
 
 
 def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
-    """Draw a figure for each file of channels; channels with a role come first."""
-    return [_figure(content, number) for number, content in enumerate(contents, 1) if content.channels]
+    """Draw a figure for each file with a channel beside time; channels with a role come first."""
+    drawn = [[channel for channel in content.channels if channel.role != "time"] for content in contents]
+    return [_figure(content, drawn[k], k + 1) for k, content in enumerate(contents) if drawn[k]]
 
 
-def _figure(content: LogContent, number: int) -> Figure:
-    """Draw the channels of one file; `number` is that of the file, for the figure's name."""
-    channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
+def _figure(content: LogContent, drawn: Sequence[ChannelContent], number: int) -> Figure:
+    """Draw channels of one file; `number` is that of the file, for the figure's name."""
+    channels = sorted(drawn, key=lambda channel: not channel.role)
     left = (
         f" {MOST_CHANNELS} of {len(channels)} channels are drawn, those with a role first."
         if len(channels) > MOST_CHANNELS

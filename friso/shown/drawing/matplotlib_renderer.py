@@ -192,8 +192,8 @@ class _LaidOut:
 
 
 _LINE, _LONG, _FRAME = (
-    re.compile(rb' (?:d|x|y)="[^"]+"|translate\([^)]+\)'),
-    re.compile(rb"-?\d+\.\d{3,}"),
+    re.compile(rb' (?:d|x|y)="[^"]+"|translate\([^()]+\)'),
+    re.compile(rb"-?(?<!\d)\d+\.\d{3,}"),
     re.compile(rb'height="[^"]*" viewBox="[^"]*"'),
 )
 
