@@ -427,7 +427,7 @@ def _crossings(result: Plane, along: int, value: float) -> list[float]:
 
 
 EndKind = Literal["range", "closed", "lost"]
-"""How a curve ends: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
+"""How a curve ends: at the end of the range, as a ring, or where its cycle was lost."""
 
 
 class CurveEnd(NamedTuple):
