@@ -24,7 +24,6 @@ from friso.hunting import (
     Ensemble,
     KeyRange,
     LocatedPoint,
-    Meeting,
     Plane,
     Point,
     Space,
@@ -41,7 +40,6 @@ from friso.questions.boundary.words import (
     ShownKey,
     _along_one,
     conclusion,
-    meeting_sentences,
     sentences,
 )
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
@@ -139,7 +137,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     assert document.keys() == {
-        *("conclusion", "x", "y", "curves", "ends", "meetings", "lost", "beyond_curves", "corners", "files", "plug_ins")
+        *("conclusion", "x", "y", "curves", "ends", "lost", "beyond_curves", "corners", "files", "plug_ins")
     }
     assert [(end["curve"], end["how"]) for end in document["ends"]][:2] == [(0, "range"), (0, "range")]
     assert document["y"] == {"key": "masses.cart", "unit": "g"}
@@ -304,59 +302,25 @@ def test_sentences_of_two_keys(crossing: Plane, snapshots: Snapshots) -> None:
 
 
 @pytest.fixture
-def met(crossing: Plane) -> Plane:
-    """Beside the flip a fold of another cycle, which is lost inside the range, and both meet in every way."""
+def two(crossing: Plane) -> Plane:
+    """Beside the flip a fold of another cycle, which is lost inside the range."""
     (flip,) = crossing.curves
     spots = tuple(Spot(np.array([x, 0.25]), located("fold", 0.0, 1), np.array([0.0, 1.0])) for x in (0.1, 0.5, 0.9))
     fold = Curve("fold", 1.0, spots, ("end of the range", "it could not be followed farther"))
-    place, error = np.array([[0.5, 0.25]]), np.full(2, 1e-6)
-    meetings = (
-        Meeting((0, 1), "cross", place, error, same_cycle=False),
-        Meeting((0, 1), "cross", place, np.full(2, np.inf), same_cycle=True),
-        Meeting((0, 0), "cross", place, error, same_cycle=False),
-        Meeting((0, 1), "together", np.array([[0.5, 0.25], [0.5, 0.75]]), error, same_cycle=True),
-        Meeting((1, 0), "end", spots[-1].at[None], error, same_cycle=True),
-    )
-    return replace(crossing, curves=(flip, fold), meetings=meetings)
+    return replace(crossing, curves=(flip, fold))
 
 
-def test_where_curves_meet_and_end_is_told(met: Plane) -> None:
-    first, second = sentences(met, KEYS)[1:3]
+def test_where_curves_end_is_told(two: Plane) -> None:
+    first = sentences(two, KEYS)[1]
     assert "at both, the range ends" in first
-    assert "joint.stroke = 1.9 mm, controller.kp = 3.16228 N/m, where it meets another curve" in second
-    here = "joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m"
-    expected = [
-        f"cross at {here}; these are two",
-        f"at about {here}; both are changes of one",
-        f"itself at {here}: there",
-    ]
-    expected += [f"together from {here} to", "near joint.stroke = 1.9 mm, controller.kp = 3.16228 N/m, where the first"]
-    for sentence, words in zip(meeting_sentences(met, KEYS), expected, strict=True):
-        assert words in sentence
-    assert conclusion(met, KEYS).endswith("There is 1 more curve.")
-    assert "No two of the curves meet." in sentences(replace(met, meetings=()), KEYS)
-
-
-def test_the_document_lists_where_curves_meet_and_end(met: Plane) -> None:
-    document = boundary_document(met, KEYS)
+    assert conclusion(two, KEYS).endswith("There is 1 more curve.")
+    document = boundary_document(two, KEYS)
     assert [(end["curve"], end["how"]) for end in document["ends"]] == [
-        *((0, "range"), (0, "range"), (1, "range"), (1, "meets")),
+        *((0, "range"), (0, "range"), (1, "range"), (1, "lost")),
     ]
     assert document["ends"][3]["at"] == pytest.approx([1.9, 10**0.5])
-    assert [meeting["how"] for meeting in document["meetings"]] == ["cross", "cross", "cross", "together", "end"]
-    first, unrefined = document["meetings"][:2]
-    assert first["curves"] == [0, 1]
-    assert first["places"] == [pytest.approx([1.5, 10**0.5])]
-    assert first["error"] == pytest.approx([1e-6, 10**0.5 * 2e-6 * np.log(10)], rel=1e-3)
-    assert unrefined["error"] == [None, None]
-
-
-def test_the_figure_marks_where_curves_meet_and_are_lost(met: Plane) -> None:
-    marks = {mark.label: len(mark.x) for mark in boundary_figure(met, KEYS).panels[0].markers}
-    assert marks == {LOST: 1, "": 6}
-    alone = boundary_figure(replace(met, meetings=()), KEYS)
-    assert {mark.label for mark in alone.panels[0].markers} == {LOST}
-    assert matplotlib_renderer.image(alone, "png")
+    marks = {mark.label: len(mark.x) for mark in boundary_figure(two, KEYS).panels[0].markers}
+    assert marks == {LOST: 2}
 
 
 @pytest.mark.inner

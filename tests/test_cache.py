@@ -21,7 +21,6 @@ from systems import posix
 
 from friso.engine import building, cache, prune
 from friso.engine.cache import SECONDS_OF_A_DAY
-from friso.engine.seal import SECRET_BYTES, SECRET_FILE, read_sealed, write_sealed
 from friso.engine.settings import BuildSettings
 from friso.platform import private
 from friso.platform.helper_process import HelperProcess
@@ -132,7 +131,7 @@ def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path:
 
 
 @pytest.mark.parametrize("damage", ["truncate", "alter", "name", "remove"])
-@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET_FILE])
+@pytest.mark.parametrize("pattern", ["*.kernel", "*.request"])
 def test_a_damaged_file_is_made_again(copied: Path, pattern: str, damage: str) -> None:
     (file,) = (copied / "kernels").glob(pattern)
     content = file.read_bytes()
@@ -424,7 +423,7 @@ def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pyt
 
 
 @posix
-@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET_FILE])
+@pytest.mark.parametrize("pattern", ["*.kernel", "*.request"])
 def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (file,) = (copied / "kernels").glob(pattern)
     belongs_to_another(file, monkeypatch)
@@ -437,32 +436,24 @@ def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkey
 @posix
 def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path: Path) -> None:
     file, link, pipe = tmp_path / "file", tmp_path / "link", tmp_path / "pipe"
-    write_sealed(file, b"content")
+    private.write_private(file, b"content")
     link.symlink_to(file)
     os.mkfifo(pipe)
-    assert (read_sealed(file), read_sealed(link), read_sealed(pipe)) == (b"content", None, None)
+    assert private.read_private(file) == b"content"
+    for path in (link, pipe):
+        with pytest.raises(OSError, match=r"link|no file|levels"):
+            private.read_private(path)
     file.chmod(0o620)
-    assert read_sealed(file) is None
-
-
-def test_a_planted_entry_is_not_loaded(copied: Path, tmp_path: Path) -> None:
-    """A planted entry is complete, with the right name and mode, but sealed with another secret or as another entry."""
-    kernel, other = entry(copied), tmp_path / "elsewhere"
-    other.mkdir(mode=0o700)
-    write_sealed(other / kernel.name, kernel.read_bytes()[SECRET_BYTES:])
-    shutil.copy(other / kernel.name, kernel)
-    assert built(copied)
-    write_sealed(kernel.with_name("other.kernel"), b"of the same secret")
-    kernel.with_name("other.kernel").replace(kernel)
-    assert built(copied)
-    assert not built(copied)
+    with pytest.raises(PermissionError):
+        private.read_private(file)
 
 
 @posix
-def test_a_secret_that_others_could_read_is_a_secret_no_more(copied: Path) -> None:
-    secret = copied / "kernels" / SECRET_FILE
-    before = secret.read_bytes()
-    secret.chmod(0o644)
-    assert built(copied)
-    assert mode(secret) == 0o600
-    assert secret.read_bytes() != before
+@pytest.mark.parametrize("name", [".", "kernels"])
+def test_nothing_is_loaded_once_a_folder_on_the_way_is_open_to_others(copied: Path, name: str) -> None:
+    """Owner and mode are checked at every load; the folder of code itself is closed again."""
+    (request,) = (copied / "kernels").glob("*.request")
+    assert cache._read(request) is not None
+    (copied / name).chmod(0o777)
+    assert (cache._read(request) is None) == (name == ".")
+    assert mode(copied / "kernels") == 0o700

@@ -25,7 +25,7 @@ import friso
 from friso.cli.app import main
 from friso.design_method import controller, method
 from friso.design_method.geometry import Geometry, Sheet
-from friso.design_method.method import Design, Frictions, NoDesign
+from friso.design_method.method import Design, NoDesign
 from friso.design_method.population import Corners
 from friso.design_method.requirements import Relaxation
 from friso.design_method.settings import DesignSettings
@@ -45,7 +45,7 @@ from friso.questions.design.steps import (
     steps,
 )
 from friso.questions.design.window import lower, stiffest, upper
-from friso.questions.design.words import brings, edge, headline, hertz, refusal, settling
+from friso.questions.design.words import brings, edge, hertz, refusal, settling, verdicts
 from friso.shown import files
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.figure import Figure
@@ -105,7 +105,7 @@ def finished(designed: Design) -> Iterator[list[str]]:
     """Let the command find this design; record what it reports of its progress."""
     labels: list[str] = []
 
-    def design(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
+    def design(stage: Stage, spec: Spec, progress: Progress, anyway: bool) -> Design:
         progress(0, 1, "leaf springs")
         labels.append(stage.name)
         return designed
@@ -156,7 +156,7 @@ def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
 def no_design(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the command find no design, and what to relax."""
 
-    def fail(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
+    def fail(stage: Stage, spec: Spec, progress: Progress, anyway: bool) -> Design:
         raise NoDesign("no leaf springs meet the specification", RELAXED)
 
     monkeypatch.setattr(method, "design", fail)
@@ -232,13 +232,11 @@ def test_the_document_has_the_agreed_keys(
 def test_what_is_not_finite_is_null(designed: Design) -> None:
     never = replace(designed.verification.free, settling=np.full(64, np.nan), words=np.full(64, "swings"))
     nowhere = replace(designed.without, edges=np.zeros(designed.without.population.count), unknown=1)
-    document = design_document(replace(verified(designed, free=never), without=nowhere, lost={"dahl": [1, 2]}))
+    document = design_document(replace(verified(designed, free=never), without=nowhere))
     json.dumps(document, allow_nan=False)
     assert document["verification"]["settling_95_s"] is None
     assert (document["without"]["highest_edge_hz"], document["without"]["unknown_corners"]) == (None, 1)
     assert document["verification"]["settling_time_met"] is False
-    assert document["friction_laws_lost_in_corners"] == {"dahl": [1, 2]}
-    assert "dahl" in headline(replace(designed, lost={"dahl": [1, 2]}))[-1][1]
 
 
 # ---------------------------------------------------------------- words
@@ -254,7 +252,7 @@ def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snaps
 
 
 def test_an_isolator_that_is_not_needed_is_weighed(designed: Design, snapshots: Snapshots) -> None:
-    (_, first), *_ = headline(designed)
+    (_, first), *_ = verdicts(designed)
     step = isolator_step(designed)
     text = step.sentences
     assert "0.3 to 0.85 N" in dict(step.facts).values()
@@ -263,7 +261,7 @@ def test_an_isolator_that_is_not_needed_is_weighed(designed: Design, snapshots: 
 
 def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapshots) -> None:
     needed = replace(designed, without=replace(designed.without, edges=np.full(len(designed.without.edges), 60.0)))
-    (_, first), *_ = headline(needed)
+    (_, first), *_ = verdicts(needed)
     assert lacking(first, "72.0 Hz", "1.2 times", "48.0 Hz") == []
     step = isolator_step(needed)
     assert len(step.sentences) < len(isolator_step(designed).sentences)  # nothing to compare it with
@@ -343,7 +341,7 @@ def test_moves_that_swing_or_take_too_long(designed: Design, snapshots: Snapshot
     step = moves_step(other)
     assert lacking(step.title, "64 moves", "2 do not", "1 swing", "1 creep") == []
     assert lacking(" ".join(step.sentences), "95 %", "1.00 s", "Not met", "1 mm") == []
-    snapshots.check("design", "moves that swing", "\n".join([*step.sentences, headline(other)[-1][1]]))
+    snapshots.check("design", "moves that swing", "\n".join([*step.sentences, verdicts(other)[-1][1]]))
     lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
     assert "4 moves" in " ".join(moves_step(verified(designed, free=lost)).sentences)
 
@@ -353,7 +351,7 @@ def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapsh
     other = verified(designed, locked=locked)
     text = " ".join(moves_step(other).sentences)
     assert lacking(text, "3.00 s", "95 %", "Of 64", "20 do not") == []
-    snapshots.check("design", "moves of a locked joint", "\n".join([text, headline(other)[-1][1]]))
+    snapshots.check("design", "moves of a locked joint", "\n".join([text, verdicts(other)[-1][1]]))
     never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))
     assert not re.search(r"\d", settling(never))
     assert "never" in brings(verified(designed, locked=never))
@@ -369,7 +367,7 @@ def test_the_page_stands_alone_and_shows_all(designed: Design, folder: Path) -> 
     assert page.tags.count("svg") >= 1
     for step in steps(designed):
         assert all(sentence in page.text for sentence in (step.title, *step.sentences))
-    for _, sentence in headline(designed):
+    for _, sentence in verdicts(designed):
         assert sentence in page.text
     for words in ("Requirements", "safety.parasitic", "worst.toml", "Scale", "[flexure]", designed.spec.name):
         assert words in page.text
@@ -486,7 +484,7 @@ def test_overrides_are_of_the_stage(finished: list[str], folder: Path, quick: No
 def test_exit_status(
     arguments: tuple, status: int, message: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any
 ) -> None:
-    def interrupt(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
+    def interrupt(stage: Stage, spec: Spec, progress: Progress, anyway: bool) -> Design:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(method, "design", interrupt)
@@ -508,7 +506,7 @@ def test_a_specification_that_is_not_met_is_told(
     """What exists is written all the same; the status is 2, and the message says what would be met."""
     hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]
     less = replace(designed, spec=designed.spec.model_copy(update={"position": hurried}))
-    monkeypatch.setattr(method, "design", lambda stage, spec, progress, laws, anyway: less)
+    monkeypatch.setattr(method, "design", lambda stage, spec, progress, anyway: less)
     with pytest.raises(typer.Exit) as left:
         command(RIG, spec, out=folder, as_json=True)
     assert left.value.exit_code == 2

@@ -13,10 +13,9 @@ from variants import VARIANTS, gains, lugre, release, stage
 from friso.hunting import AttractionEnd, BandwidthWindow
 from friso.questions.check.laws import laws_document, laws_rows, laws_sentences
 from friso.shown.drawing.prefixes import NOTHING
-from friso.stage import violations
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert
-from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, frictions_that_keep, verdicts_by_law
+from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, verdicts_by_law
 
 RIGID = VARIANTS["rigid"]
 PD = stage(release(), friction=lugre(2), controller=gains(kp=1000, kd=20, tau=1e-3))
@@ -188,32 +187,6 @@ def test_edges_as_factors_that_look_the_same_are_one_number() -> None:
 
 OTHERS = ("dwell", "elasto_plastic", "gms", "load_dependent", "rolling")
 """Laws that keep what is measured under LuGre."""
-
-
-def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
-    """A law's open parameters are adapted to each machine's friction.
-
-    Bristles that hold 1 N elastically would be too strong for 0.15 N.
-    """
-    machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((3.0, 1.0), (1.0, 0.15))]
-    frictions = frictions_that_keep(machines).frictions
-    assert {name.split(",")[0] for name in frictions} == {*OTHERS}
-    for friction in frictions.values():
-        assert not violations({**RIGID.flat(), **friction})
-        assert friction["friction.static"] == pytest.approx([3.0, 1.0])
-    most = frictions["elasto_plastic, most breakaway_deflection"]["friction.breakaway_deflection"]
-    assert most[1] < most[0]
-
-
-def test_ends_that_only_some_machines_have_are_tried_and_laws_that_only_some_lose_are_named() -> None:
-    """Hardly any Coulomb friction leaves the bristles nothing to hold; dahl has no friction that falls."""
-    machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((1.0, 1e-3), (3.0, 3.0))]
-    laws = frictions_that_keep(machines)
-    assert laws.lost == {"dahl": [0]}
-    names = ("elasto_plastic", "elasto_plastic, most breakaway_deflection")
-    least, most = (laws.frictions[name]["friction.breakaway_deflection"] for name in names)
-    assert most[0] == least[0]
-    assert most[1] > least[1]
 
 
 def test_nothing_hunts_without_an_integrator() -> None:

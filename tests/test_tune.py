@@ -832,9 +832,7 @@ REFUSED: list[tuple[str | None, Callable[[Stage], object]]] = [
 
 
 @pytest.mark.parametrize(("key", "asked"), REFUSED)
-def test_what_cannot_be_searched_is_refused(
-    rigid: Stage, key: str | None, asked: Callable[[Stage], object]
-) -> None:
+def test_what_cannot_be_searched_is_refused(rigid: Stage, key: str | None, asked: Callable[[Stage], object]) -> None:
     with refused(key):
         asked(rigid)
 

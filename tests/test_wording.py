@@ -40,7 +40,7 @@ MISTAKES = {
     "doctor": ("--full-path",),
     "example": ("thesis",),
     "schema": ("--of", "design"),
-    "app": ("--host", "0.0.0.0", "--insecure", "--no-browser"),
+    "app": ("missing.toml", "--no-browser"),
 }
 
 RUNS = {

@@ -113,15 +113,9 @@ class Access:
         return _same(proof, hmac.new(self.secret.encode(), self.challenge.encode(), "sha256").hexdigest())
 
     @classmethod
-    def at(cls, host: str, port: int, store: Path | None = None) -> Access:
-        """Return the access to a server at a host and port, whose secret is kept in the file `store`.
-
-        A host such as localhost, which means this machine alone, may also be called by its other names, such as
-        127.0.0.1.
-        """
-        named = (f"[{host}]" if ":" in host else host).lower()
-        names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
-        hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP_PORT else set())
+    def at(cls, port: int, store: Path | None = None) -> Access:
+        """Return the access to a server at a port of this machine, whose secret is kept in the file `store`."""
+        hosts = {f"{name}:{port}" for name in LOOPBACK} | (LOOPBACK if port == HTTP_PORT else set())
         return cls(frozenset(hosts), store=store)
 
     def token_for_once(self) -> str:
@@ -172,8 +166,8 @@ class Access:
 HTTP_PORT = 80
 """Port that browsers leave out of addresses."""
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-"""Names of this machine that no other machine can reach."""
+LOOPBACK = {"127.0.0.1", "localhost"}
+"""Names under which this machine alone reaches the server."""
 
 
 class Gate:

@@ -17,7 +17,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from friso.app.connections import MOST_CONNECTIONS, Connection, Once, failed
-from friso.app.gate import LOOPBACK, Access
+from friso.app.gate import Access
 from friso.app.server import application
 from friso.app.work import Workshop
 from friso.engine.cache import cache_folder
@@ -26,6 +26,9 @@ from friso.interface.starting import example
 from friso.platform.early import SIGNALS
 from friso.stage.files import load
 from friso.stage.tables_of_files import text_of
+
+ADDRESS = "127.0.0.1"
+"""Address of the server: that of this machine for itself."""
 
 DEFAULT_PORT = 8741
 """Default port. Browsers keep the contents of a page by its port."""
@@ -41,26 +44,19 @@ FURTHER_PORTS = 20
 """Number of further ports that are tried if the default is taken."""
 
 
-def serve(stage: Path | None, host: str, port: int | None, insecure: bool, browser: bool) -> None:
+def serve(stage: Path | None, port: int | None, browser: bool) -> None:
     """Print the address of the page and serve it until interrupted.
 
     The page begins with the file `stage`, or with an example. With `browser`, the address is also opened. Raises
-    InputError for a stage file that cannot be read, or if no port is free. A host that others can reach is refused
-    unless `insecure` is set.
+    InputError for a stage file that cannot be read, or if no port is free.
     """
     file = example("thesis_rig") if stage is None else stage
     load(file)
     begin = {"name": file.name, "text": text_of(file, "a stage file"), "asked": stage is not None}
-    if host not in LOOPBACK and not insecure:
-        expected = "127.0.0.1, or --insecure: anyone who can read the traffic sees everything and can use this machine"
-        raise InputError("--host", host, expected, "--host 127.0.0.1")
-    if host in ("0.0.0.0", "::"):
-        raise InputError("--host", host, "the name or address by which others reach this machine", "--host rig.local")
-    listener = listening(host, port)
+    listener = listening(port)
     own = listener.getsockname()[1]
-    access = Access.at(host, own, cache_folder() / f"app-{own}.secret")
-    named = f"[{host}]" if ":" in host else host
-    address = f"http://{named}:{own}/?token="
+    access = Access.at(own, cache_folder() / f"app-{own}.secret")
+    address = f"http://{ADDRESS}:{own}/?token="
     print(f"friso app: {address}{access.token}\nCtrl-C ends it.", flush=True)
     if browser:
         webbrowser.open(f"{address}{access.token_for_once()}")
@@ -139,26 +135,25 @@ class Server(uvicorn.Server):
                 logging.getLogger(name).removeFilter(self.once)
 
 
-def listening(host: str, port: int | None) -> socket.socket:
-    """Return a socket that listens at a free port of the host.
+def listening(port: int | None) -> socket.socket:
+    """Return a socket that listens at a free port of this machine, which no other machine reaches.
 
     The port is the one asked for; without one, the first free port from the usual one on. Raises InputError if none is
     free.
     """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     wanted = [port] if port is not None else [*range(DEFAULT_PORT, DEFAULT_PORT + FURTHER_PORTS)]
     problem = ""
     for number in wanted:
-        listener = socket.socket(family)
+        listener = socket.socket(socket.AF_INET)
         try:
             if os.name == "posix":  # otherwise the port stays taken for a minute after a server has ended
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listener.bind((host, number))
+            listener.bind((ADDRESS, number))
             listener.listen()
             return listener
         except OSError as error:
             problem = str(error.strerror or error).lower()
             listener.close()
     raise InputError(
-        "--port", f"{wanted[0]} on {host}: {problem}", "a port that is free", f"--port {DEFAULT_PORT + FURTHER_PORTS}"
+        "--port", f"{wanted[0]}: {problem}", "a port that is free", f"--port {DEFAULT_PORT + FURTHER_PORTS}"
     )

@@ -5,7 +5,7 @@ The method is that of the thesis, Sec. 3.4.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -23,13 +23,10 @@ from friso.design_method.controller import (
 )
 from friso.design_method.population import (
     Corners,
-    OtherLaws,
     Population,
     corners,
     edges_over,
     rigid,
-    under_law,
-    worst_edges,
 )
 from friso.design_method.prepare import by_rules, prepared, with_leaves
 from friso.design_method.requirements import LeafTask, Relaxation, relaxed_requirements
@@ -43,14 +40,6 @@ from friso.frequency.crossover import Range
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
-
-Frictions = Callable[[Sequence[Stage]], OtherLaws]
-"""Function that returns the friction of stages, which differ in its numbers, under other laws."""
-
-
-def own_law(stages: Sequence[Stage]) -> OtherLaws:
-    """Return no other friction laws, so that each stage is tried under its own law alone."""
-    return OtherLaws()
 
 
 @dataclass(frozen=True)
@@ -117,9 +106,7 @@ class Design:
     leaf springs and crossover chosen. `controller` has the margins, `map` shows hunting over crossover and stroke, and
     `verification` the simulated moves. `stage` is the design as a stage.
 
-    `damped` is the joint damping with which the crossover could be `faster` [Hz], if margins limit it. `by_law` holds
-    the edges without and with isolator under each friction law; `without` and `edges` are the worst. `lost` names laws
-    that were not tried, with the indices of the corners whose friction they cannot match.
+    `damped` is the joint damping with which the crossover could be `faster` [Hz], if margins limit it.
     """
 
     spec: Spec
@@ -134,8 +121,6 @@ class Design:
     verification: Verification
     damped: Relaxation | None
     faster: float
-    by_law: Mapping[str, tuple[Corners, Corners]]
-    lost: Mapping[str, Sequence[int]]
 
     @property
     def stage(self) -> Stage:
@@ -218,24 +203,22 @@ class NotNeeded(Exception):
         self.so_far = so_far
 
 
-def design(
-    stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law, anyway: bool = True
-) -> Design:
+def design(stage: Stage, spec: Spec, progress: Progress = silent, anyway: bool = True) -> Design:
     """Design leaf springs, stroke and controller of an isolator.
 
-    Edges of hunting are the worst over the stage's own friction and other `laws`. Raises InputError for unusable input,
-    NoDesign if nothing meets the specification, and DesignInterrupted at Ctrl-C. Raises NotNeeded if no isolator is
-    needed, unless one is wanted `anyway`.
+    Raises InputError for unusable input, NoDesign if nothing meets the specification, and DesignInterrupted at Ctrl-C.
+    Raises NotNeeded if no isolator is needed, unless one is wanted `anyway`.
     """
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
     friction = float(np.min(least_breakaway(population.over(flat))))
     if friction <= 0:
         raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
-    others = laws([base.with_numbers(_friction_of(population, n)) for n in range(population.count)])
-    over = partial(
-        _by_law, laws={flat["friction.model"]: {}, **others.frictions}, population=population, progress=progress
-    )
+
+    def over(there: dict[str, float], highest: float, above: float, label: str) -> Corners:
+        """Return the edges of hunting at each corner, between fractions of the crossover `highest` [Hz]."""
+        low, high = settings.lowest_edge * highest, above * highest
+        return edges_over(there, population, low, high, settings.edge_steps, progress, label)
 
     def fitted() -> tuple[LeavesAndCrossover, list[Candidate]] | NoDesign:
         try:
@@ -245,10 +228,8 @@ def design(
             return failure
 
     label = "hunting without isolator"
-    without, outcome = both(
-        partial(over, rigid(flat), settings.lowest_edge * limit, settings.highest_edge * limit, label), fitted
-    )
-    need = Need(worst_edges(without), spec, by_rules(stage).flat()[CROSSOVER])
+    without, outcome = both(partial(over, rigid(flat), limit, settings.highest_edge, label), fitted)
+    need = Need(without, spec, by_rules(stage).flat()[CROSSOVER])
     if isinstance(outcome, NoDesign):
         raise outcome.of(need)
     fit, candidates = outcome
@@ -264,11 +245,9 @@ def design(
 
     label, edges = "hunting with isolator", None
     try:
-        isolated, (by_beams, control, edges_map) = both(
-            partial(over, worst, settings.lowest_edge * crossover, settings.above_crossover * crossover, label),
-            examined,
+        edges, (by_beams, control, edges_map) = both(
+            partial(over, worst, crossover, settings.above_crossover, label), examined
         )
-        edges = worst_edges(isolated)
         _does_not_hunt(fit, edges, need)
         softening = fit.task.load / fit.choice.beams.buckling
         tried, (damped, faster) = both(
@@ -277,34 +256,7 @@ def design(
     except KeyboardInterrupt:
         raise DesignInterrupted(UnfinishedDesign(spec, stage, need, fit, edges)) from None
     results = (need.without, tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
-    return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without}, others.lost)
-
-
-def _friction_of(population: Population, number: int) -> dict[str, float]:
-    """Return the friction keys of one machine that differ from the stage's."""
-    return {key: value for key, value in population.of(number).items() if key.startswith("friction.")}
-
-
-def _by_law(
-    flat: Mapping[str, Any],
-    low: float,
-    high: float,
-    label: str,
-    laws: Mapping[str, Mapping[str, Any]],
-    population: Population,
-    progress: Progress,
-) -> dict[str, Corners]:
-    """Return the edges of hunting of a stage at each corner, by friction law.
-
-    Crossovers from `low` to `high` [Hz] are searched.
-    """
-    edges = {}
-    for law, friction in laws.items():
-        there = under_law(flat, friction) if friction else flat
-        edges[law] = edges_over(
-            there, population, low, high, settings.edge_steps, progress, f"{label}, {law}" if friction else label
-        )
-    return edges
+    return Design(spec, stage, *results)
 
 
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:

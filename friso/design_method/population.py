@@ -7,8 +7,8 @@ all its moves afterwards.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -228,33 +228,6 @@ def edges_over(
             survey(highest, (inside[highest] + outside[highest]) / 2)
     edges = np.where(np.isneginf(inside), 0.0, np.exp((inside + outside) / 2))
     return Corners(population, edges, (low, high), int(unsure.any(axis=0).sum()))
-
-
-def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
-    """Return at each corner of friction and masses the highest edge of hunting of all laws.
-
-    All friction laws must have been searched over the same corners and range.
-    """
-    several = [*by_law.values()]
-    edges = np.max([corners.edges for corners in several], axis=0)
-    return replace(several[0], edges=edges, unknown=sum(corners.unknown for corners in several))
-
-
-@dataclass(frozen=True)
-class OtherLaws:
-    """The friction of some stages under other laws: keys [SI] by the name of the law.
-
-    Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that cannot match the measured
-    friction of some stages, each with their indices.
-    """
-
-    frictions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    lost: Mapping[str, Sequence[int]] = field(default_factory=dict)
-
-
-def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage's keys with all friction keys replaced by those of another law."""
-    return {**{key: value for key, value in flat.items() if not key.startswith("friction.")}, **friction}
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind

@@ -1,8 +1,7 @@
 """Store compiled code on disk, private to the user.
 
-An entry is a file with machine code and its module. Only code that this user alone can have written (`private.py`) and
-that bears friso's seal (`seal.py`) is loaded; anything else is built anew. Locks separate processes that build at the
-same time.
+An entry is a file with machine code and its module. Only code that this user alone can have written is loaded
+(`private.py`); anything else, and a damaged file, is built anew. Locks separate processes that build at the same time.
 
 An entry is named after the generated source, the compiler and the processor; a request, named after the task and
 friso's own sources, gives the name of its entry. So a start of an unchanged friso generates nothing, and a change of
@@ -20,6 +19,7 @@ import os
 import re
 import sys
 import time
+import zlib
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -37,9 +37,8 @@ from filelock import FileLock
 from platformdirs import user_cache_dir
 
 from friso.engine.processor import processor
-from friso.engine.seal import read_sealed, write_sealed
 from friso.platform.leftovers import locked_folder, temporary_folder
-from friso.platform.private import make_private
+from friso.platform.private import make_private, read_private, write_private
 from friso.platform.system import cause_of, path_of, remove_folder
 from friso.version import VERSION
 
@@ -190,12 +189,12 @@ class CodeRequest:
 
     def answer(self, name: str) -> None:
         """Store the name of the cache entry that fulfils the request."""
-        write_sealed(self.file, name.encode("ascii"))
+        _write(self.file, name.encode("ascii"))
 
     def entry(self) -> Compiled | None:
         """Return the cache entry, or None if it is missing or damaged, and record its use."""
         file = self.file
-        name = (read_sealed(file) or b"").decode("ascii")
+        name = (_read(file) or b"").decode("ascii")
         if not re.fullmatch("[0-9a-f]{24}", name):
             return None
         stored = _stored(file.parent / f"{name}{ENTRY}")
@@ -216,8 +215,31 @@ def _note_use(*files: Path) -> None:
 
 def _stored(file: Path) -> Compiled | None:
     """Return the entry in a file; None for one that friso did not write."""
-    content = read_sealed(file)
+    content = _read(file)
     return None if content is None else Compiled(file.stem, *marshal.loads(content))
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a file for this user alone, with a check sum before its content."""
+    write_private(path, _check_sum(content) + content)
+
+
+def _read(path: Path) -> bytes | None:
+    """Return the content of a file; None if it is missing or damaged, or another user can have written it."""
+    try:
+        make_private(path.parent)  # a folder on the way may have been opened since
+        kept = read_private(path)
+    except OSError:
+        return None
+    content = kept[_CHECK_SUM_BYTES:]
+    return content if kept == _check_sum(content) + content else None
+
+
+def _check_sum(content: bytes) -> bytes:
+    return zlib.crc32(content).to_bytes(_CHECK_SUM_BYTES, "little")
+
+
+_CHECK_SUM_BYTES = 4
 
 
 def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> str:
@@ -231,7 +253,7 @@ def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> s
         if _stored(file) is None:
             compiled = compile(source, _file_name(name), "exec")
             code = code_of(_module(name, source, compiled))
-            write_sealed(file, marshal.dumps((source, marshal.dumps(compiled), code)))
+            _write(file, marshal.dumps((source, marshal.dumps(compiled), code)))
     return name
 
 

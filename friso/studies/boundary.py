@@ -6,7 +6,7 @@ The numbers are the points of branches and curves, and the verdicts at stages be
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -28,7 +28,6 @@ from friso.hunting import (
     Diagram,
     KeyRange,
     LocatedPoint,
-    Meeting,
     Plane,
     Space,
     cannot_hunt,
@@ -427,8 +426,8 @@ def _crossings(result: Plane, along: int, value: float) -> list[float]:
     return crossings
 
 
-EndKind = Literal["range", "closed", "meets", "lost"]
-"""How a curve ends: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
+EndKind = Literal["range", "closed", "lost"]
+"""How a curve ends: at the end of the range, as a ring, or where its cycle was lost."""
 
 
 class CurveEnd(NamedTuple):
@@ -441,25 +440,12 @@ class CurveEnd(NamedTuple):
 
 def curve_ends(result: Plane) -> list[CurveEnd]:
     """List both ends of every curve of a plane, in the order of the curves."""
-    on_another = [(meeting.curves[0], meeting.places[0]) for meeting in result.meetings if meeting.kind == "end"]
     ends = []
     for number, curve in enumerate(result.curves):
         for spot, how in zip((curve.spots[0], curve.spots[-1]), curve.ends, strict=True):
-            on = any(number == other and np.array_equal(spot.at, place) for other, place in on_another)
             kinds: dict[str, EndKind] = {END_OF_RANGE: "range", CLOSED: "closed"}
-            kind = kinds.get(how, "meets" if on else "lost")
-            ends.append(CurveEnd(number, _values(result.space, spot.at[None])[0], kind))
+            ends.append(CurveEnd(number, _values(result.space, spot.at[None])[0], kinds.get(how, "lost")))
     return ends
-
-
-def curve_meetings(result: Plane) -> list[Meeting]:
-    """Return where curves of a plane meet, with positions and errors as key values [SI]."""
-    meetings = []
-    for meeting in result.meetings:
-        places = _values(result.space, meeting.places)
-        error = np.abs(_values(result.space, meeting.places[:1] + meeting.error) - places[:1])[0]
-        meetings.append(replace(meeting, places=places, error=error))
-    return meetings
 
 
 def lost_places(result: Plane) -> np.ndarray:

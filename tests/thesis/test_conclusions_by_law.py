@@ -1,8 +1,5 @@
 """The thesis's conclusions and a design's edges under several friction laws: what of each counts."""
 
-import numpy as np
-
-from friso.design_method.population import Corners, Population, under_law, worst_edges
 from friso_thesis.questions.reproduce.words import laws_document, laws_rows
 from friso_thesis.studies.thesis.claims import Finding, Part, claims
 from friso_thesis.studies.thesis.laws import ConclusionByLaw, ConclusionsByLaw
@@ -30,15 +27,3 @@ def test_a_conclusion_survives_the_laws_under_which_the_same_parts_hold() -> Non
     document = laws_document(by_law)
     assert [row["turned"] for row in document["conclusions"]] == [{}, {"gms": ["number 0", "number 1"]}]
     assert len(laws_rows(by_law)) == 2
-
-
-def test_the_edge_of_a_corner_is_the_highest_under_any_law() -> None:
-    population = Population({}, 3)
-    corners = [Corners(population, np.array(edges), (1.0, 9.0), 1) for edges in ((0.0, 3.0, 5.0), (2.0, 2.5, np.inf))]
-    worst = worst_edges(dict(zip(("lugre", "gms"), corners, strict=True)))
-    assert worst.edges.tolist() == [2.0, 3.0, np.inf]
-    assert worst.unknown == 2
-    assert under_law({"friction.model": "lugre", "friction.x": 1.0, "masses.cart": 2.0}, {"friction.model": "gms"}) == {
-        "friction.model": "gms",
-        "masses.cart": 2.0,
-    }

@@ -11,20 +11,10 @@ from friso.cli.command import Command
 from friso.interface.question import HUNTS
 
 BeginArgument = Annotated[Path | None, typer.Argument(metavar="STAGE.toml", help="The stage file to start with.")]
-Host = Annotated[
-    str,
-    typer.Option("--host", metavar="NAME", help="Address to listen on; any but this machine's own needs --insecure."),
-]
 Port = Annotated[
     int | None,
     typer.Option(
         "--port", metavar="N", min=0, max=65535, help="Port to listen on; default: 8741, or the next free one."
-    ),
-]
-Insecure = Annotated[
-    bool,
-    typer.Option(
-        "--insecure", help="Let others connect, unencrypted: anyone who reads the traffic can use this machine."
     ),
 ]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open the browser.")]
@@ -32,9 +22,7 @@ Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether t
 
 def app(
     stage_file: BeginArgument = None,
-    host: Host = "127.0.0.1",
     port: Port = None,
-    insecure: Insecure = False,
     browser: Browser = True,
 ) -> None:
     """Everything live in the browser, served to this machine alone: drag a value and see whether it hunts.
@@ -43,7 +31,7 @@ def app(
     """
     from friso.app.serve import serve
 
-    serve(stage_file, host, port, insecure, browser)
+    serve(stage_file, port, browser)
 
 
 COMMAND = Command(app, 22, HUNTS)

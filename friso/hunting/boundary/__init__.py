@@ -2,7 +2,6 @@
 
 from friso.hunting.boundary.curve import CLOSED, Curve, Spot
 from friso.hunting.boundary.diagram import Diagram, diagram
-from friso.hunting.boundary.meetings import Meeting
 from friso.hunting.boundary.plane import Plane, edge_curves, plane
 from friso.hunting.boundary.space import KeyRange, Space
 from friso.hunting.continuation.branch import END_OF_RANGE, Branch, Point
@@ -17,7 +16,6 @@ __all__ = [
     "Diagram",
     "KeyRange",
     "LocatedPoint",
-    "Meeting",
     "Plane",
     "Point",
     "Space",

@@ -12,7 +12,6 @@ import numpy as np
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
-from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
 from friso.hunting.boundary.space import Space
 from friso.hunting.continuation.branch import Point, Tracer
 from friso.hunting.continuation.locate import changes, located
@@ -35,7 +34,7 @@ CURVES = "following the edge of hunting"
 class Plane:
     """Edges of hunting in the box of two keys.
 
-    - `curves`: the edges, and `meetings`: where they meet.
+    - `curves`: the edges.
     - `nodes`: stages along each side of the grid; `allowed`: numbers of the valid ones in C order, the first key along
       the first side.
     - `cycles`: hunting cycles of the allowed stages; `attracts`: whether they have an attractor; `decided`: whether
@@ -54,7 +53,6 @@ class Plane:
     decided: np.ndarray
     unstable: np.ndarray
     gaps: tuple[np.ndarray, ...]
-    meetings: tuple[Meeting, ...] = ()
     last_ends: tuple[LastEnd, ...] = ()
 
 
@@ -137,9 +135,8 @@ def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, prog
             gaps.append(middle)
     last_ends = _last_ends(space, curves, [(points[a], points[b]) for a, b in ends], rtol)
     unstable = np.any([*unstable_among(stages).values()], axis=0)
-    meetings = find_meetings(space, curves, rtol)
     columns = space, curves, grid.nodes, grid.allowed, hunting, attracts, decided, unstable
-    return Plane(*columns, tuple(gaps), meetings, last_ends)
+    return Plane(*columns, tuple(gaps), last_ends)
 
 
 def _followed(
@@ -353,3 +350,13 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
         return None, tracer.reaches(points, reason)
     special = located(tracer, last, point, "fold" if "fold" in kinds else kinds[0])
     return (Spot(start + special.point.place * across, special, across) if special else None), False
+
+
+def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return where on each leg of a path the point nearest to `at`, shape (2,), lies.
+
+    The legs are the straight pieces between the points of the path, (n, 2). The results, (n - 1,), run from 0 at the
+    start of a leg to 1 at its end.
+    """
+    legs = np.diff(path, axis=0)
+    return np.clip(((at - path[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.hunting import Diagram, Meeting, Plane
+from friso.hunting import Diagram, Plane
 from friso.questions.boundary.words import ShownKey, answer, conclusion, details
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
@@ -117,7 +117,7 @@ def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
 
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
-    """Return the curves in the plane of two keys, how they end and meet, and the corner verdicts."""
+    """Return the curves in the plane of two keys, how they end, and the corner verdicts."""
     x, y = keys
     verdicts = [verdict for _, _, verdict in boundary.corner_verdicts(traced)]
     return {
@@ -128,24 +128,12 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
             {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind}
             for end in boundary.curve_ends(traced)
         ],
-        "meetings": [_meeting(meeting, keys) for meeting in boundary.curve_meetings(traced)],
         "lost": _numbers(boundary.lost_places(traced), keys),
         "beyond_curves": [
             dict(zip(("hunts_at", "settles_at"), _numbers(end, keys), strict=True))
             for end in boundary.last_ends(traced)
         ],
         "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
-    }
-
-
-def _meeting(meeting: Meeting, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
-    """Return where and how two curves meet, and whether both are changes of one cycle."""
-    return {
-        "curves": meeting.curves,
-        "how": meeting.kind,
-        "places": _numbers(meeting.places, keys),
-        "error": _numbers(meeting.error[None], keys)[0],
-        "same_cycle": meeting.same_cycle,
     }
 
 

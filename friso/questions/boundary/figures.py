@@ -24,7 +24,7 @@ from friso.shown.drawing.figure import (
     Series,
     Symbol,
 )
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, LIGHT, VERMILLION
+from friso.shown.drawing.palette import BLUE, GREY, INK, LIGHT, VERMILLION
 from friso.studies import boundary
 from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line
 
@@ -168,13 +168,11 @@ def _plane(traced: Plane) -> Figure:
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
     note = " ".join([*meanings, BASIN] if basin else meanings)
     lost_ends = [end.at for end in boundary.curve_ends(traced) if end.kind == "lost"]
-    meetings = [place for meeting in boundary.curve_meetings(traced) for place in meeting.places]
     marks = (
         *_marks([*boundary.lost_places(traced), *lost_ends], LOST, GREY, "cross"),
-        *_marks(meetings, "", GREEN, "target"),
         *_marks([end.mean(axis=0) for end in boundary.last_ends(traced)], "", VERMILLION, "circle"),
     )
-    explained = {"target": "Green: curves meet.", "circle": "Red: hunting ends here, by another swing."}
+    explained = {"circle": "Red: hunting ends here, by another swing."}
     note = " ".join([note, *(explained[mark.symbol] for mark in marks if mark.symbol in explained)])
     return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, marks, clouds=(nodes,)),), note=note)
 

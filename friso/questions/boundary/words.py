@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Meeting, Plane, Space
+from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Plane, Space
 from friso.questions.map.words import friction_held
 from friso.shown.drawing.figure import Array
 from friso.shown.drawing.prefixes import listed, pretty, swing_with_unit, with_unit
@@ -95,7 +95,7 @@ END_DIGITS = 3
 
 
 MOST_SENTENCES = 3
-"""Largest number of sentences in the answer; figure and details have all curves and meetings."""
+"""Largest number of sentences in the answer; figure and details have all curves."""
 
 
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -215,31 +215,8 @@ def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int 
     return f"{name} from {start}, where {ENDS[first]}, to {stop}, where {ENDS[last]}"
 
 
-def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say for each meeting of two curves where they meet, and whether both change one cycle."""
-    return [_meeting(meeting, boundary.lines(traced), keys) for meeting in boundary.curve_meetings(traced)]
-
-
-def _meeting(meeting: Meeting, curves: Sequence[Line], keys: tuple[ShownKey, ...]) -> str:
-    """Describe one meeting of two curves: they cross, end on each other, or run together."""
-    names = [f"{curves[number].kinds[0]} of {CYCLES[curves[number].shape]}" for number in meeting.curves]
-    pair = f"A {names[0]} and a {names[1]}" if names[0] != names[1] else f"Two curves of a {names[0]}"
-    places, one = [_place(place, keys) for place in meeting.places.tolist()], "both are changes of one cycle"
-    about = "at" if np.isfinite(meeting.error).all() else "at about"
-    if meeting.curves[0] == meeting.curves[1]:
-        cycles = "one cycle does so twice" if meeting.same_cycle else "there two cycles of one stage change"
-        return f"A curve of a {names[0]} crosses itself {about} {places[0]}: {cycles}."
-    if meeting.kind == "together":
-        whole = "are one curve, followed from two places," if names[0] == names[1] else "run together"
-        return f"{pair} {whole} from {places[0]} to {places[1]}; {one}."
-    if meeting.kind == "end":
-        return f"{pair} meet near {places[0]}, where the first is not followed farther; {one}."
-    return f"{pair} cross {about} {places[0]}; {one if meeting.same_cycle else 'these are two cycles of one stage'}."
-
-
 ENDS = {
     "range": "the range ends",
-    "meets": "it meets another curve",
     "lost": "its cycle could not be followed farther",
 }
 """Ways in which a curve of the plane ends, in words."""
@@ -338,10 +315,9 @@ def end_sentence(traced: Diagram, key: ShownKey) -> str:
 
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Describe each curve in the plane of two keys, their meetings, and the corners."""
+    """Describe each curve in the plane of two keys, and the corners."""
     curves = boundary.lines(traced)
     text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
-    text += meeting_sentences(traced, keys) or (["No two of the curves meet."] if len(curves) > 1 else [])
     text += [
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]

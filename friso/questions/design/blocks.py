@@ -21,7 +21,7 @@ from friso.materials import materials
 from friso.questions.design.figures import design_figures
 from friso.questions.design.steps import requirement_rows, steps
 from friso.questions.design.window import lower, upper
-from friso.questions.design.words import need_words, of_laws, refusal, so_far, verdicts
+from friso.questions.design.words import need_words, refusal, so_far, verdicts
 from friso.questions.flexure.drawing import drawing_svg
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json, unit_suffix
@@ -42,9 +42,8 @@ def blocks(design: Design | UnfinishedDesign) -> list[AnswerBlock]:
     if isinstance(design, UnfinishedDesign):
         return [AnswerBlock(sentences=so_far(design), numbers=numbers)]
     colours, sentences = zip(*verdicts(design), strict=True)
-    laws = [sentence for _, sentence in of_laws(design)]
     titled = [f"{step.title}: {' '.join(step.sentences)}" for step in steps(design)]
-    details = [*laws, *(f"{number}. {text}" for number, text in enumerate(titled, 1))]
+    details = [f"{number}. {text}" for number, text in enumerate(titled, 1)]
     draw = partial(design_figures, design)
     return [AnswerBlock(sentences=sentences, colours=colours, details=details, draw=draw, numbers=numbers)]
 
@@ -53,7 +52,6 @@ def page_values(design: Design) -> dict[str, Any]:
     """Return the steps that the page shows, with the drawing and how much of each requirement is used."""
     return {
         "spec": design.spec,
-        "laws": of_laws(design),
         "steps": steps(design),
         "leaves": LEAVES_STEP,
         "drawing": Markup(_drawing(design)),
@@ -111,17 +109,7 @@ def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
         "controller": _controller(design),
         "verification": _verification(design),
     }
-    laws = {"friction_laws": _by_law(design)} if len(design.by_law) > 1 else {}
-    lost = {"friction_laws_lost_in_corners": design.lost} if design.lost else {}
-    return plain_json(document | laws | lost)
-
-
-def _by_law(design: Design) -> dict[str, Any]:
-    """Return the edges of hunting without and with the joint, for each friction law."""
-    return {
-        law: {"without_highest_edge_hz": without.highest, "joint_highest_edge_hz": isolated.highest}
-        for law, (without, isolated) in design.by_law.items()
-    }
+    return plain_json(document)
 
 
 def refused_document(stage: Stage, spec: str, failure: NoDesign) -> dict[str, Any]:

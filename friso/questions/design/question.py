@@ -63,7 +63,6 @@ def design(
     *,
     set: Changes = None,
     crossover: FrequencyLike | None = None,
-    laws: bool = False,
     anyway: bool = False,
     progress: Progress = silent,
 ) -> DesignAnswer:
@@ -75,8 +74,6 @@ def design(
         The specification: crossover limit, friction, moves, load, space, sheets; default: one made from the stage.
     crossover : str or float, optional
         Crossover that can be reached, "20 Hz", in place of the limit in the specification.
-    laws : bool
-        Take the worst edge of hunting over all friction laws that keep what is measured.
     anyway : bool
         Design and try the isolator even if none is needed.
 
@@ -111,12 +108,11 @@ def design(
         LOGGER.warning(
             "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"
         )
-    from friso.design_method.method import DesignInterrupted, NotNeeded, own_law
+    from friso.design_method.method import DesignInterrupted, NotNeeded
     from friso.design_method.method import design as designed
-    from friso.studies.laws.verdicts import frictions_that_keep
 
     try:
-        return DesignAnswer(designed(chosen, specification, progress, frictions_that_keep if laws else own_law, anyway))
+        return DesignAnswer(designed(chosen, specification, progress, anyway))
     except (DesignInterrupted, NotNeeded) as ended:
         return DesignAnswer(ended.so_far)
 

@@ -69,11 +69,6 @@ def isolator(fitted: LeavesAndCrossover, crossover: float) -> str:
     return f"{springs}; stroke {stroke} mm to each side, crossover {hertz(crossover)}"
 
 
-def headline(design: Design) -> list[tuple[str, str]]:
-    """Return the verdicts, and what friction laws change in them, each with its colour."""
-    return [*verdicts(design), *of_laws(design)]
-
-
 def verdicts(design: Design) -> list[tuple[str, str]]:
     """Return the verdicts with their colours: is an isolator needed, which one, do moves settle."""
     return [
@@ -85,35 +80,6 @@ def verdicts(design: Design) -> list[tuple[str, str]]:
         ),
         _verified(design),
     ]
-
-
-def of_laws(design: Design) -> list[tuple[str, str]]:
-    """Say with colours what friction laws change in the edges of hunting, and which were not tried."""
-    return [
-        *([(GREEN, across_laws(design))] if len(design.by_law) > 1 else []),
-        *([(ORANGE, lost_laws(design))] if design.lost else []),
-    ]
-
-
-def across_laws(design: Design) -> str:
-    """Say between which crossovers the edges of hunting lie, and under which friction laws."""
-    ends = []
-    for place, name in enumerate(("without isolator", "with it")):
-        edges = {law: corners[place].highest for law, corners in design.by_law.items()}
-        least, worst = min(edges, key=edges.__getitem__), max(edges, key=edges.__getitem__)
-        ends.append(f"{name} {hertz(edges[least])} ({least}) to {hertz(edges[worst])} ({worst})")
-    moves = f"the moves are simulated under {next(iter(design.by_law))}"
-    return f"Edges of hunting are the worst of {len(design.by_law)} friction laws: {'; '.join(ends)}; {moves}."
-
-
-def lost_laws(design: Design) -> str:
-    """Name the friction laws that were not tried, and corners whose friction they cannot match."""
-    corners, flat = design.without, design.stage.flat()
-    laws = "; ".join(
-        f"{law}, not in {len(where)} of {corners.population.count} corners (such as {corner(corners, flat, where[0])})"
-        for law, where in design.lost.items()
-    )
-    return f"Not tried, since they keep what is measured in some corners only: {laws}. Edges may be worse under them."
 
 
 def need_words(need: Need) -> str:

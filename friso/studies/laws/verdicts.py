@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from friso.design_method.population import OtherLaws
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
@@ -249,37 +247,6 @@ def kept_laws(stage: Stage) -> tuple[list[LawConversion], dict[str, tuple[Measur
         else:
             kept.append(conversion)
     return kept, left_out
-
-
-def frictions_that_keep(stages: Sequence[Stage]) -> OtherLaws:
-    """Return friction keys of stages under each other law that keeps their measured friction.
-
-    The stages differ only in numbers of their friction. The keys come with SI values, by a name of the law: as
-    converted and, if measurements leave keys open, also with all of these at the lower or at the upper end of their
-    ranges. A law that keeps the measured friction of some stages only is listed as lost, with the indices of the
-    others. Raises InputError for a stage whose law cannot say what would be measured.
-    """
-    kept = [{conversion.law: conversion for conversion in kept_laws(stage)[0][1:]} for stage in stages]
-    frictions, lost = {}, {}
-    for law in dict.fromkeys(law for conversions in kept for law in conversions):
-        if lacking := [number for number, conversions in enumerate(kept) if law not in conversions]:
-            lost[law] = lacking
-            continue
-        conversions = [conversions[law] for conversions in kept]
-        trials = [trials_left_open(conversion) for conversion in conversions]
-        for end in dict.fromkeys(end for trial in trials for end in trial):
-            drawn = [trial.get(end, {}) for trial in trials]
-            flats = [{**made.stage.flat(), **changes} for made, changes in zip(conversions, drawn, strict=True)]
-            opened = dict.fromkeys(key for changes in drawn for key in changes)
-            name = ", ".join([law, *(f"{end} {key.removeprefix('friction.')}" for key in opened)])
-            keys = [key for key in flats[0] if key.startswith("friction.")]
-            frictions[name] = {key: _together([flat[key] for flat in flats]) for key in keys}
-    return OtherLaws(frictions, lost)
-
-
-def _together(values: Sequence[Any]) -> Any:
-    """Return the value that all stages have in common, or an array if they differ."""
-    return values[0] if all(value == values[0] for value in values) else np.array(values)
 
 
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
