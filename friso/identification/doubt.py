@@ -107,7 +107,8 @@ class RecordCase:
 
     def modelled(self, log: Log, **options: Any) -> InverseModel:
         """Return the inverse model of a log changed for an effect, with further `options` of `inverse_model`."""
-        return inverse_model(log, self.inverse.bandwidth, False, self.cart_share, **options)
+        inverse = self.inverse
+        return inverse_model(log, inverse.bandwidth, False, self.cart_share, slowest=inverse.slowest, **options)
 
 
 @dataclass(frozen=True)

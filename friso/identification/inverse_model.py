@@ -4,6 +4,9 @@ The filtering follows Janot, Gautier, Brunot (EMPS benchmark, nonlinearbenchmark
 Gautier, Janot, Vandanjon 2013, doi:10.1109/TCST.2012.2185697: position through a Butterworth filter of order 4 forward
 and back, at five times the bandwidth of the motion, derivatives by central differences, and all columns and the force
 decimated to 2.5 times the bandwidth by another filter.
+
+At rest friction is any force, and bristles bend: such samples leave the force and all columns before they are
+decimated, which would spread that force over the rows beside them.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -22,9 +25,8 @@ from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.logs.checks import runs
 from friso.identification.logs.log import ROLES, Log
-from friso.identification.readings.common import cart, noise_of, turns_of
+from friso.identification.readings.common import noise_of, on_bearing, turns_of
 from friso.identification.settings import doubt_settings, identification_settings
 from friso.identification.spread import groups_of, spread_of
 
@@ -40,6 +42,7 @@ class InverseModel:
     `estimates` have intervals; `solution` has the fitted coefficients by name ("mass"; per direction "... forward" and
     "... backward"). The fit combines the `columns`, shape (rows, columns); `covariance` is that of their coefficients.
     `time` [s] and forces [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
+    Samples not faster than `slowest` [m/s] are left out.
     """
 
     estimates: tuple[Estimate, ...]
@@ -50,6 +53,7 @@ class InverseModel:
     measured: np.ndarray
     fitted: np.ndarray
     bandwidth: float
+    slowest: float
 
     @property
     def error(self) -> float:
@@ -187,6 +191,7 @@ def inverse_model(
     cart_share: float = 0.0,
     averaged: int = 1,
     extra: Mapping[str, np.ndarray] = NO_COLUMNS,
+    slowest: float | None = None,
 ) -> InverseModel:
     """Fit mass, viscous and Coulomb friction and offset to a log with position and force.
 
@@ -194,9 +199,13 @@ def inverse_model(
     difference of the Coulomb frictions looks alike. For a stage on a joint, `cart_share` is the fraction of the mass
     that moves with the measured cart, on which friction acts.
 
-    `bandwidth` [Hz] is the motion's, taken from the log by default. A log may vibrate beyond its moves, as a loop does
-    on the steps of an encoder: if the model is poor there, smaller bandwidths are tried. One counts if its model is not
-    poor, and its error half as large.
+    `bandwidth` [Hz] is the motion's, taken from the log by default. If the model is poor there, others are tried:
+    larger ones first, then smaller ones, as a log may vibrate beyond its moves (a loop does on the steps of an
+    encoder). One counts if its model is not poor, and its error half as large.
+
+    Samples not faster than `slowest` [m/s] are left out. By default it is the lowest of some shares of the highest
+    speed above which friction is that of sliding, as far as the error shows: with none of the others is it half as
+    large, or it is small.
 
     `averaged` is the number of samples over which the log's force is averaged; the columns are averaged alike. `extra`
     columns by name, shape (n,), are fitted as well, and their part is subtracted from the measured force. Raises
@@ -204,18 +213,18 @@ def inverse_model(
     """
     if bandwidth is None:
         return _within_its_moves(log, by_direction, cart_share, averaged, extra)
+    if slowest is None:
+        return _where_it_slides(log, bandwidth, by_direction, cart_share, averaged, extra)
     band = bandwidth
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
         actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
         raise InputError("--bandwidth", actual, expected, '--bandwidth "20 Hz"', log.name)
     beside = np.stack(list(extra.values()), axis=1) if extra else np.zeros((len(log.time), 0))
-    parts = [_rows(log, part, band, by_direction, cart_share, averaged, beside[part]) for part in log.segments]
-    time, columns, force, position = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    parts = [_rows(log, part, band, by_direction, cart_share, averaged, beside[part], slowest) for part in log.segments]
+    time, columns, forces, position = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    force = forces[:, 0]
     velocity = columns[:, 1] + columns[:, 3] if by_direction else columns[:, 1]
-    speed = np.abs(velocity)
-    slides = ~_rests(speed <= identification_settings.speed_share_of_sliding * speed.max(initial=0.0), time)
-    time, columns, force, position, velocity = (rows[slides] for rows in (time, columns, force, position, velocity))
     if len(force) < identification_settings.rows_of_an_inverse_model:
         actual = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
         least = f"at least {identification_settings.rows_of_an_inverse_model} in motion after decimation"
@@ -224,14 +233,14 @@ def inverse_model(
     both = all(directions(log["position"]))
     if not both and not by_direction:
         columns[:, 3] = 0.0  # motion in one direction only adds it to Coulomb friction
-    solution = np.linalg.lstsq(columns, force, rcond=None)[0]
+    solution, held = np.linalg.lstsq(columns, forces, rcond=None)[0].T
     fitted = columns @ solution
     names = _NAMES[by_direction]
     own = len(names)
     covariance = spread_of(columns, force - fitted, groups_of(position, velocity, columns[:, 0]))[:own, :own]
     estimates = tuple(
-        _estimate(name, unit_of(unit, log), value, variance if both or name != "coulomb" else np.inf)
-        for (name, unit), value, variance in zip(names, solution[:own], np.diag(covariance), strict=True)
+        _estimate(name, unit_of(unit, log), value, other, variance if both or name != "coulomb" else np.inf)
+        for (name, unit), value, other, variance in zip(names, solution[:own], held, np.diag(covariance), strict=False)
     )
     residual, size = np.linalg.norm(force - fitted), float(np.linalg.norm(force))
     power = float(force @ velocity)
@@ -244,15 +253,43 @@ def inverse_model(
     numbers = dict(zip((*(name for name, _ in names), *extra), map(float, solution), strict=True))
     explained = columns[:, own:] @ solution[own:]
     forces = force - explained, fitted - explained
-    return InverseModel(estimates, numbers, columns[:, :own], covariance, time, *forces, band)
+    return InverseModel(estimates, numbers, columns[:, :own], covariance, time, *forces, band, slowest)
+
+
+def _where_it_slides(
+    log: Log, band: float, by_direction: bool, cart_share: float, averaged: int, extra: Mapping[str, np.ndarray]
+) -> InverseModel:
+    """Fit an inverse model to the samples of a log in which friction is that of sliding.
+
+    Intervals hold those of clearly better models of faster samples: where friction falls with speed, no line through it
+    is right. Raises InputError as `inverse_model` does.
+    """
+    top = max(float(np.abs(_carried(log, part, band).velocity).max(initial=0.0)) for part in log.segments)
+    models, first = [], None
+    for share in identification_settings.speed_shares_of_sliding:
+        try:
+            models.append(inverse_model(log, band, by_direction, cart_share, averaged, extra, share * top))
+        except InputError as error:
+            first = first or error
+    if first is not None and all(model.estimate("mass").high < 0 for model in models):
+        raise first  # whatever samples count, the force has the wrong sign, or there are too few of them
+    better, fine = doubt_settings.error_share_of_a_clearly_better_model, doubt_settings.error_of_a_fine_model
+    enough = max(fine, min(model.error for model in models) / better)
+    chosen = next(model for model in models if model.error <= enough)
+    for model in models:
+        if model.slowest > chosen.slowest and model.error <= better * chosen.error:
+            pairs = zip(chosen.estimates, model.estimates, strict=True)
+            wider = (one.reaching(other.low, other.high) if other.determined else one for one, other in pairs)
+            chosen = replace(chosen, estimates=tuple(wider))
+    return chosen
 
 
 def _within_its_moves(
     log: Log, by_direction: bool, cart_share: float, averaged: int, extra: Mapping[str, np.ndarray]
 ) -> InverseModel:
-    """Fit an inverse model within the bandwidth of a log, or, if it is poor there, within a smaller one.
+    """Fit an inverse model within the bandwidth of a log, or, if it is poor there, within another one.
 
-    A smaller bandwidth counts if the error is half of the first or less. Raises InputError as `inverse_model` does.
+    Another bandwidth counts if the error is half of the first or less. Raises InputError as `inverse_model` does.
     """
     poor, band = doubt_settings.error_of_a_poor_model, bandwidth_of(log)
     first: InverseModel | InputError
@@ -261,7 +298,7 @@ def _within_its_moves(
     except InputError as error:  # vibration may be against the force, as of a negative mass
         first = error
     worse = first.error if isinstance(first, InverseModel) else 1.0
-    for part in identification_settings.bandwidths_within_vibration if worse > poor else ():
+    for part in identification_settings.bandwidths_of_a_poor_model if worse > poor else ():
         with suppress(InputError):
             model = inverse_model(log, part * band, by_direction, cart_share, averaged, extra)
             if model.error <= min(poor, worse / 2):
@@ -309,26 +346,19 @@ def unit_of(unit: str, log: Log) -> str:
     return re.sub(r"\bN\b", log.unit("force"), unit.replace("kg", "N*s^2/m"))
 
 
-def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
+def _estimate(name: str, unit: str, value: float, held: float, variance: float) -> Estimate:
     """Make an estimate from a coefficient and its variance.
 
-    The variance is infinite, and the value unknown, if the log lacks a direction.
+    The interval is wider by the distance to the value `held` for a force half a sample off. The variance is infinite,
+    and the value unknown, if the log lacks a direction.
     """
     if np.isfinite(variance):
-        return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
+        off = abs(float(held - value))
+        return replace(
+            Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD).widened(off), systematic=off
+        )
     why = "the motion is in one direction only, which does not separate it from the others"
     return Estimate.unknown(name, unit, METHOD, why)
-
-
-def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Mark the rows (rows,) in stretches of slow motion that last long enough to be left out.
-
-    `slow` marks slow rows, and `time` [s] has their instants.
-    """
-    rests = np.zeros(len(slow), bool)
-    for rest in runs(slow):
-        rests[rest] = np.ptp(time[rest]) >= identification_settings.time_of_a_left_out_rest
-    return rests
 
 
 _NAMES = {
@@ -344,22 +374,31 @@ _NAMES = {
 
 
 def _rows(
-    log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
+    log: Log,
+    part: slice,
+    band: float,
+    by_direction: bool,
+    cart_share: float,
+    averaged: int,
+    extra: np.ndarray,
+    slowest: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return filtered, decimated times, columns, forces and positions of a segment.
+    """Return filtered, decimated times, columns, forces and positions of a segment where it slides.
 
     `part` are its samples, and `band` [Hz] is the motion's bandwidth; the other arguments are those of `inverse_model`.
-    All results are empty for a segment too short to filter.
+    Forces, (rows, 2), are as logged, and half a sample later, as a force acts that is held up to the next sample. Which
+    came first in a sample, force or position, a log does not tell, and in brisk moves inertia half a sample off looks
+    like viscous friction. All results are empty for a segment too short to filter.
     """
     if part.stop - part.start < 2 * identification_settings.samples_of_an_edge:
-        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
+        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros((0, 2)), np.zeros(0)
     moved = moved_in(log, log["position"][part], band)
     v, a = moved.velocity, moved.acceleration
-    carried_position = cart(log) if cart_share else None
-    if carried_position is not None:
-        carried = moved_in(log, carried_position[part], band)
+    if cart_share:
+        carried = _carried(log, part, band)
         v, a = carried.velocity, cart_share * carried.acceleration + (1 - cart_share) * a
-    sign = np.sign(v)
+    cutoff = identification_settings.smoothing_bandwidths * band
+    force, sign = (smoothed(one, log.sample_time, cutoff) for one in (log["force"][part], np.sign(v)))
     if by_direction:
         forward, backward = (1 + sign) / 2, (1 - sign) / 2
         columns = np.stack([a, v * forward, sign * forward, v * backward, sign * backward], axis=1)
@@ -367,13 +406,21 @@ def _rows(
         columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
     if averaged > 1:
         columns = uniform_filter1d(columns, averaged, axis=0)
-    columns = np.hstack([columns, extra])
+    slides = np.abs(v) > slowest
+    forces = np.stack([force, (force + np.r_[force[0], force[:-1]]) / 2], axis=1) * slides[:, None]
+    columns = np.hstack([columns, extra]) * slides[:, None]
     rate = 2 * identification_settings.decimation_bandwidths * band
     step = max(1, round(identification_settings.decimation_pass / (rate * log.sample_time)))
     inside = slice(identification_settings.samples_of_an_edge, None)
-    arrays = [array[inside] for array in (log.time[part], columns, log["force"][part], moved.position)]
-    time, position = (array[_first(len(array), step) :: step] for array in (arrays[0], arrays[3]))
-    return time, _decimated(arrays[1], step), _decimated(arrays[2], step), position
+    columns, forces = (_decimated(array[inside], step) for array in (columns, forces))
+    every = slice(_first(len(v[inside]), step), None, step)
+    time, position, kept = (array[inside][every] for array in (log.time[part], moved.position, slides))
+    return time[kept], columns[kept], forces[kept], position[kept]
+
+
+def _carried(log: Log, part: slice, band: float) -> FilteredMotion:
+    """Return the motion of the body on the bearing in a segment: the cart's, if measured."""
+    return moved_in(log, on_bearing(log)[part], band)
 
 
 def _decimated(columns: np.ndarray, step: int) -> np.ndarray:

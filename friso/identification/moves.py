@@ -111,7 +111,7 @@ def identify_moves(
     share = _cart_share(log, flat)
     replay = replayed(log, flat) if own_loop else None
     inverse = inverse_model(log, bandwidth, False, share)
-    by_direction = inverse_model(log, inverse.bandwidth, True, share)
+    by_direction = inverse_model(log, inverse.bandwidth, True, share, slowest=inverse.slowest)
     tell(log.name, inverse.estimates)
     moved = moved_in(log, log["position"][part], inverse.bandwidth)
     follows, loop = _problems(log, part, flat, inverse, float(np.abs(moved.velocity).max()), own_loop)
