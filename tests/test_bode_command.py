@@ -279,7 +279,7 @@ def _but(response: Bode, **other: Any) -> Bode:
 
 def test_friction_that_rises_is_not_blamed(response: Bode) -> None:
     assert all(item.falling for item in response.unstable)
-    risen = _but(response, unstable=(Unstable(1e-2, 1.0, False, True, falling=False),))
+    risen = _but(response, unstable=(Unstable(1e-2, 1.0, False, True, falling=False, gains=""),))
     assert not any("Stribeck" in sentence for sentence in sentences(risen))
     assert any("Stribeck" in sentence for sentence in sentences(response))
 

@@ -1,8 +1,11 @@
 """Test README, docs and package: links lead somewhere, generated pages are complete and not stale."""
 
+import ast
 import importlib.util
+import inspect
 import io
 import json
+import operator
 import re
 import shutil
 import subprocess
@@ -136,6 +139,36 @@ def test_every_command_is_on_its_page() -> None:
 
     page = module("generate").commands_page()
     assert [name for name in COMMANDS if f"### friso {name}\n" not in page] == []
+
+
+def calls(page: Path) -> Iterator[tuple[str, ast.Call]]:
+    """The calls in code cells and examples in Python of a page, with the dotted names of what they call."""
+    for code in re.findall(
+        r"^```(?:\{code-cell\} ipython3|python)\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE
+    ):
+        for call in ast.walk(ast.parse(code)):
+            if isinstance(call, ast.Call):
+                yield ast.unparse(call.func), call
+
+
+def test_code_on_pages_calls_public_functions_as_they_are() -> None:
+    """The site executes all of it, which takes too long for every change (`.ci/thorough tutorials`)."""
+    found, wrong = 0, []
+    for page in PAGES:
+        for name, call in calls(page):
+            if not re.fullmatch(r"friso(\.\w+)+", name):
+                continue
+            found += 1
+            try:
+                function = operator.attrgetter(name.removeprefix("friso."))(friso)
+                named = {one.arg: None for one in call.keywords if one.arg}
+                several = any(isinstance(one, ast.Starred) for one in call.args) or len(named) < len(call.keywords)
+                signature = inspect.signature(function)
+                (signature.bind_partial if several else signature.bind)(*call.args, **named)
+            except (AttributeError, TypeError) as error:
+                wrong.append((str(page.relative_to(ROOT)), ast.unparse(call), str(error)))
+    assert found > 40
+    assert wrong == []
 
 
 def test_every_public_name_is_on_its_page() -> None:

@@ -483,7 +483,7 @@ def test_the_stribeck_range_is_unstable_and_told(rig: Stage) -> None:
     for item in result.unstable:
         for speed, stable in ((0.99 * item.low, True), (1.01 * item.low, False), (0.99 * item.high, False)):
             assert (spectral_abscissa(rig.flat(), member(speed, touched=item.touched))[0] < 0) == stable
-    worst, expected = result.worst
+    worst, expected, _ = result.worst
     assert not expected.stable
     assert result.unstable[0].low < worst.speed[0] < result.unstable[0].high
 
@@ -539,3 +539,47 @@ TUNED = {"crossover": 8.0, "alpha": 0.1, "beta": 2.0, "mass": 1.7}
 def test_what_no_stage_can_be_asked_is_refused(rig: Stage, key: str | None, asked: Callable[[Stage], object]) -> None:
     with refused(key):
         asked(rig)
+
+
+GAINS = {"kp": (0.6374e6, "N/m"), "ki": (136.5e6, "N/(m*s)"), "kd": (428.4, "N*s/m")}
+FRICTION = {
+    **{"static": "6 N", "coulomb": "4.2 N", "stribeck_velocity": "0.3 mm/s", "stribeck_exponent": 1},
+    **{"viscous": "30 N*s/m", "bristle_stiffness": "20 N/um", "bristle_damping": "800 N*s/m"},
+}
+
+
+def fast_stage(factor: float = 1.0, **settings: Any) -> Stage:
+    """A fast stage whose gains are multiplied by a factor, with settings against friction."""
+    gains = {name: f"{factor * value} {unit}" for name, (value, unit) in GAINS.items()}
+    return Stage(
+        masses={"stage": "0.35 kg"},
+        friction={"model": "lugre", **FRICTION},
+        controller={"kind": "pid", "derivative_on": "measurement", **gains, **settings},
+        drive={"sample_time": "50 us", "delay": "50 us"},
+        motion={"kind": "hold", "duration": "1 s"},
+    )
+
+
+@pytest.mark.parametrize("factor", [2.7, 0.1])
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        (lambda factor: {"standstill_window": "3 um", "standstill_factor": factor}, "standstill"),
+        (lambda factor: {"moving_factor": factor}, "moves"),
+        (lambda factor: {"schedule_error": ["1 um", "1 mm"], "schedule_factor": [factor, 1.0]}, "times"),
+    ],
+)
+def test_the_worst_gains_count(settings: Callable[[float], dict[str, Any]], name: str, factor: float) -> None:
+    """Margins and limits are those of the loop with each set of gains written out, whichever is the worse."""
+    plain, changed, both = fast_stage(), fast_stage(factor), fast_stage(**settings(factor))
+    alone, expected = [bode(stage) for stage in (plain, changed)], bode(both)
+    for one in ("highest_stable", "highest_comfortable"):
+        least = min(getattr(result.limits["given"], one) for result in alone)
+        assert getattr(expected.limits["given"], one) == pytest.approx(least, rel=1e-3)
+    bad = [one.abscissa if not one.stable else -one.modulus_margin for one in (result.settled[1] for result in alone)]
+    _, worst, gains = expected.settled
+    assert (-worst.modulus_margin if worst.stable else worst.abscissa) == pytest.approx(max(bad), rel=1e-6)
+    assert (name in gains) == (bad[1] > bad[0])
+    speeds = [[one.low, one.high] for result in alone for one in result.unstable]
+    np.testing.assert_allclose([[one.low, one.high] for one in expected.unstable], speeds, rtol=1e-3)
+    assert expected.stable == all(result.stable for result in alone)

@@ -398,7 +398,7 @@ def test_steady_friction_is_that_of_both_sides() -> None:
 
 def test_what_bode_says_of_a_backlash() -> None:
     def says(stage: Stage) -> str:
-        bode: Any = SimpleNamespace(stage=stage, limits={}, scan=SimpleNamespace(members=[0]))
+        bode: Any = SimpleNamespace(stage=stage, limits={}, scan=SimpleNamespace(members=[0]), scans={"": None})
         return " ".join(details(bode))
 
     assert "one flank" in says(machine())

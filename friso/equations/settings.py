@@ -84,6 +84,15 @@ def gain_states(flat: FlatMachine) -> list[FlatMachine]:
     The first set is that far from the reference at rest, the last that at the reference. A standstill window, a factor
     in moves and the points of a schedule add sets.
     """
+    return [state for _, state in _sets_of_gains(flat)]
+
+
+def named_gains(flat: FlatMachine) -> dict[str, FlatMachine]:
+    """Return the keys of `gain_states` by words on the gains; "" for those far from the reference at rest."""
+    return dict(_sets_of_gains(flat))
+
+
+def _sets_of_gains(flat: FlatMachine) -> list[tuple[str, FlatMachine]]:
     controller, schedules = controller_of(flat), tuple(map(ControllerSection.key, (*SCHEDULES, "schedule_factor")))
     in_loop = INNER_WINDOWS in settings_of(flat)
     slow = controller.position_loop
@@ -98,12 +107,14 @@ def gain_states(flat: FlatMachine) -> list[FlatMachine]:
         {**plain, **{key: factor * flat[key] for key in map(controller.key, gain)}}
         for factor in (far, *in_moves, *nearer, *near)
     ]
+    names = ["", *(f"{factor:.3g} times the gains, in moves" for factor in in_moves)]
+    names += [*(f"{factor:.3g} times the gains" for factor in nearer), *("the gains of standstill" for _ in near)]
     if inner is not None:
         own = flat.get(ControllerSection.key("standstill_integral_factor"), inner) / inner
         for name, power in controller.integral_gain.items():
             if (key := controller.key(name)) in flat and (name in slow or not in_loop):
                 states[-1][key] = states[-1][key] * np.power(own, float(power))
-    return [*states]
+    return [*zip(names, states, strict=True)]
 
 
 def _scaled(scale: float, ends: tuple[float, float]) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
+from friso.equations.settings import named_gains
 from friso.errors import InputError
 from friso.frequency.crossover import Limits, Range, limits, ranges_below
 from friso.frequency.family import Scan, closed_loop_poles, loops, plant_poles, scan_stability, spectral_abscissa
@@ -129,7 +130,7 @@ class Unstable:
     """Range of speeds [m/s], from `low` to `high`, at which a sliding stage is not stable.
 
     `falling` is true if its friction is smaller at the upper end. `touched` is true for a touched limiter, and
-    `forward` for motion ahead.
+    `forward` for motion ahead. `gains` are those that act (`named_gains`).
     """
 
     low: float
@@ -137,6 +138,7 @@ class Unstable:
     touched: bool
     forward: bool
     falling: bool
+    gains: str
 
 
 @dataclass(frozen=True)
@@ -166,11 +168,18 @@ class Bode:
     cases: Mapping[str, BodeCase]
     cascades: Mapping[str, CascadeLoops]
 
-    @cached_property
+    @property
     def scan(self) -> Scan:
-        """Return the stability of the stage in all states of a family, near and between limit cases."""
-        flat = self.stage.flat()
-        return scan_stability(flat, family(flat))
+        """Return the stability of the stage in all states of a family, near and between limit cases.
+
+        Its gains are those far from the reference at rest; `scans` has the others as well.
+        """
+        return self.scans[""]
+
+    @cached_property
+    def scans(self) -> Mapping[str, Scan]:
+        """Return the stability of the stage in all states of a family by the gains that act (`named_gains`)."""
+        return {name: scan_stability(flat, family(flat)) for name, flat in named_gains(self.stage.flat()).items()}
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
@@ -179,8 +188,8 @@ class Bode:
 
     @property
     def stable(self) -> bool:
-        """Tell whether the stage is stable in every state of the family, from stuck to sliding fast."""
-        return bool(self.scan.stable.all())
+        """Tell whether the stage is stable in every state of the family, from stuck to sliding fast, with all gains."""
+        return all(scan.stable.all() for scan in self.scans.values())
 
     @cached_property
     def loops(self) -> np.ndarray:
@@ -188,25 +197,25 @@ class Bode:
         return loops(self.scan.flat, self.scan.members, self.omega)
 
     @cached_property
-    def worst(self) -> tuple[Members, Margins]:
-        """Return the state of the family in which the loop is the worst, with its margins.
+    def worst(self) -> tuple[Members, Margins, str]:
+        """Return the state of the family in which the loop is the worst, with its margins and gains.
 
         It is the least stable one, or the one whose loop comes closest to -1.
         """
-        return self._with_margins(self.scan.worst())
+        return self._worst(np.ones(len(self.scan.members), bool))
 
     @cached_property
-    def settled(self) -> tuple[Members, Margins]:
-        """Return the worst of the states in which a stage may settle, with its margins.
+    def settled(self) -> tuple[Members, Margins, str]:
+        """Return the worst of the states in which a stage may settle, with its margins and gains.
 
         A stage may settle in the limit cases, and in the states stuck under any bias force.
         """
-        return self._with_margins(self.scan.worst(self.scan.members.settled))
+        return self._worst(self.scan.members.settled)
 
     @cached_property
     def unstable(self) -> tuple[Unstable, ...]:
-        """Return the ranges of speed at which the stage is not stable."""
-        return _unstable(self.scan.flat, self.scan.members)
+        """Return the ranges of speed at which the stage is not stable, gains by gains."""
+        return tuple(one for name, scan in self.scans.items() for one in _unstable(scan.flat, scan.members, name))
 
     @cached_property
     def limits(self) -> Mapping[str, Limits]:
@@ -217,9 +226,16 @@ class Bode:
         stages = _by_joint(self.stage)
         return dict(zip(stages, side_by_side([partial(limits, flat) for flat in stages.values()]), strict=True))
 
-    def _with_margins(self, number: int) -> tuple[Members, Margins]:
-        member = self.scan.members[number]
-        return member, margins(self.scan.flat, member)
+    def _worst(self, among: np.ndarray) -> tuple[Members, Margins, str]:
+        """Return the worst of some states of the family over all gains, with its margins and gains."""
+        states = []
+        for gains, scan in self.scans.items():
+            member = scan.members[scan.worst(among)]
+            states.append((member, margins(scan.flat, member), gains))
+        unstable = [state for state in states if not state[1].stable]
+        if unstable:
+            return max(unstable, key=lambda state: state[1].abscissa)
+        return min(states, key=lambda state: state[1].modulus_margin)
 
 
 def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
@@ -301,7 +317,7 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
     )
 
 
-def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]:
+def _unstable(flat: Mapping[str, Any], members: Members, gains: str) -> tuple[Unstable, ...]:
     """Return the ranges of speed at which the stage is not stable, within states of a family.
 
     Each belongs to one state of the limiter and one direction.
@@ -316,5 +332,5 @@ def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]
 
         for low, high in ranges_below(alike.speed, stability):
             before, after = steady_force(flat, np.array([low, high]), not backward)
-            ranges.append(Unstable(low, high, touched, not backward, bool(after < before)))
+            ranges.append(Unstable(low, high, touched, not backward, bool(after < before), gains))
     return tuple(ranges)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster, sped_up
-from friso.equations.settings import gain_states
+from friso.equations.settings import gain_states, named_gains
 from friso.frequency.family import (
     PoleStability,
     bare_loops,
@@ -149,13 +149,14 @@ class Limits:
     """Crossovers [Hz] at which a stage is stable, and those with a `comfortable` margin.
 
     They are ranges within `searched_crossovers`, valid in all limit cases: stuck under any bias force or sliding fast,
-    limiter free or touched.
+    limiter free or touched, with every set of gains that the loop may have.
 
     For both kinds, one range contains the stage's own crossover, or is the next one below it (or the lowest).
     `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None without a range. `first_lost` is
     the state that becomes unstable just above `highest_stable`. `closest` is the state that comes closest to -1 just
-    above `highest_comfortable`. Each is None if its range ends with the search. Without a range, both states are given
-    at the stage's own crossover. For a controller given by gains all values are factors of its bandwidth.
+    above `highest_comfortable`. Each comes with the gains that act in it (`named_gains`), and is None if its range ends
+    with the search. Without a range, both states are given at the stage's own crossover. For a controller given by
+    gains all values are factors of its bandwidth.
     """
 
     searched: Range
@@ -163,8 +164,8 @@ class Limits:
     comfortable: tuple[Range, ...]
     highest_stable: float | None
     highest_comfortable: float | None
-    first_lost: Members | None
-    closest: Members | None
+    first_lost: tuple[Members, str] | None
+    closest: tuple[Members, str] | None
 
     @property
     def open_ended(self) -> bool:
@@ -177,7 +178,7 @@ def limits(flat: Mapping[str, Any]) -> Limits:
 
     `flat` has the stage's keys in SI.
     """
-    search = _Search(flat, settled_members(flat))
+    search = _SearchOfGains({name: _Search(keys, settled_members(keys)) for name, keys in named_gains(flat).items()})
     ends, crossover = search.ends, _stated(flat)
     stable = search.stable()
     close = ranges_below(search.at, lambda f: COMFORTABLE_MARGIN - search.distance(f).min(axis=1))
@@ -190,8 +191,8 @@ def limits(flat: Mapping[str, Any]) -> Limits:
         comfortable,
         highest,
         calm,
-        first_lost=None if highest == ends[1] else search.members[int(search.abscissa(above)[0].argmax())],
-        closest=None if calm == ends[1] else search.members[int(search.distance(beyond)[0].argmin())],
+        first_lost=None if highest == ends[1] else search.state(int(search.abscissa(above)[0].argmax())),
+        closest=None if calm == ends[1] else search.state(int(search.distance(beyond)[0].argmin())),
     )
 
 
@@ -322,3 +323,36 @@ class _Search:
         """Return the stability of all states at each crossover, one crossover after the other."""
         keys = _at(self.flat, np.repeat(crossover, len(self.members)))
         return stability_by_poles(keys, self.members.repeated(len(crossover)))
+
+
+@dataclass(frozen=True)
+class _SearchOfGains:
+    """Search over crossovers with every set of gains that the loop may have: the searches with each, by its name."""
+
+    searches: Mapping[str, _Search]
+
+    @property
+    def ends(self) -> Range:
+        return self.searches[""].ends
+
+    @property
+    def at(self) -> np.ndarray:
+        """Return the crossovers [Hz] at which to look first, shape (crossovers,)."""
+        return self.searches[""].at
+
+    def stable(self) -> tuple[Range, ...]:
+        """Return the ranges of crossovers at which the stage is stable in all states with all gains."""
+        return reduce(shared, (search.stable() for search in self.searches.values()))
+
+    def abscissa(self, crossover: np.ndarray) -> np.ndarray:
+        """Return the real part [1/s] of the rightmost closed-loop pole, (crossovers, gains and states)."""
+        return np.hstack([search.abscissa(crossover) for search in self.searches.values()])
+
+    def distance(self, crossover: np.ndarray) -> np.ndarray:
+        """Return the least distance of the loop from -1, shape (crossovers, gains and states)."""
+        return np.hstack([search.distance(crossover) for search in self.searches.values()])
+
+    def state(self, number: int) -> tuple[Members, str]:
+        """Return the state of a column of `abscissa` and `distance`, and its gains."""
+        names, count = [*self.searches], len(self.searches[""].members)
+        return self.searches[names[number // count]].members[number % count], names[number // count]

@@ -20,8 +20,9 @@ from friso.shown.drawing.palette import GREEN, VERMILLION
 
 def basis(bode: Bode) -> str:
     """Say from what the margins were computed, and how they are defined."""
+    states = len(bode.scan.members) * len(bode.scans)
     return (
-        f" from the equations of the simulation, linearised in {len(bode.scan.members)} states. Margins follow their "
+        f" from the equations of the simulation, linearised in {states} states. Margins follow their "
         "definitions: how much gain, phase or delay takes the loop to the edge of stability; phase margins count both "
         "lag and lead"
     )
@@ -62,7 +63,11 @@ def bode_document(bode: Bode) -> dict[str, Any]:
         "worst": _at(bode, *bode.worst),
         "worst_settled": _at(bode, *bode.settled),
         "unstable_speeds_m_per_s": [
-            {**entries(unstable, "low", "high", "forward"), "limiter": _limiter(bode, unstable.touched)}
+            {
+                **entries(unstable, "low", "high", "forward"),
+                "limiter": _limiter(bode, unstable.touched),
+                "gains": unstable.gains or None,
+            }
             for unstable in bode.unstable
         ],
         "limits": {name: _limits(margins, "hz" if crossover else "factor") for name, margins in bode.limits.items()},
@@ -79,13 +84,14 @@ def _margins(margins: Margins) -> dict[str, Any]:
     return {**ratios, **distances, "poles": [[pole.real, pole.imag] for pole in margins.poles.tolist()]}
 
 
-def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:
-    """Return the margins in one state of friction, with its bias force, speed and limiter."""
+def _at(bode: Bode, member: Members, margins: Margins, gains: str) -> dict[str, Any]:
+    """Return the margins in one state of friction, with its bias force, speed, limiter and gains."""
     at = {
         "bias_n": float(member.bias[0]),
         "speed_m_per_s": float(member.speed[0]),
         "limiter": _limiter(bode, bool(member.touched[0])),
         "forward": bool(member.forward[0]),
+        "gains": gains or None,
     }
     return {**_margins(margins), "at": at}
 

@@ -48,10 +48,10 @@ def shown_states(bode: Bode) -> tuple[ShownState, ...]:
     ]
     if not has_family(bode):
         return tuple(cases)
-    (settled, margins), (worst, worst_margins) = bode.settled, bode.worst
-    cases.append(ShownState("Worst settled", GREY, place(settled, bode), margins))
-    if worst != settled:
-        cases.append(ShownState("Worst of the family", GREY, place(worst, bode), worst_margins))
+    for title, (member, margins, gains) in {"Worst settled": bode.settled, "Worst of the family": bode.worst}.items():
+        cases.append(ShownState(title, GREY, with_gains(place(member, bode), gains), margins))
+    if bode.worst[0] == bode.settled[0] and bode.worst[2] == bode.settled[2]:
+        cases.pop()
     return tuple(cases)
 
 
@@ -90,6 +90,11 @@ def in_words(cart: str, touched: bool, limited: bool) -> str:
     return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
 
 
+def with_gains(state: str, gains: str) -> str:
+    """Add to a state in words the gains that act in it, unless they are those far from the reference at rest."""
+    return f"{state}, with {gains}" if gains else state
+
+
 def cart(member: Members, bode: Bode) -> str:
     """Say what the cart does: it sticks, or slides at a speed; empty without friction.
 
@@ -119,7 +124,7 @@ def has_limiter(bode: Bode) -> bool:
 
 def has_family(bode: Bode) -> bool:
     """Tell whether there are more states than the limit cases; only friction creates some."""
-    return len(bode.scan.members) > len(bode.cases)
+    return len(bode.scan.members) * len(bode.scans) > len(bode.cases)
 
 
 def has_friction(bode: Bode) -> bool:

@@ -13,7 +13,7 @@ from friso.frequency.crossover import COMFORTABLE_MARGIN, Limits, Range
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.questions.bode.numbers import growth
-from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place
+from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, with_gains
 from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
 from friso.shown.says import Alternatives, Words, always, say, say_all
 
@@ -35,7 +35,7 @@ def details(bode: Bode) -> list[str]:
 
 def _alone(bode: Bode) -> bool:
     """Tell whether the loop has a single state, as without friction and limiter."""
-    return len(bode.scan.members) == 1
+    return len(bode.scan.members) * len(bode.scans) == 1
 
 
 def _settled_stable(bode: Bode) -> bool:
@@ -46,7 +46,7 @@ def _settled_stable(bode: Bode) -> bool:
 def _of_tuning(bode: Bode) -> bool:
     """Tell whether the loop is unstable in a limit case or a stuck state, where friction does not fall with speed."""
     settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
-    return not (settled and bode.scan.stable[bode.scan.members.stuck].all())
+    return not (settled and all(scan.stable[scan.members.settled].all() for scan in bode.scans.values()))
 
 
 def _by_crossover(bode: Bode) -> bool:
@@ -72,9 +72,10 @@ def _margin(margins: Margins) -> str:
     return f"modulus margin {margins.modulus_margin:.3g} at {with_unit(margins.closest, 'Hz')}"
 
 
-def _worst(bode: Bode, member: Members, margins: Margins) -> str:
+def _worst(bode: Bode, member: Members, margins: Margins, gains: str) -> str:
     """Write a state of the loop, and its margin or how fast a deviation grows in it."""
-    return f"{place(member, bode)}, {_margin(margins) if margins.stable else f'where a deviation {growth(margins)}'}"
+    size = _margin(margins) if margins.stable else f"where a deviation {growth(margins)}"
+    return f"{with_gains(place(member, bode), gains)}, {size}"
 
 
 def _states_checked(bode: Bode) -> str:
@@ -84,16 +85,18 @@ def _states_checked(bode: Bode) -> str:
     parts = [f"stuck under bias forces of up to {with_unit(biases.max(), 'N')}"] if biases.any() else []
     parts += [f"sliding at {range_with_unit(speeds.min(), speeds.max(), 'm/s')}"] if has_friction(bode) else []
     parts += ["limiter free and touched"] if has_limiter(bode) else []
-    return f"{', '.join(parts)} ({len(members)} states)"
+    parts += [gains for gains in bode.scans if gains]
+    return f"{', '.join(parts)} ({len(members) * len(bode.scans)} states)"
 
 
 def _where(bode: Bode) -> str:
     """List the unstable states: stuck ones by bias force, sliding ones by range of speed."""
-    members, stable = bode.scan.members, bode.scan.stable
-    states = []
-    for touched in np.unique(members.touched[members.stuck & ~stable]).tolist():
-        rest = members.stuck & (members.touched == touched)
-        states.append(in_words(_stuck(members.bias[rest & ~stable], bode), touched, has_limiter(bode)))
+    members, states = bode.scan.members, []
+    for gains, scan in bode.scans.items():
+        for touched in np.unique(members.touched[members.stuck & ~scan.stable]).tolist():
+            rest = members.stuck & (members.touched == touched) & ~scan.stable
+            state = in_words(_stuck(members.bias[rest], bode), touched, has_limiter(bode))
+            states.append(with_gains(state, gains))
     return "; ".join([*states, *(_speeds(speeds, bode) for speeds in bode.unstable)])
 
 
@@ -113,7 +116,7 @@ def _speeds(speeds: Unstable, bode: Bode) -> str:
     window = window_with_unit(speeds.low, speeds.high, (float(searched.min()), float(searched.max())), "m/s")
     way, whole = "sliding" if speeds.forward else "sliding backwards", window.startswith("all")
     at = "any speed" if whole else window if window[0].isdigit() else f"speeds {window}"
-    return in_words(f"{way} at {at}", speeds.touched, has_limiter(bode))
+    return with_gains(in_words(f"{way} at {at}", speeds.touched, has_limiter(bode)), speeds.gains)
 
 
 def _own(bode: Bode) -> str:
@@ -152,11 +155,12 @@ def _at(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
 def _ends(limits: Limits, name: str, bode: Bode) -> str:
     """Name in brackets the states that come closest to -1, and become unstable first, as the bandwidth rises."""
     ends = ((limits.closest, "closest to −1"), (limits.first_lost, "lost first"))
-    states = [
-        f"{meaning}: {in_words(cart(member, bode), bool(member.touched[0]), name == 'free')}"
-        for member, meaning in ends
-        if member is not None and not _alone(bode)
-    ]
+    states = []
+    for state, meaning in ends:
+        if state is not None and not _alone(bode):
+            member, gains = state
+            where = in_words(cart(member, bode), bool(member.touched[0]), name == "free")
+            states.append(f"{meaning}: {with_gains(where, gains)}")
     return f" ({'; '.join(states)})" if states else ""
 
 
