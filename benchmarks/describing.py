@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 import friso
-from friso.frequency.describing.function import describing
-from friso.frequency.describing.response import mass_line, plant_response
 from friso.stage import Stage
-from friso.studies.harmonic_balance import harmonic_balance
+from friso_thesis.studies.describing.function import describing
+from friso_thesis.studies.describing.response import mass_line, plant_response
+from friso_thesis.studies.harmonic_balance import harmonic_balance
 
 ROOT = Path(__file__).parents[1]
 

@@ -12,8 +12,6 @@ from friso.version import VERSION as __version__
 if TYPE_CHECKING:
     from friso.errors import InputError, LogError, SpecError, StageError, StoreError
     from friso.frequency.analysis import linear
-    from friso.frequency.describing.function import describing
-    from friso.frequency.describing.response import mass_line, plant_response
     from friso.frequency.margins import Tuning, tuning
     from friso.frequency.members import Members, member
     from friso.interface.starting import example, init, schema
@@ -33,19 +31,15 @@ if TYPE_CHECKING:
     from friso.questions.tune.question import tune
     from friso.stage import Stage, load, loads, save
     from friso.studies.axes import Samples
-    from friso.studies.harmonic_balance import harmonic_balance
     from friso.studies.store import read_store
 
 _PLACES = {
     "friso.interface.starting": ("example", "init", "schema"),
     "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
     "friso.frequency.analysis": ("linear",),
-    "friso.frequency.describing.function": ("describing",),
-    "friso.frequency.describing.response": ("mass_line", "plant_response"),
     "friso.frequency.members": ("Members", "member"),
     "friso.frequency.margins": ("Tuning", "tuning"),
     "friso.stage": ("Stage", "load", "loads", "save"),
-    "friso.studies.harmonic_balance": ("harmonic_balance",),
     "friso.studies.axes": ("Samples",),
     "friso.studies.store": ("read_store",),
 }
@@ -68,22 +62,18 @@ __all__ = [
     "boundary",
     "check",
     "compare",
-    "describing",
     "design",
     "doctor",
     "example",
     "export",
     "flexure",
-    "harmonic_balance",
     "identify",
     "init",
     "linear",
     "load",
     "loads",
     "logs",
-    "mass_line",
     "member",
-    "plant_response",
     "read_store",
     "rig",
     "save",

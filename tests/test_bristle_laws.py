@@ -28,8 +28,6 @@ from friso.equations.driven import Driven
 from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.frequency.describing.function import describing
-from friso.frequency.describing.multi import OneStateLaw
 from friso.frequency.members import member
 from friso.frequency.parts import plant
 from friso.hunting import Ensemble, find_cycles
@@ -37,6 +35,8 @@ from friso.identification.output_error.parameters import fit_parameters
 from friso.stage.tables import friction_law
 from friso.virtual_rig.run import failures, run
 from friso.virtual_rig.task import own_motion
+from friso_thesis.studies.describing.function import describing
+from friso_thesis.studies.describing.multi import OneStateLaw
 
 pytestmark = pytest.mark.xdist_group("bristle_laws")
 

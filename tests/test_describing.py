@@ -31,12 +31,12 @@ from variants import (
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.imposed import imposed_form
-from friso.frequency.describing.balance import TOUCHES
-from friso.frequency.describing.function import Imposition, describing, dynamic_stiffness, steady
-from friso.frequency.describing.response import MISSING, NOT_FOUND, mass_line, plant_response
-from friso.frequency.settings import FrequencySettings
 from friso.stage import Stage
 from friso.stage.tables import FRICTION
+from friso_thesis.studies.describing.balance import TOUCHES
+from friso_thesis.studies.describing.function import Imposition, describing, dynamic_stiffness, steady
+from friso_thesis.studies.describing.response import MISSING, NOT_FOUND, mass_line, plant_response
+from friso_thesis.studies.describing.settings import DescribingSettings
 
 LAWS = {
     "lugre": lugre(2),
@@ -313,7 +313,7 @@ def test_bad_input(ask: Callable[[], object]) -> None:
 
 
 def test_a_state_that_does_not_close_is_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    with FrequencySettings(secant_steps=1).in_use():
+    with DescribingSettings(secant_steps=1).in_use():
         responses = describing(rigid(LAWS["lugre"]), [1e-5], [1.0])
         assert responses["status"].item() not in ("", "done")
         assert np.isnan(responses["stiffness"].item())
@@ -410,7 +410,7 @@ def test_missing_answers_are_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
     def partly(flat: dict[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> np.ndarray:
         return np.where(amplitudes < 1e-4, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
 
-    monkeypatch.setattr("friso.frequency.describing.response.dynamic_stiffness", partly)
+    monkeypatch.setattr("friso_thesis.studies.describing.response.dynamic_stiffness", partly)
     response = plant_response(rigid(LAWS["lugre"]), [1.0, 1.8], [5.0])
     assert set(np.ravel(response["status"])) <= {MISSING, NOT_FOUND}
     assert np.isnan(response["up"].values[0, 0])

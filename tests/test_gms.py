@@ -14,11 +14,11 @@ from friso.equations.friction.gms import GeneralisedMaxwellSlip, polygon
 from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.frequency.describing.function import describing
 from friso.frequency.members import member
 from friso.frequency.parts import plant
 from friso.hunting import Ensemble, find_cycles
 from friso.studies.laws.conversion import measure_friction
+from friso_thesis.studies.describing.function import describing
 
 pytestmark = pytest.mark.xdist_group("gms")
 

@@ -10,14 +10,22 @@ from refusals import refused
 from scipy.integrate import solve_ivp
 from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains, lugre, stage, stribeck, van_dijk
 
-from friso.frequency.describing import balance
-from friso.frequency.describing.balance import DEFAULT_FREQUENCIES, receptance, single_harmonic
-from friso.frequency.describing.function import dynamic_stiffness
-from friso.frequency.describing.multi import DONE, OPEN, REST, HarmonicSeries, OneStateLaw, balanced, friction_answer
-from friso.frequency.settings import FrequencySettings
 from friso.hunting import Ensemble, find_cycles
 from friso.stage import Stage
-from friso.studies.harmonic_balance import harmonic_balance
+from friso_thesis.studies.describing import balance
+from friso_thesis.studies.describing.balance import DEFAULT_FREQUENCIES, receptance, single_harmonic
+from friso_thesis.studies.describing.function import dynamic_stiffness
+from friso_thesis.studies.describing.multi import (
+    DONE,
+    OPEN,
+    REST,
+    HarmonicSeries,
+    OneStateLaw,
+    balanced,
+    friction_answer,
+)
+from friso_thesis.studies.describing.settings import DescribingSettings
+from friso_thesis.studies.harmonic_balance import harmonic_balance
 
 pytestmark = pytest.mark.xdist_group("describing")
 
@@ -83,7 +91,7 @@ def test_a_turn_without_a_solution_is_told() -> None:
     """Newton's method that ends nowhere has found no cycle."""
     amplitude, omega = near_sine()
     grid = (amplitude * np.geomspace(0.1, 10, 12), omega / (2 * np.pi) * np.geomspace(0.1, 10, 12))
-    with FrequencySettings(balance_newton_steps=0).in_use():
+    with DescribingSettings(balance_newton_steps=0).in_use():
         harmonic = single_harmonic(unstable("1e8 N/m"), *grid)
         assert (harmonic.amplitudes.size, harmonic.unsolved) == (0, 1)
     cells, axes = np.array([[2, 2], [2, 2]]), (np.arange(9.0), np.arange(9.0))

@@ -15,8 +15,6 @@ from friso.equations.component import Kink, Switch, state
 from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.frequency.describing.function import describing
-from friso.frequency.describing.multi import OneStateLaw as Waveform
 from friso.frequency.members import level, member, speeds, steady_force
 from friso.frequency.parts import plant
 from friso.hunting import CYCLE_RTOL, Cycles, Ensemble, find_cycles
@@ -26,6 +24,8 @@ from friso.hunting.cycle.shooting import shoot
 from friso.identification.output_error.parameters import fit_parameters
 from friso.virtual_rig.run import as_built_keys, failures, run
 from friso.virtual_rig.task import own_motion
+from friso_thesis.studies.describing.function import describing
+from friso_thesis.studies.describing.multi import OneStateLaw as Waveform
 
 pytestmark = pytest.mark.xdist_group("maxwell_slip")
 

@@ -15,7 +15,6 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from friso.engine.simulate import simulate
-from friso.frequency.describing.response import mass_line
 from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.identification.logs.log import Log
@@ -26,6 +25,7 @@ from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.experiments.constant_speed import passes_log
 from friso.studies.rig.outcome import freed, locked_stage, pace
+from friso_thesis.studies.describing.response import mass_line
 from friso_thesis.studies.rig.in_position import InPosition
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import (

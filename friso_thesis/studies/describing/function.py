@@ -30,9 +30,9 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.imposed import FREQUENCY, HARMONIC, imposed_form
 from friso.equations.roles import Role
 from friso.errors import InputError
-from friso.frequency.settings import settings
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
+from friso_thesis.studies.describing.settings import settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -255,8 +255,8 @@ def describing(
 
     Examples
     --------
-    >>> import friso
-    >>> friso.describing(friso.load("rig.toml"), [1e-5, 1e-4], [10.0])["stiffness"]  # doctest: +SKIP
+    >>> import friso, friso_thesis
+    >>> friso_thesis.describing(friso.load("rig.toml"), [1e-5, 1e-4], [10.0])["stiffness"]  # doctest: +SKIP
     """
     import xarray as xr
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from friso.equations.bandwidth import at_bandwidth
 from friso.errors import InputError
-from friso.frequency.describing.balance import single_harmonic
-from friso.frequency.describing.function import checked_positive
-from friso.frequency.describing.multi import DONE, balanced
 from friso.hunting import CYCLE_RTOL, Cycles, Ensemble, find_cycles
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
+from friso_thesis.studies.describing.balance import single_harmonic
+from friso_thesis.studies.describing.function import checked_positive
+from friso_thesis.studies.describing.multi import DONE, balanced
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,7 @@ def harmonic_balance(
     - `period` [s], `amplitude` [m] and `multiplier`, over "crossover": the simulated cycle, attracting or not, closed
       by shooting. What attracts the stage is another question: see `friso.check`.
     - `solutions` and `least_residual`, over "crossover": the number of cycles that balance with a single harmonic
-      predicts, and the least residual of that balance (see `friso.frequency.describing.balance`).
+      predicts, and the least residual of that balance (see `friso_thesis.studies.describing.balance`).
     - `period_error` and `amplitude_error`, over both: relative errors of balance with several harmonics, which starts
       from the simulated cycle. They are NaN where balance does not close on a motion; `status` says so.
 
@@ -55,9 +55,9 @@ def harmonic_balance(
 
     Examples
     --------
-    >>> import friso
+    >>> import friso, friso_thesis
     >>> locked = friso.load(friso.example("thesis_rig")).replace({"joint.locked": True})
-    >>> friso.harmonic_balance(locked, [6.0, 8.0])  # doctest: +SKIP
+    >>> friso_thesis.harmonic_balance(locked, [6.0, 8.0])  # doctest: +SKIP
     """
     import xarray as xr
 

@@ -28,8 +28,8 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import DIRECTION, direction, friction_alone
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
-from friso.frequency.describing.balance import TOUCHES, beyond_stroke, receptance
-from friso.frequency.settings import settings
+from friso_thesis.studies.describing.balance import TOUCHES, beyond_stroke, receptance
+from friso_thesis.studies.describing.settings import settings
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,12 @@ import numpy as np
 from scipy.optimize.elementwise import find_root
 
 from friso.engine.tolerance import checked_rtol
-from friso.frequency.describing.balance import TOUCHES, beyond_stroke
-from friso.frequency.describing.function import IMPOSED_RTOL, Imposition, checked_positive, dynamic_stiffness
 from friso.frequency.parts import mechanics
-from friso.frequency.settings import settings
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
+from friso_thesis.studies.describing.balance import TOUCHES, beyond_stroke
+from friso_thesis.studies.describing.function import IMPOSED_RTOL, Imposition, checked_positive, dynamic_stiffness
+from friso_thesis.studies.describing.settings import settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -201,8 +201,8 @@ def plant_response(
 
     Examples
     --------
-    >>> import friso
-    >>> friso.plant_response(friso.load("rig.toml"), [2.0], [5.0, 10.0])["up"]  # doctest: +SKIP
+    >>> import friso, friso_thesis
+    >>> friso_thesis.plant_response(friso.load("rig.toml"), [2.0], [5.0, 10.0])["up"]  # doctest: +SKIP
     """
     import xarray as xr
 
@@ -344,9 +344,9 @@ def mass_line(
 
     Examples
     --------
-    >>> import friso
+    >>> import friso, friso_thesis
     >>> places = [{"friction.static": "2 N"}, {"friction.static": "3 N"}]
-    >>> friso.mass_line(friso.load("rig.toml"), places, [2.0], [5.0, 10.0])  # doctest: +SKIP
+    >>> friso_thesis.mass_line(friso.load("rig.toml"), places, [2.0], [5.0, 10.0])  # doctest: +SKIP
     """
     import xarray as xr
 

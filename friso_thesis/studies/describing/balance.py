@@ -25,10 +25,10 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.component import key
 from friso.equations.model import assemble
 from friso.equations.structure import Structure, shared_structure
-from friso.frequency.describing.function import IMPOSED_RTOL, checked_positive, dynamic_stiffness
-from friso.frequency.settings import settings
 from friso.frequency.system import Declared
 from friso.stage import Stage
+from friso_thesis.studies.describing.function import IMPOSED_RTOL, checked_positive, dynamic_stiffness
+from friso_thesis.studies.describing.settings import settings
 
 FORCE, CART, STAGE = "force on cart", "cart", "stage"
 
