@@ -317,9 +317,36 @@ def test_what_one_survey_observed_makes_no_edge_certain_unless_a_thorough_one_do
     assert where._surely_attracts(_Place(1.0, survey.motions, 1.1))
 
 
+SCHEDULED = Stage(
+    masses={"stage": "4.858 kg"},
+    friction={
+        **{"model": "lugre", "static": "9.036 N", "coulomb": "5.197 N", "viscous": "1.128 N*s/m"},
+        **{"stribeck_velocity": "0.001754 m/s", "stribeck_exponent": 2.0},
+        **{"bristle_stiffness": "209900.0 N/m", "bristle_damping": "692.9 N*s/m"},
+    },
+    controller={
+        **{"kind": "pid", "kp": "4122.0 N/m", "ki": "9761.0 N/(m*s)", "kd": "122.2 N*s/m"},
+        **{"derivative_on": "error", "tau": "0.00168 s"},
+        "schedule_error": ["0.0001325 m", "0.000265 m", "0.00106 m"],
+        "schedule_factor": [0.2997, 0.656, 0.8678],
+    },
+    motion={"kind": "release", "displacement": "0.006576 m", "duration": "13.7 s"},
+)
+"""Gains follow a schedule. Below 0.8925 times its bandwidth a symmetric cycle attracts; an asymmetric one does so, from
+half of the displacements, up to between 0.910 and 0.915 times."""
+
+
+def test_an_asymmetric_cycle_that_outlives_a_flip_makes_the_edge() -> None:
+    edge = find_margin(SCHEDULED, attracting=False)
+    assert edge is not None
+    assert 0.908 < edge.factor < 0.915 < edge.quiet < 0.921
+    beside = bandwidth_path(SCHEDULED.flat(), False).stages(np.array([0.905, edge.factor * 0.998, edge.quiet]))
+    assert attractors(beside, thorough=True).attracts.tolist() == [True, True, False]
+
+
 def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:
-    others = (rig.replace({"joint.locked": False}), locked.replace({"controller.error_deadband": "1 um"}))
-    assert [has_a_map(Ensemble.held(stage.flat(), 1)) for stage in (locked, *others)] == [True, False, False]
+    others = (rig.replace({"joint.locked": False}), locked.replace({"controller.error_deadband": "1 um"}), SCHEDULED)
+    assert [has_a_map(Ensemble.held(stage.flat(), 1)) for stage in (locked, *others)] == [True, False, False, False]
     with ReturnMapSettings(maps_decide=False).in_use():
         assert not has_a_map(Ensemble.held(locked.flat(), 1))
 

@@ -24,7 +24,7 @@ from friso.hunting.return_map.mapped import Mapped, map_stages
 from friso.hunting.return_map.settings import settings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
-from friso.stage.controllers import dead_band
+from friso.stage.controllers import NO_SETTINGS, SCHEDULES, dead_band
 
 SKETCH_RTOL = ToleranceSettings().sketch_rtol
 """Relative tolerance of the runs of a sketch."""
@@ -255,12 +255,14 @@ def has_a_map(stages: Ensemble) -> bool:
     - Integrals of several loops wind up separately.
     - The stage may stand anywhere within a dead band or a backlash.
     - A window of the controller remembers the past.
+    - Gains follow a schedule: the map bends where they do, between landings that are too far apart to show it.
 
     The result is also false where the setting `maps_decide` is.
     """
     if not settings.maps_decide:
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))
-    form = stages.structure.controller
-    stands_anywhere |= form is not None and form.settings.past_decides
-    return not (stages.chatters or stands_anywhere or winds_up_at_a_limit(stages) or stages.outer_integrals)
+    controller = stages.structure.controller
+    against = controller.settings if controller else NO_SETTINGS
+    undecided = stands_anywhere or against.past_decides or any(name in against for name in SCHEDULES)
+    return not (stages.chatters or undecided or winds_up_at_a_limit(stages) or stages.outer_integrals)
