@@ -1,14 +1,16 @@
 """The given controller as a witness: replayed on a log it tells clock, units, signs, gains and feedforward."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from friso.errors import InputError
+from friso.identification.logs.assemble import read_log
 from friso.identification.logs.log import Log
-from friso.identification.witness import Witness, doubt_of, replayed
+from friso.identification.witness import Witness, doubt_of, replayed, witnessed
 from friso.stage import Stage
 
 STEP = 1e-3
@@ -28,20 +30,22 @@ STAGE = Stage(
 )
 
 
-def recorded(limit: float = np.inf) -> Log:
+def recorded(limit: float = np.inf, filtered: float = 0.0, move: float = 0.2) -> Log:
     """An axis of 4.2 kg with Coulomb friction of 5 N, moved there and back, its controller sampled at 1 kHz.
 
-    Own equations, steps of 50 us, and a spring that yields at 5 N for friction; independent of friso.
+    Own equations, steps of 50 us, and a spring that yields at 5 N for friction; independent of friso. The derivative is
+    `filtered` by a time constant [s].
     """
     time = np.arange(0.0, 6.0, STEP)
-    phase = np.clip((time % 1.5) / 0.2, 0, 1)
+    phase = np.clip((time % 1.5) / move, 0, 1)
     there = phase**3 * (10 - 15 * phase + 6 * phase**2)
     reference = 0.02 * np.where((time // 1.5) % 2 == 0, there, 1 - there)
     position, force = np.zeros((2, len(time)))
-    x = v = z = integral = before = 0.0
+    x = v = z = integral = before = rate = 0.0
     for k, wanted in enumerate(reference):
         integral += KI * (wanted - x) * STEP
-        command = KP * (wanted - x) + integral - KD * (x - before) / STEP
+        rate += ((x - before) / STEP - rate) * STEP / (filtered + STEP)
+        command = KP * (wanted - x) + integral - KD * rate
         u = float(np.clip(command, -limit, limit))
         if u != command:
             integral -= KI * (wanted - x) * STEP
@@ -115,6 +119,54 @@ def test_forces_at_a_limit_do_not_count() -> None:
     peak = float(np.abs(LOG["force"]).max())
     best = Witness(recorded(limit=0.6 * peak), STAGE.flat()).best()
     assert best.agrees
+
+
+@pytest.mark.parametrize("share", [0.8, 0.6])
+def test_a_noisy_force_at_the_limit_of_the_file_does_not_count(share: float) -> None:
+    """Beyond it the command is what the force is not, though noise keeps the force from staying at one value."""
+    limit = share * float(np.abs(LOG["force"]).max())
+    log = recorded(limit=limit)
+    noise = 2e-3 * limit * np.random.default_rng(2).standard_normal(len(log.time))
+    noisy = replace(log, signals={**log.signals, "force": log["force"] + noise})
+    replay = replayed(noisy, STAGE.replace({"controller.force_limit": f"{limit} N"}).flat())
+    assert replay is not None
+    assert replay.agrees
+    assert not replay.refutes
+
+
+@pytest.mark.parametrize("place", [0.1, -3.0])
+@pytest.mark.parametrize("begin", [0, 60, 130])
+def test_filters_begin_in_the_state_that_the_record_shows(place: float, begin: int) -> None:
+    """A record may begin anywhere, and within a move."""
+    log = recorded(filtered=20e-3)
+    shifted = {**log.signals, "position": log["position"] + place, "reference": log["reference"] + place}
+    count = len(log.time) - begin
+    cut = Log("axis", log.time[:count], STEP, {k: v[begin:] for k, v in shifted.items()}, (slice(0, count),))
+    best = Witness(cut, STAGE.replace({"controller.tau": "20 ms"}).flat()).best()
+    assert best.agrees
+    assert best.left < 0.05
+
+
+@pytest.mark.parametrize("place", [0.0, 0.1])
+def test_samples_whose_time_stamps_scatter_are_tried_as_even(tmp_path: Path, place: float) -> None:
+    """Even samples, stamped up to 0.15 ms off: interpolated by their stamps they would refute the controller."""
+    log, jitter = recorded(), np.random.default_rng(7).uniform(-0.15e-3, 0.15e-3, len(LOG.time))
+    columns = [log.time + jitter, log["reference"] + place, np.round(log["position"] + place, 8), log["force"]]
+    path = tmp_path / "axis.csv"
+    np.savetxt(path, np.column_stack(columns), delimiter=",", fmt="%.9g", comments="",
+               header="t [s],reference [m],position [m],force [N]")  # fmt: skip
+    read = read_log(path)
+    assert Witness(read, STAGE.flat()).best().left > 0.15
+    taken, replay = witnessed(read, STAGE.flat())
+    assert replay is not None
+    assert replay.agrees
+    assert replay.left < 0.05
+    assert taken["position"] == pytest.approx(columns[2], abs=1e-12)
+    other = STAGE.replace({"controller.kp": "1e3 N/m", "controller.ki": "2e6 N/(m*s)", "controller.kd": "5 N*s/m"})
+    stamped, refuted = witnessed(read, other.flat())
+    assert stamped is read
+    assert refuted is not None
+    assert refuted.refutes
 
 
 def test_a_step_of_the_force_is_no_switch_of_gains() -> None:

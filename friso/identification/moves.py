@@ -33,7 +33,7 @@ from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
 from friso.identification.settings import identification_settings
 from friso.identification.spread import binned, correlation_length
-from friso.identification.witness import Replay, replayed
+from friso.identification.witness import Replay, witnessed
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -107,9 +107,9 @@ def identify_moves(
     Raises InputError for a log without position or force, or one whose clock, unit or sign the controller contradicts.
     """
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
-    part = log.longest
     share = _cart_share(log, flat)
-    replay = replayed(log, flat) if own_loop else None
+    log, replay = witnessed(log, flat) if own_loop else (log, None)
+    part = log.longest
     inverse = inverse_model(log, bandwidth, False, share)
     by_direction = inverse_model(log, inverse.bandwidth, True, share, slowest=inverse.slowest)
     tell(log.name, inverse.estimates)

@@ -514,6 +514,9 @@ class WitnessSettings(Settings):
     samples_of_a_start: int = setting(10, "")
     """Samples at the start that do not count, in which filters of the controller forget that they began at rest."""
 
+    least_share_of_a_state: float = setting(1e-9, "")
+    """Smallest effect on the force, relative to the largest, by which states of the controller are told apart."""
+
     samples_of_a_replay: int = setting(50, "")
     """Fewest samples of a replay that says anything."""
 

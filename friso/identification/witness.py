@@ -14,9 +14,10 @@ import numpy as np
 from scipy.signal import bilinear, lfilter, ss2tf
 
 from friso.errors import InputError
-from friso.identification.inverse_model import least_squares, unit_of, within_stretches
+from friso.identification.inverse_model import least_squares, unit_of
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import noise_of
+from friso.identification.settings import doubt_settings
 from friso.identification.settings import witness_settings as settings
 from friso.quantities import percent, plain_factor
 from friso.stage.controllers import CONTROLLER, NO_SETTINGS, settings_of
@@ -34,7 +35,8 @@ class Replay:
     variation, of which the share `noise` differs from sample to sample. It comes `lag` [s] after the command. Time
     of the log runs `clock` times as slowly as the controller's. `mass` [kg] times the reference's acceleration, and
     `direction` [N] in its direction, are in it besides. `slopes` are those before and after an instant at which
-    gains were switched.
+    gains were switched. With samples that are taken as even, against their time stamps, `left_by_stamps` is the share
+    left with these.
     """
 
     slope: float
@@ -46,6 +48,7 @@ class Replay:
     direction: float = 0.0
     force: float = 1.0
     slopes: tuple[float, float] | None = None
+    left_by_stamps: float | None = None
 
     @property
     def explains(self) -> bool:
@@ -73,7 +76,11 @@ class Replay:
 
 
 class Witness:
-    """A log with reference, position and force, and the controller of a stage whose keys in SI are `flat`."""
+    """A log with reference, position and force, and the controller of a stage whose keys in SI are `flat`.
+
+    Samples at the force limit do not count. What the controller's integrals and filters hold where a stretch without
+    them begins, no channel shows: what they do to the force from there on is left out of both forces.
+    """
 
     def __init__(self, log: Log, flat: Mapping[str, Any]) -> None:
         from friso.frequency.parts import compensator  # imports SymPy, which is slow
@@ -83,10 +90,13 @@ class Witness:
         self.reference, self.position, self.force = (log[name][part] for name in CHANNELS)
         self.system = compensator(flat, 1)
         self._commands: dict[float, np.ndarray] = {}
-        size = np.abs(self.force)
+        self._ebbs: dict[float, np.ndarray] = {}
+        size, limit = np.abs(self.force), float(flat.get(FORCE_LIMIT, np.inf))
         inside = size < settings.share_of_a_limit * size.max()
         if np.mean(~inside) < settings.share_at_a_limit:
             inside[:] = True  # the largest force is no limit
+        noise = doubt_settings.deviations_at_a_limit * noise_of(self.force)
+        inside &= size < settings.share_of_a_limit * limit - noise
         inside[: settings.samples_of_a_start] = False
         self.rows = np.flatnonzero(inside)
         self.stretch = np.cumsum(np.diff(inside.astype(int), prepend=0) > 0)[self.rows]
@@ -119,7 +129,7 @@ class Witness:
         if fed:
             rate, acceleration, _ = self._derivatives(self.step)
             columns += [acceleration, np.sign(rate)]
-        signals = within_stretches(np.stack([*columns, self.force], axis=1)[self.rows], self.stretch)
+        signals = self._settled(np.stack([*columns, self.force], axis=1)[self.rows], self.stretch, clock)
         solution, left = least_squares(signals[:, :-1], signals[:, -1])
         spread = float(np.std(signals[:, -1])) or 1.0
         mass, direction = solution[2:] if fed else (0.0, 0.0)
@@ -156,12 +166,41 @@ class Witness:
         best, slopes = settings.force_left_by_the_controller, None
         spread = float(np.std(signals[:, 1])) or 1.0
         for share in np.linspace(*settings.shares_of_a_record, settings.instants_tried):
-            parts = [signals[: int(share * count)], signals[int(share * count) :]]
-            fits = [least_squares((one - one.mean(axis=0))[:, :1], (one - one.mean(axis=0))[:, 1]) for one in parts]
+            later = np.arange(count) >= int(share * count)
+            settled = self._settled(signals, 2 * self.stretch + later, 1.0)
+            fits = [least_squares(settled[part, :1], settled[part, 1]) for part in (~later, later)]
             left = float(np.sqrt(sum(float(rest @ rest) for _, rest in fits) / count)) / spread
             if left < best:
                 best, slopes = left, (float(fits[0][0][0]), float(fits[1][0][0]))
         return slopes
+
+    def _settled(self, signals: np.ndarray, stretch: np.ndarray, clock: float) -> np.ndarray:
+        """Subtract from signals, (rows, signals), what a state at the begin of a stretch, (rows,), may have caused."""
+        ebb, left = self._ebb(clock), np.empty_like(signals)
+        for number in np.unique(stretch):
+            rows = np.flatnonzero(stretch == number)
+            columns = np.column_stack([np.ones(len(rows)), ebb[: len(rows)]])
+            columns = columns[:, columns.any(axis=0)]
+            directions, sizes, _ = np.linalg.svd(columns / np.abs(columns).max(axis=0), full_matrices=False)
+            directions = directions[:, sizes > settings.least_share_of_a_state * sizes[0]]
+            left[rows] = signals[rows] - directions @ (directions.T @ signals[rows])
+        return left
+
+    def _ebb(self, clock: float) -> np.ndarray:
+        """Return the force that each state of the controller causes from 1 on, by itself, (samples, states)."""
+        if clock not in self._ebbs:
+            from friso.frequency.parts import FORCE
+
+            of_states = self.system.take((), (FORCE,))
+            half, one = of_states.a[0] * self.step / clock / 2, np.eye(of_states.a.shape[1])
+            onward = np.linalg.inv(one - half)
+            rows, power = of_states.c[0] @ onward, onward @ (one + half)
+            with np.errstate(all="ignore"):  # a controller that is unstable by itself
+                while len(rows) < len(self.force):
+                    rows, power = np.vstack([rows, rows @ power]), power @ power
+            rows = rows[: len(self.force)]
+            self._ebbs[clock] = rows[:, np.isfinite(rows).all(axis=0) & rows.any(axis=0)]
+        return self._ebbs[clock]
 
     def _lagged(self, clock: float, fed: bool = False) -> Replay:
         """Return the best replay with a clock over delays of few samples."""
@@ -175,6 +214,21 @@ class Witness:
         return rate, acceleration, np.gradient(acceleration, step)
 
 
+def witnessed(log: Log, flat: Mapping[str, Any]) -> tuple[Log, Replay | None]:
+    """Replay the controller of a stage on a log, as `replayed` does, and return the log by the clock that it confirms.
+
+    Where time stamps scatter, it may be they and not the instants of the samples that do: samples are taken as even if
+    the controller explains the force only so, or clearly better. Raises InputError as `replayed` does.
+    """
+    if log.as_even is not None:
+        witness, even = _witness(log, flat), replayed(log.as_even, flat)
+        if witness and even and even.explains:
+            stamped = witness.best()
+            if not stamped.explains or even.left < settings.share_left_by_a_cause * stamped.left:
+                return log.as_even, replace(even, left_by_stamps=stamped.left)
+    return log, replayed(log, flat)
+
+
 def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
     """Replay the controller of a stage on a log; None where what it saw and commanded is not what was logged.
 
@@ -182,14 +236,8 @@ def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
     against friction, which are not linear, and where nothing varies. Raises InputError if the log contradicts its own
     clock, unit or sign: no value of such a log holds.
     """
-    behind = "disturbance" in log or any(key.startswith(f"{TRANSMISSION}.") for key in flat)
-    if behind or settings_of(flat) != NO_SETTINGS or flat.get(f"{CONTROLLER}.coulomb_feedforward"):
-        return None
-    witness = Witness(log, flat)
-    varies = [
-        np.ptp(signal[witness.rows]) if len(witness.rows) else 0.0 for signal in (witness.force, witness.command())
-    ]
-    if len(witness.rows) < settings.samples_of_a_replay or not np.all(np.isfinite(varies)) or not all(varies):
+    witness = _witness(log, flat)
+    if witness is None:
         return None
     replay = witness.best()
     left = f"the controller leaves {percent(witness.replay().left)} of the force, so {percent(replay.left)}"
@@ -209,6 +257,20 @@ def replayed(log: Log, flat: Mapping[str, Any]) -> Replay | None:
         example = '--unit CHANNEL="mm" for position and reference' if by_unit else scale
         raise InputError("force", actual, expected, example, log.name)
     return replay if replay.explains else replace(replay, slopes=witness.at_both_ends())
+
+
+def _witness(log: Log, flat: Mapping[str, Any]) -> Witness | None:
+    """Return log and controller to be replayed; None where `replayed` says nothing."""
+    behind = "disturbance" in log or any(key.startswith(f"{TRANSMISSION}.") for key in flat)
+    if behind or settings_of(flat) != NO_SETTINGS or flat.get(f"{CONTROLLER}.coulomb_feedforward"):
+        return None
+    witness = Witness(log, flat)
+    varies = [
+        np.ptp(signal[witness.rows]) if len(witness.rows) else 0.0 for signal in (witness.force, witness.command())
+    ]
+    if len(witness.rows) < settings.samples_of_a_replay or not np.all(np.isfinite(varies)) or not all(varies):
+        return None
+    return witness
 
 
 def doubt_of(replay: Replay, log: Log) -> str:
@@ -242,6 +304,8 @@ def doubt_of(replay: Replay, log: Log) -> str:
         "force (check gains, derivative, filters and the mass it is tuned for)"
     )
 
+
+FORCE_LIMIT = f"{CONTROLLER}.force_limit"
 
 CHANNELS = ("reference", "position", "force")
 """Channels of a log that a replay needs."""

@@ -67,6 +67,10 @@ def _explained(replay: Replay | None) -> str:
     if replay is None or not replay.agrees or replay.refutes:
         return ""
     late = f", {replay.lag * 1e3:.3g} ms after the position" if replay.lag else ""
+    if replay.left_by_stamps is not None:
+        late += (
+            f" (with scattering time stamps it leaves {percent(replay.left_by_stamps)}: the samples are taken as even)"
+        )
     return (
         "replayed on the log, the controller of the stage file explains the force to "
         f"{percent(max(abs(replay.slope - 1), replay.left))}{late}: its clock, and the force over the position, fit it"

@@ -54,11 +54,16 @@ def read_log(
     check_gaps(reading, proposal, needed, readings)
     chosen = proposal.chosen
     unused(mapping, chosen, str(path))
-    notes = Notes(list(table.read), _undecided(proposal))
+    notes, even = Notes(list(table.read), _undecided(proposal)), None
     try:
         signals = _stamped(chosen, reading, notes, needed) if stamped else {}
         uneven = bool(signals)
-        base, signals = as_stamped(signals) if uneven else resample_tracks(_tracks(chosen, reading, notes, needed))
+        if uneven:
+            base, signals = as_stamped(signals)
+        else:
+            tracks = _tracks(chosen, reading, notes, needed)
+            base, signals = resample_tracks(tracks)
+            even = None if by_velocity else _as_even(tracks)
         notes.read += base.read
         notes.warnings += base.warnings
         _check(base, signals, needed)
@@ -72,11 +77,25 @@ def read_log(
     _no_doubtful_unit(base, reading)
     notes.warnings += [*_lost(base), *_missing(base), *([] if uneven else _doubts(base, signals, notes))]
     notes.read.append(_spans(base))
-    return Log(
+    log = Log(
         path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
         tuple(notes.read), tuple(notes.warnings), dict(mapping.setup), mapping.axis_kind,
         base.bridged if base.bridged.any() else None, is_integrated=by_velocity and not uneven, is_uneven=uneven,
     )  # fmt: skip
+    if even is None:
+        return log
+    clock, taken = even
+    bridged = clock.bridged if clock.bridged.any() else None
+    same = {"sample_time": clock.period, "signals": taken, "segments": tuple(clock.segments), "bridged": bridged}
+    return replace(log, as_even=replace(log, time=clock.time, **same))
+
+
+def _as_even(tracks: dict[str, Track]) -> tuple[Track, dict[str, np.ndarray]] | None:
+    """Bring tracks, samples of which are taken as even, to one base; None if no track was interpolated."""
+    if any(track.as_even for track in tracks.values()):
+        with suppress(LogError):
+            return resample_tracks({role: track.as_even or track for role, track in tracks.items()})
+    return None
 
 
 def _undecided(proposal: Proposal) -> list[str]:

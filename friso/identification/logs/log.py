@@ -38,7 +38,9 @@ class Log:
     engineer should know before trusting it. `setup` are keys of the stage file that had other values for this log
     ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), marks lost samples that are interpolated; None without any.
     `is_excerpt` marks a part of a longer log, `is_integrated` a log whose position is the integral of its velocity. A
-    log that `is_uneven` has the instants of the file, and `sample_time` is the usual step.
+    log that `is_uneven` has the instants of the file, and `sample_time` is the usual step. Where samples were
+    interpolated onto even instants because their time stamps scatter, `as_even` is the log with the samples as they
+    are, taken as even.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Log:
     is_excerpt: bool = False
     is_integrated: bool = False
     is_uneven: bool = False
+    as_even: Log | None = None
 
     def __contains__(self, role: str) -> bool:
         """Tell whether the log has a role."""
@@ -88,7 +91,9 @@ class Log:
         signals = {role: values[chosen] for role, values in self.signals.items()}
         bridged = None if self.bridged is None else self.bridged[chosen]
         part = (slice(0, count),)
-        return replace(self, time=self.time[chosen], signals=signals, segments=part, bridged=bridged, is_excerpt=True)
+        even = self.as_even and self.as_even.excerpt(count)
+        cut = replace(self, time=self.time[chosen], signals=signals, segments=part, bridged=bridged, as_even=even)
+        return replace(cut, is_excerpt=True)
 
     def per_unit_of_force(self) -> Log:
         """Return the log with its force in the logged unit (such as amperes), if that is no force."""
@@ -129,6 +134,7 @@ def join_logs(logs: Sequence[Log]) -> Log:
         warnings=tuple(dict.fromkeys(line for log in logs for line in log.warnings)),
         bridged=np.concatenate([log.measured(slice(0, log.time.size)) == 0 for log in logs]),
         is_excerpt=False,
+        as_even=join_logs([log.as_even or log for log in logs]) if any(log.as_even for log in logs) else None,
         is_integrated=any(log.is_integrated for log in logs),
     )
 

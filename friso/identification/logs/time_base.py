@@ -20,7 +20,7 @@ class Track:
     """A channel with even instants within each segment.
 
     `time` [s] and `values` have the shape (n,), and `bridged` marks lost samples; `read` and `warnings` describe the
-    processing.
+    processing. `as_even` is the track with its samples as they are, taken as even, where they were interpolated.
     """
 
     time: np.ndarray
@@ -30,6 +30,7 @@ class Track:
     bridged: np.ndarray
     read: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    as_even: Track | None = None
 
 
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
@@ -185,6 +186,7 @@ def _evened(name: str, raw: Track) -> Track:
         f"{name}: time stamps scatter by {jitter:.2g} of a sample time: interpolated onto uniform time stamps; if the "
         f'sampling was uniform and only the time stamps were not, use --dt "{raw.period * 1e3:.6g} ms"'
     )
+    raw.as_even = Track(time, raw.values, raw.period, raw.segments, raw.bridged)
     times, values, filled, segments, start = [], [], [], [], 0
     for part in raw.segments:
         count = int((raw.time[part.stop - 1] - raw.time[part.start]) / raw.period + 1e-6) + 1
