@@ -102,6 +102,39 @@ def with_measures(result: OptionResult, **measured: Any) -> OptionResult:
     return replace(result, measures=replace(result.measures, **columns))
 
 
+@pytest.fixture
+def screw() -> Stage:
+    """A stage whose friction is at the motor, which swings slowly."""
+    return Stage(
+        masses={"stage": "9 kg"},
+        transmission={"mass": "6 kg", "stiffness": "60 N/um", "damping": "500 N*s/m", "backlash": "0 um"},
+        encoder={"position": "load", "velocity": "load"},
+        motor_friction={
+            **{"model": "lugre", "static": "16 N", "coulomb": "8 N", "stribeck_velocity": "2 mm/s"},
+            **{"stribeck_exponent": 2, "bristle_stiffness": "0.8 N/um", "bristle_damping": "1500 N*s/m"},
+            "viscous": "12 N*s/m",
+        },
+        controller={"kind": "pid", "crossover": "6 Hz", "alpha": 0.1, "beta": 2},
+        drive={"sample_time": "500 us", "delay": "0 us"},
+        motion={"kind": "there_and_back", "acceleration": "8 m/s^2", "acceleration_time": "50 ms", "return_at": "1.5 s",
+                "duration": "6 s"},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("duration", ["6 s", "3.4 s"])
+def test_a_swing_slower_than_the_run_is_a_swing(screw: Stage, duration: str) -> None:
+    """The stage swings by a millimetre every 3 s."""
+    stage = screw.replace({"motion.duration": duration})
+    machines = drawn(stage)
+    work = work_of(stage, machines)
+    option = Option(OPTIONS["as-is"], stage)
+    measures = work.runs(option, 0)
+    assert not measures.swings.any()
+    followed = work.with_slow_swings(option, measures)
+    assert followed.swings.all()
+    assert not followed.rests.any()
+
+
 def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
     flat = built.flat()
     assert {*machines.keys} == {*SPREADS.keys() & flat.keys(), "rail.seed"}
