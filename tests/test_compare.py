@@ -32,12 +32,14 @@ from friso.questions.compare.blocks import compare_document
 from friso.questions.compare.figures import compare_figures
 from friso.questions.compare.question import CompareAnswer
 from friso.questions.compare.words import PAIRED, answer, brought, paired_rows, sentences, table_rows
+from friso.remedies.machines import draw_fleet
 from friso.shares import share
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.matplotlib_renderer import image
 from friso.stage import Stage, load
 from friso.stage.correlations import Correlations
 from friso.stage.lists import element_keys
+from friso.stage.tables import motor_mass
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import difference, linear_loops, median, quantile_interval, staying_in_position
@@ -59,6 +61,7 @@ COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
 
 QUICK = {study: {"FOLLOWED_MACHINES": 6, "LONGER_FACTOR": 3}}
 COUNT = 20
+GEARED = {"transmission.inertia": "1.5e-5 kg*m^2", "transmission.lead": "10 mm"}
 RIGID = {"joint": None, "parasitic": None}
 
 
@@ -102,6 +105,62 @@ def with_measures(result: OptionResult, **measured: Any) -> OptionResult:
     return replace(result, measures=replace(result.measures, **columns))
 
 
+@pytest.fixture
+def screw() -> Stage:
+    """A stage whose friction is at the motor, which swings slowly."""
+    return Stage(
+        masses={"stage": "9 kg"},
+        transmission={"mass": "6 kg", "stiffness": "60 N/um", "damping": "500 N*s/m", "backlash": "0 um"},
+        encoder={"position": "load", "velocity": "load"},
+        motor_friction={
+            **{"model": "lugre", "static": "16 N", "coulomb": "8 N", "stribeck_velocity": "2 mm/s"},
+            **{"stribeck_exponent": 2, "bristle_stiffness": "0.8 N/um", "bristle_damping": "1500 N*s/m"},
+            "viscous": "12 N*s/m",
+        },
+        controller={"kind": "pid", "crossover": "6 Hz", "alpha": 0.1, "beta": 2},
+        drive={"sample_time": "500 us", "delay": "0 us"},
+        motion={"kind": "there_and_back", "acceleration": "8 m/s^2", "acceleration_time": "50 ms", "return_at": "1.5 s",
+                "duration": "6 s"},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("duration", ["6 s", "3.4 s"])
+def test_a_swing_slower_than_the_run_is_a_swing(screw: Stage, duration: str) -> None:
+    """Most machines swing by a millimetre every 3 s, as a run of a minute shows."""
+    stage, long = (screw.replace({"motion.duration": one}) for one in (duration, "60 s"))
+    work, at_length = (work_of(one, drawn(one)) for one in (stage, long))
+    option = Option(OPTIONS["as-is"], stage)
+    measures = work.runs(option, 0)
+    assert not measures.swings.any()
+    expected = at_length.runs(replace(option, stage=long), 0).swings
+    assert np.count_nonzero(expected) > 10
+    assert np.array_equal(work.with_slow_swings(option, measures).swings, expected)
+
+
+@pytest.mark.parametrize("changes", [{}, {"transmission.mass": None, **GEARED}])
+def test_machines_spread_at_the_motor_as_at_the_guide(screw: Stage, changes: dict[str, Any]) -> None:
+    stage = screw.replace(changes)
+    keys, flat = draw_machines(stage, Correlations(), 1000, 3).keys, stage.flat()
+    both = keys["motor_friction.static"], keys["motor_friction.coulomb"]
+    assert np.corrcoef(both)[0, 1] == pytest.approx(TOGETHER_BY, abs=0.05)
+    for key, spread in SPREADS.items():
+        if key.startswith(("motor_friction.", "transmission.")) and flat.get(key):
+            within = np.abs(keys[key] / flat[key] - 1) <= spread / 100
+            assert np.mean(within) == pytest.approx(0.95, abs=0.02), key
+    fleet = draw_fleet(stage, Correlations(), 20, 3).laid_over(stage, {}, 1)
+    for one in (draw_machines(stage, Correlations(), 20, 3).flat(stage, {}), fleet):
+        assert np.ptp(one["transmission.mass"]) > 0
+        if changes:
+            np.testing.assert_allclose(one["transmission.mass"], motor_mass(one))
+
+
+def test_a_feedforward_compensates_the_motor_s_friction(screw: Stage) -> None:
+    machines = drawn(screw)
+    (option,) = (one for one in options(machines, 1e-6).options if one.kind.name == "feedforward")
+    ahead = option.changes["drive.feedforward_coulomb"] / machines.keys["motor_friction.coulomb"]
+    assert np.abs(ahead - 1) == pytest.approx(MODEL_ERROR)
+
+
 def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
     flat = built.flat()
     assert {*machines.keys} == {*SPREADS.keys() & flat.keys(), "rail.seed"}
@@ -130,7 +189,7 @@ def test_presliding_of_every_law_is_drawn() -> None:
     """
     elements = load(EXAMPLE.with_name("thesis_rig_gms.toml"))
     gms = draw_machines(elements, Correlations(), 200, 3)
-    for array in ELEMENTS:
+    for array in (array for array in ELEMENTS if array.startswith("friction.")):
         ratios = [gms.keys[key] / elements.flat()[key] for key in element_keys(elements.flat(), array)]
         assert len(ratios) == 4
         assert np.ptp(ratios, axis=0).max() < 1e-6

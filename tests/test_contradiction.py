@@ -105,6 +105,7 @@ def test_a_stage_without_friction_hunts_from_a_level_on(hunting: Stage) -> None:
     """The level of the thesis's own friction, 1 N, lies among those at which similar contacts hunt with the joint
     locked; a stage that states friction is not asked."""
     assert friction_levels(hunting) is None
+    assert friction_levels(friso.load(friso.example("ball_screw_axis")).replace({"friction": None})) is None
     levels = friction_levels(hunting.replace({"friction": None, "controller.crossover": "4 Hz"}))
     assert levels is not None
     assert levels.shares[0] < 0.1

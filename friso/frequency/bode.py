@@ -36,6 +36,7 @@ from friso.frequency.settings import settings
 from friso.frequency.system import Complex, DriveTiming
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
+from friso.stage.tables import leading_friction
 
 POSITION_TIME = "drive.position_sample_time"
 
@@ -306,7 +307,7 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:
     """Return the loops at prescribed speeds of the cart, with the limiter free if possible."""
-    if flat["friction.model"] == "none":
+    if leading_friction(flat)["friction.model"] == "none":
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
     states = Members.joined([member(speed, touched=touched) for speed in PRESCRIBED_SPEEDS])

@@ -158,6 +158,11 @@ class Stage(Section):
         exerts = self.actuator.exerts if self.actuator else ()
         return replace(kind, exerts=exerts, counted=counted_by(kind, vars(self)))
 
+    @property
+    def states_friction(self) -> bool:
+        """Tell whether the stage file states friction, of the guide or at the motor, be it none."""
+        return self.friction is not None or self.motor_friction is not None
+
     @field_validator("name", "source", "note", "unknown")
     @classmethod
     def _can_be_saved(cls, text: str) -> str:

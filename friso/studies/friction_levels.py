@@ -44,7 +44,7 @@ def friction_levels(stage: Stage) -> FrictionLevels | None:
     Levels are those that bearings of such a mass may have. Returns None for a stage that states its friction, be it
     none, that moves for ever, or whose loop cannot hunt with any friction.
     """
-    if stage.friction is not None:
+    if stage.states_friction:
         return None
     mass = float(moving_mass(stage.flat()))
     levels = mass * np.geomspace(*settings.accelerations_of_friction, settings.levels_of_friction)

@@ -13,6 +13,7 @@ from friso.frequency.members import Members
 from friso.shown.drawing.figure import Dash
 from friso.shown.drawing.palette import BLUE, GREY, ORANGE, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
+from friso.stage.tables import leading_friction
 
 SERIES = "-series"
 """Suffix of the name of a case whose limiter follows the series formula in Table 1 of the thesis."""
@@ -128,8 +129,8 @@ def has_family(bode: Bode) -> bool:
 
 
 def has_friction(bode: Bode) -> bool:
-    """Tell whether the stage has a friction law."""
-    return bode.stage.flat()["friction.model"] != "none"
+    """Tell whether the stage has a friction law, of the guide or of the motor."""
+    return leading_friction(bode.stage.flat())["friction.model"] != "none"
 
 
 def _speed(member: Members) -> str:

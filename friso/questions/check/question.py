@@ -69,7 +69,7 @@ class CheckAnswer(Answer):
     @cached_property
     def friction_levels(self) -> FrictionLevels | None:
         """Return for which friction a stage would hunt whose stage file states none; None for any other."""
-        if self.stage.friction is not None:
+        if self.stage.states_friction:
             return None
         from friso.studies.friction_levels import friction_levels
 

@@ -23,7 +23,7 @@ def verdict_words(check: CheckAnswer) -> tuple[str, bool]:
     """Say what the check found, and whether it is a sure verdict that the stage does not hunt."""
     case = check.result["given"]
     hunting, verdict = case.judgement.hunting, case.verdict
-    if check.stage.friction is None:
+    if not check.stage.states_friction:
         return "there is no verdict: the stage file states no friction", False
     if check.failure or verdict == "failed":
         return f"there is no verdict: {check.failure or 'the run was not completed'}", False

@@ -24,8 +24,8 @@ from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
 from friso.stage import ControllerSection, Stage
 from friso.stage.controllers import CONTROLLER, KIND, controller_of
-from friso.stage.tables import moving_mass
-from friso.studies.compare.machines import Machines
+from friso.stage.tables import MOTOR_FRICTION, moving_mass
+from friso.studies.compare.machines import FRICTIONS, Machines
 from friso.studies.settings import settings
 
 ADRC = "adrc"
@@ -278,8 +278,8 @@ def _feedforward(situation: Situation) -> Variant:
     coulomb = level_under_conditions(flat, "coulomb") if "friction.coulomb" in flat else 0.0
     off = 1 + MODEL_ERROR * machines.signs
     ahead = {
-        "drive.feedforward_coulomb": off * coulomb,
-        "drive.feedforward_viscous": off * flat.get("friction.viscous", 0.0),
+        "drive.feedforward_coulomb": off * (coulomb + flat.get(f"{MOTOR_FRICTION}.coulomb", 0.0)),
+        "drive.feedforward_viscous": off * sum(flat.get(f"{table}.viscous", 0.0) for table in FRICTIONS),
     }
     if not any(np.any(force) for force in ahead.values()):
         raise UnavailableError("the stage file has neither Coulomb nor viscous friction")

@@ -19,7 +19,7 @@ from friso.equations.settings import settings_named
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
 from friso.frequency.crossover import bandwidths_at, limits
-from friso.hunting.criteria import settling_in_the_end
+from friso.hunting.criteria import CREEPS, SWINGS, settling_in_the_end
 from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -100,6 +100,9 @@ FOLLOWED_MACHINES, LONGER_FACTOR = 40, 6
 """Number of machines that are run again, and the factor on their duration. An integrator that was reset may swing that
 slowly."""
 
+TRIED_MACHINES = 8
+"""Machines that are followed for `LONGER_FACTOR` squared; only if one of them swings so slowly, the others are, too."""
+
 NOT_FOLLOWED = Later(np.zeros(0, bool), np.zeros(0, bool))
 """Result for an option whose machines are not run again for longer."""
 
@@ -131,7 +134,7 @@ class OptionResult:
 
     @property
     def swinging(self) -> Share:
-        """Return the probability that a machine swings at the end of the run."""
+        """Return the probability that a machine swings in the end: in its run, or followed for longer."""
         return share(self.measures.swings, self.measures.done)
 
     @property
@@ -313,7 +316,7 @@ def compare(
     results: list[OptionResult] = []
     try:
         for option in tried.options:
-            measures = work.runs(option, len(results))
+            measures = work.with_slow_swings(option, work.runs(option, len(results)))
             may_rest = measures.rests.mean() >= settings.followed_share
             later = work.longer(option) if may_rest else NOT_FOLLOWED
             loops = results[0].loops if results and not option.kind.own_loop else _loops(machines, option)
@@ -365,32 +368,54 @@ class _Work:
         count, parts = self.machines.count, []
         label, total = option.label, count * self.options
         self.progress(before * count, total, label)
-        for recorded in self._recorded(option, self.task, count, 1):
+        for recorded in self._recorded(option, np.arange(count), 1):
             parts.append(measure_chunk(recorded, self.places, self.within))
             self.progress(before * count + int(recorded.numbers[-1]) + 1, total, label)
         return MachineMeasures.joined(parts)
 
     def longer(self, option: Option) -> Later:
         """Run an option on the first machines for longer, and return which stay in position."""
-        task = replace(self.task, duration=LONGER_FACTOR * self.task.duration)
-        count = min(FOLLOWED_MACHINES, self.machines.count)
-        return Later.joined(
-            [
-                staying_in_position(recorded, self.within)
-                for recorded in self._recorded(option, task, count, LONGER_FACTOR)
-            ]
-        )
+        first = np.arange(min(FOLLOWED_MACHINES, self.machines.count))
+        runs = self._recorded(option, first, LONGER_FACTOR)
+        return Later.joined([staying_in_position(recorded, self.within) for recorded in runs])
 
-    def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[RecordedRuns]:
-        """Yield the recorded runs of the first `count` machines, chunk by chunk.
+    def with_slow_swings(self, option: Option, measures: MachineMeasures) -> MachineMeasures:
+        """Return measures of an option in which machines swing whose swing is slower than their run.
 
-        The samples are `coarser` times as far apart as usual.
+        Machines that end outside the tolerance without a swing are run for longer. Without an integral nothing moves
+        them so late.
         """
+        controller = option.stage.controller
+        if controller is None or not controller.integrates(option.stage.flat()):
+            return measures
+        outcome = measures.outcome.copy()
+        for factor in (2, LONGER_FACTOR, LONGER_FACTOR**2):
+            left = np.flatnonzero(outcome == CREEPS)
+            tried = len(left) if factor <= LONGER_FACTOR else TRIED_MACHINES
+            for numbers in (left[:tried], left[tried:]):
+                if numbers.size and (numbers[0] == left[0] or SWINGS in outcome[left[:tried]]):
+                    outcome[numbers] = np.where(self._swing(option, numbers, factor), SWINGS, CREEPS)
+        return replace(measures, outcome=outcome)
+
+    def _swing(self, option: Option, numbers: np.ndarray, factor: int) -> np.ndarray:
+        """Return which of some machines swing in a run that is `factor` times as long."""
+        parts = [
+            measure_chunk(recorded, self.places, self.within).swings
+            for recorded in self._recorded(option, numbers, factor)
+        ]
+        return np.concatenate(parts)
+
+    def _recorded(self, option: Option, numbers: np.ndarray, longer: int) -> Iterator[RecordedRuns]:
+        """Yield the recorded runs of some machines, chunk by chunk.
+
+        They are `longer` times as long as usual, and their samples as many times as far apart.
+        """
+        task = replace(self.task, duration=longer * self.task.duration)
         sample = self.machines.stage.flat()["drive.sample_time"]
-        interval = coarser * max(1, int(np.ceil(LEAST_INTERVAL / sample * (1 - 1e-9)))) * sample
+        interval = longer * max(1, int(np.ceil(LEAST_INTERVAL / sample * (1 - 1e-9)))) * sample
         drawn = self.machines.changes(option.stage, option.changes)
-        changes = {key: value[:count] if np.ndim(value) else value for key, value in drawn.items()}
-        return run(option.stage, task, self.machines.seeds[:count].tolist(), interval, changes)
+        changes = {key: value[numbers] if np.ndim(value) else value for key, value in drawn.items()}
+        return run(option.stage, task, self.machines.seeds[numbers].tolist(), interval, changes)
 
 
 def _loops(machines: Machines, option: Option) -> LoopRobustness:
