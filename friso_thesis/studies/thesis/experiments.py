@@ -23,10 +23,10 @@ from friso.identification.readings.friction_position import FrictionPosition, fr
 from friso.identification.readings.passes import passes
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
-from friso.studies.rig.experiments.constant_speed import passes_log
-from friso.studies.rig.outcome import freed, locked_stage, pace
 from friso_thesis.studies.describing.response import mass_line
+from friso_thesis.studies.rig.experiments.constant_speed import passes_log
 from friso_thesis.studies.rig.in_position import InPosition
+from friso_thesis.studies.rig.outcome import freed, locked_stage, pace
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import (
     RAIL_SEED,
