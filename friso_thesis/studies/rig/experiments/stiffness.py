@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from friso.equations.continuous import slow_gains
-from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.progress import Progress
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.drawing.palette import BLUE, LIGHT, VERMILLION
@@ -20,6 +19,7 @@ from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import staircase
+from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
 from friso_thesis.studies.rig.experiments import RigExperiment
 from friso_thesis.studies.rig.outcome import FIXED_MASS, Outcome, RigLog, freed, interval, pace, rig_log
 
