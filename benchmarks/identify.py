@@ -30,8 +30,6 @@ from benchmarks.report import Goal, print_goals, print_table
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.break_away import static_from_ramps
-from friso.identification.experiments.steps import stiffness_from_steps
-from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.identification.logs.log import Log
 from friso.identification.moves import identify_moves
 from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, fit_parameters
@@ -39,6 +37,8 @@ from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
 from friso.intervals import NORMAL_COVERAGE
+from friso_thesis.studies.identification.steps import stiffness_from_steps
+from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from machines import Machine, break_aways, creeping, drawn, moves, shaken, speeds, steps

@@ -33,12 +33,12 @@ from friso.hunting import check
 from friso.identification.method import Identification, identify
 from friso.stage import Stage, load
 from friso.stage.files import save
-from friso.studies.rig.experiments.frf import plant_log
-from friso.studies.rig.experiments.presliding import presliding_log
-from friso.studies.rig.experiments.stiction import slow_legs
-from friso.studies.rig.experiments.stiffness import steps
-from friso.studies.rig.many_speeds import many_speeds_logs, slow_sliding_logs
-from friso.studies.rig.outcome import RigLog, freed, locked_stage, travel
+from friso_thesis.studies.rig.experiments.frf import plant_log
+from friso_thesis.studies.rig.experiments.presliding import presliding_log
+from friso_thesis.studies.rig.experiments.stiction import slow_legs
+from friso_thesis.studies.rig.experiments.stiffness import steps
+from friso_thesis.studies.rig.many_speeds import many_speeds_logs, slow_sliding_logs
+from friso_thesis.studies.rig.outcome import RigLog, freed, locked_stage, travel
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from rig_machines import Machine, built, mean_level, sources, through_files

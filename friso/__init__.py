@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from friso.questions.identify.question import identify
     from friso.questions.logs.question import logs
     from friso.questions.map.question import sweep
-    from friso.questions.rig.question import rig
     from friso.questions.simulate.question import simulate
     from friso.questions.tune.question import tune
     from friso.stage import Stage, load, loads, save
@@ -75,7 +74,6 @@ __all__ = [
     "logs",
     "member",
     "read_store",
-    "rig",
     "save",
     "schema",
     "simulate",

@@ -20,8 +20,8 @@ from friso.identification.kind import Source
 from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.sources import LogFile, read_all
-from friso.questions.rig.blocks import write_csv
-from friso.studies.rig.outcome import RigLog
+from friso_thesis.questions.rig.blocks import write_csv
+from friso_thesis.studies.rig.outcome import RigLog
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "thesis_drive.toml"
 

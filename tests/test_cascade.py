@@ -35,13 +35,13 @@ from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.progress import silent
 from friso.questions.compare.words import sentences as comparison_sentences
-from friso.questions.rig.words import sentences
 from friso.stage import Stage
 from friso.studies.compare import study
 from friso.studies.compare.study import compare
-from friso.studies.rig.experiments import hunting as rig_hunting
-from friso.studies.rig.moves_on_rails import rails
 from friso.studies.sweep import sweep
+from friso_thesis.questions.rig.words import sentences
+from friso_thesis.studies.rig.experiments import hunting as rig_hunting
+from friso_thesis.studies.rig.moves_on_rails import rails
 
 KV, KP, T_V, MASS = 60.0, 50.0, 0.03, 1.7
 

@@ -40,7 +40,7 @@ from friso.hunting.criteria import (
 from friso.hunting.measures import measure_runs, measuring_options, scan_turning_points
 from friso.questions.simulate.words import conclusion
 from friso.stage import Stage
-from friso.studies.rig.moves_on_rails import turning_points
+from friso_thesis.studies.rig.moves_on_rails import turning_points
 
 STEP, DURATION = 1 / 128, 20.0
 TIME = np.arange(0, DURATION + STEP / 2, STEP)

@@ -35,8 +35,8 @@ from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.studies.metric import METRICS, MapFinding, Metric, Word
-from friso.studies.rig.experiments import RIG_EXPERIMENTS, RigExperiment
-from friso.studies.rig.outcome import Outcome, RigLog
+from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS, RigExperiment
+from friso_thesis.studies.rig.outcome import Outcome, RigLog
 
 ROOT = Path(__file__).parents[1]
 

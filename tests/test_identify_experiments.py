@@ -22,8 +22,6 @@ from friso.errors import LogError
 from friso.identification.combine import combined
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.break_away import static_from_ramps
-from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
-from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.identification.kind import NOTHING_CHOSEN, Prior
 from friso.identification.kinds import KINDS
 from friso.identification.logs.checks import runs
@@ -38,6 +36,8 @@ from friso.identification.readings.rate_effect import break_away, share_below, s
 from friso.identification.readings.settings import ReadingSettings
 from friso.identification.response.fitting import ResponseFit
 from friso.identification.sources import recognised
+from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
+from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
 
 pytestmark = pytest.mark.xdist_group("identify-experiments")
 

@@ -24,8 +24,8 @@ from friso.identification.sources import recognised
 from friso.progress import silent
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import with_friction
-from friso.studies.rig.experiments.presliding import EXPERIMENT, GENTLE, LOOP_COUNT, loop_log, presliding_log
-from friso.studies.rig.outcome import excite, locked_stage, rig_log, travel
+from friso_thesis.studies.rig.experiments.presliding import EXPERIMENT, GENTLE, LOOP_COUNT, loop_log, presliding_log
+from friso_thesis.studies.rig.outcome import excite, locked_stage, rig_log, travel
 
 DT, SECONDS = 5e-4, 6.0
 LINES = np.array([0.7, 1.3, 2.9, 5.3, 9.7, 17.3, 23.9, 31.1, 37.7])

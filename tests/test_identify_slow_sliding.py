@@ -16,8 +16,8 @@ from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.at_bearing import BearingRecord, Between, at_bearing, machine_between
 from friso.identification.readings.common import deflections, record
-from friso.studies.rig import many_speeds
-from friso.studies.rig.outcome import RigLog, locked_stage
+from friso_thesis.studies.rig import many_speeds
+from friso_thesis.studies.rig.outcome import RigLog, locked_stage
 
 DT, SECONDS, FINE = 2e-4, 2.0, 10
 MASS, STIFFNESS, DAMPING, VISCOUS = 1.7, 1e5, 300.0, 2.0
@@ -201,7 +201,7 @@ def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig
 
 @pytest.mark.usefixtures("one_place")
 def test_the_stage_file_takes_it_with_what_presliding_shows() -> None:
-    from friso.studies.rig.experiments.presliding import presliding_log
+    from friso_thesis.studies.rig.experiments.presliding import presliding_log
 
     machine = built(93)
     stage, flat = locked_stage(machine.truth), machine.flat

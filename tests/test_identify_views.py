@@ -25,8 +25,6 @@ from friso.identification.experiments.moves import KIND as MOVES
 from friso.identification.experiments.moves import record_panels
 from friso.identification.experiments.presliding import bristles_from_presliding
 from friso.identification.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
-from friso.identification.experiments.steps import stiffness_from_steps
-from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.identification.inverse_model import inverse_model, motion
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
@@ -64,6 +62,8 @@ from friso.questions.identify.words import (
 from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure, Panel, Series
 from friso.stage.correlations import Correlations
+from friso_thesis.studies.identification.steps import stiffness_from_steps
+from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
 
 pytestmark = pytest.mark.xdist_group("identify-views")
 

@@ -56,7 +56,7 @@ def test_a_command_has_a_function_and_its_options_are_keywords(command: str) -> 
 
 def test_dir_is_the_public_list() -> None:
     """`dir` includes the functions of installed packages, here those of the thesis."""
-    assert dir(friso) == sorted([*friso.__all__, "guideline", "reproduce"])
+    assert dir(friso) == sorted([*friso.__all__, "guideline", "reproduce", "rig"])
     assert [name for name in dir(friso) if inspect.ismodule(getattr(friso, name))] == []
 
 

@@ -26,9 +26,9 @@ from friso.remedies.catalogue import remedies
 from friso.remedies.search import Budget
 from friso.stage import Stage, save
 from friso.studies.compare import study
-from friso.studies.rig.experiments import hunting
-from friso.studies.rig.moves_on_rails import rails
 from friso.virtual_rig.run import as_built_keys
+from friso_thesis.studies.rig.experiments import hunting
+from friso_thesis.studies.rig.moves_on_rails import rails
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 CONTROLLER = {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg", "force_limit": "200 N"}

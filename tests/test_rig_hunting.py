@@ -11,9 +11,10 @@ from refusals import refused
 from friso import load
 from friso.engine.arrays import Status
 from friso.progress import silent
-from friso.questions.rig.words import rig_document, rig_figures, sentences
-from friso.studies.rig.experiments import hunting
-from friso.studies.rig.moves_on_rails import (
+from friso.virtual_rig.run import RecordedRuns
+from friso_thesis.questions.rig.words import rig_document, rig_figures, sentences
+from friso_thesis.studies.rig.experiments import hunting
+from friso_thesis.studies.rig.moves_on_rails import (
     distance,
     move,
     numbers_of,
@@ -25,7 +26,6 @@ from friso.studies.rig.moves_on_rails import (
     turning_points,
     with_joint,
 )
-from friso.virtual_rig.run import RecordedRuns
 
 RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")
 

@@ -7,12 +7,12 @@ import pytest
 from refusals import refused
 
 import friso
-from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.progress import silent
 from friso.stage import Stage
-from friso.studies.rig import many_speeds, outcome
-from friso.studies.rig.experiments import constant_speed, frf, stiction, stiffness
-from friso.studies.rig.outcome import rig_log
+from friso_thesis.studies.identification.stick_slip import static_from_stick_slip
+from friso_thesis.studies.rig import many_speeds, outcome
+from friso_thesis.studies.rig.experiments import constant_speed, frf, stiction, stiffness
+from friso_thesis.studies.rig.outcome import rig_log
 
 PLACE = 0.02
 

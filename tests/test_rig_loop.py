@@ -14,9 +14,9 @@ from friso.identification.readings.common import record
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.stage import load
 from friso.stage.files import save
-from friso.studies.rig.experiments.stiction import slow_legs
-from friso.studies.rig.experiments.stiffness import steps
-from friso.studies.rig.outcome import freed
+from friso_thesis.studies.rig.experiments.stiction import slow_legs
+from friso_thesis.studies.rig.experiments.stiffness import steps
+from friso_thesis.studies.rig.outcome import freed
 
 STIFFNESS, STATIC = "joint.stiffness", "friction.static"
 

@@ -10,11 +10,11 @@ from friso.identification.kind import as_set_up
 from friso.identification.logs.mapping import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.sources import read_all
 from friso.progress import silent
-from friso.questions.rig.blocks import write_csv
-from friso.questions.rig.words import sentences
 from friso.stage import Stage
-from friso.studies.rig.experiments import constant_speed, presliding, stiction
-from friso.studies.rig.experiments.stiffness import steps
+from friso_thesis.questions.rig.blocks import write_csv
+from friso_thesis.questions.rig.words import sentences
+from friso_thesis.studies.rig.experiments import constant_speed, presliding, stiction
+from friso_thesis.studies.rig.experiments.stiffness import steps
 
 
 @pytest.fixture(scope="module")

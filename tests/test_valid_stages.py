@@ -21,10 +21,10 @@ from friso.interface.answer import Answer
 from friso.stage import Stage
 from friso.stage.plausible import idle_encoder, implausible_values
 from friso.studies.laws.conversion import convert
-from friso.studies.rig.moves_on_rails import with_joint
-from friso.studies.rig.outcome import freed
 from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import SAMPLE_TIME, own_motion
+from friso_thesis.studies.rig.moves_on_rails import with_joint
+from friso_thesis.studies.rig.outcome import freed
 
 LIMITER = {"limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
 FREE = {"stiffness": "2.4 N/mm", "damping": "0.5 N*s/m", "stroke": "1 mm"}

@@ -25,7 +25,7 @@ from friso.design_method.method import NoDesign
 from friso.errors import InputError, StageError
 from friso.interface.answer import Answer
 from friso.stage import Stage
-from friso.studies.rig.experiments import RIG_EXPERIMENTS
+from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS
 
 ALWAYS = ("masses", "friction", "controller", "motion")
 STEEL = "stainless 1.4310"

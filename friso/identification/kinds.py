@@ -10,8 +10,9 @@ from friso.registry import Registry
 if TYPE_CHECKING:  # --help lists the names and must be fast
     from friso.identification.kind import ExperimentKind
 
-KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiments", "KIND")
-"""All kinds of experiment; every module of `friso/identification/experiments/` declares one."""
+KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiments", "KIND", "friso.experiments")
+"""All kinds of experiment: every module of `friso/identification/experiments/` declares one, and so does every module
+that an installed package names."""
 
 
 def in_order(registry: Registry[Any] = KINDS) -> list[str]:

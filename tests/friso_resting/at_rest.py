@@ -8,8 +8,8 @@ import numpy as np
 
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.outcome import Outcome, RigLog
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.outcome import Outcome, RigLog
 
 
 class AtRest(RigExperiment):

@@ -6,9 +6,9 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
-from friso.studies.rig.experiments.frf import MeasuredLoop, Plant
-from friso.studies.rig.moves_on_rails import RailRuns
+from friso_thesis.studies.rig.experiments.frf import MeasuredLoop, Plant
 from friso_thesis.studies.rig.in_position import InPosition, NoisyStandstill, Standstill
+from friso_thesis.studies.rig.moves_on_rails import RailRuns
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import CyclesOnRails, MovesOnRails, RailTraces, RigLoops
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from friso.studies.rig.outcome import locked_stage
+from friso_thesis.studies.rig.outcome import locked_stage
 from friso_thesis.studies.thesis.as_built import rig_with_drive
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.experiments import (

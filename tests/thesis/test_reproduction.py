@@ -29,8 +29,6 @@ from friso.equations.motion import size
 from friso.hunting import find_margin
 from friso.interface.output_folder import UNFINISHED, write
 from friso.shares import share
-from friso.studies.rig.experiments import RIG_EXPERIMENTS
-from friso.studies.rig.moves_on_rails import RailRuns, distance
 from friso.studies.store_files import kept_arrays
 from friso.studies.study import _DECISIVE
 from friso_thesis.questions.reproduce.document import reproduce_document
@@ -39,6 +37,8 @@ from friso_thesis.questions.reproduce.page import COLOURS, claims_markdown, repr
 from friso_thesis.questions.reproduce.questions import QUESTIONS
 from friso_thesis.questions.reproduce.summary import summary_sheet
 from friso_thesis.questions.reproduce.words import SHORT_FORM, details, in_order, met, reasons, short
+from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS
+from friso_thesis.studies.rig.moves_on_rails import RailRuns, distance
 from friso_thesis.studies.thesis import experiments
 from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso_thesis.studies.thesis.claims import (

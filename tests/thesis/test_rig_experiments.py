@@ -9,9 +9,9 @@ from refusals import refused
 
 from friso import load
 from friso.progress import silent
-from friso.questions.rig.words import rig_document, rig_figures, sentences
-from friso.studies.rig.moves_on_rails import rails, with_joint
+from friso_thesis.questions.rig.words import rig_document, rig_figures, sentences
 from friso_thesis.studies.rig import in_position, measured_cycles, stroke_crossover
+from friso_thesis.studies.rig.moves_on_rails import rails, with_joint
 
 RIG = load(Path(__file__).parents[2] / "examples" / "thesis_drive.toml")
 

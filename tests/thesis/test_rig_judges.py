@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rig_evidence import FAILED, HUNTS, cycles, grid, loops, moves, standstill
 
-from friso.studies.rig.experiments.frf import measured_loop
+from friso_thesis.studies.rig.experiments.frf import measured_loop
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.experiments import BUILT, GRID, MOVES, ON_RAILS, STANDSTILL, Experiments
 from friso_thesis.studies.thesis.judges.identified_in_time import MEASURED_MASSES, WEIGHED_MASSES

@@ -27,7 +27,7 @@ from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy
 if TYPE_CHECKING:
     import xarray as xr
 
-    from friso.studies.rig.experiments.frf import MeasuredLoop
+    from friso_thesis.studies.rig.experiments.frf import MeasuredLoop
     from friso_thesis.studies.thesis.cycles import Edge
     from friso_thesis.studies.thesis.linear.loops import CrossoverLoops
     from friso_thesis.studies.thesis.reproduce import Reproduction

@@ -20,11 +20,11 @@ from friso.shown.drawing.palette import BLUE, GREEN, GREY, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.moves_on_rails import crossover, crossover_key, move, with_joint
-from friso.studies.rig.outcome import Outcome, interval, rig_log
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import MoveTask, standing
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.moves_on_rails import crossover, crossover_key, move, with_joint
+from friso_thesis.studies.rig.outcome import Outcome, interval, rig_log
 
 FASTER_CROSSOVER = 2.0
 """Raised crossover relative to that of the stage: 16 Hz for the 8 Hz of the thesis's rig (Sec. 4.3.2)."""

@@ -23,9 +23,10 @@ from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Map, Markers, 
 from friso.shown.drawing.palette import BLUE, INK, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.experiments.hunting import CRITERIA, Trace, runs_document, share_document
-from friso.studies.rig.moves_on_rails import (
+from friso.virtual_rig.task import MoveTask
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.experiments.hunting import CRITERIA, Trace, runs_document, share_document
+from friso_thesis.studies.rig.moves_on_rails import (
     RailRuns,
     crossover,
     distance,
@@ -37,8 +38,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, rig_log
-from friso.virtual_rig.task import MoveTask
+from friso_thesis.studies.rig.outcome import Outcome, rig_log
 
 FRICTION_DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
 """Relative standard deviations of static and of Coulomb friction: our choice."""

@@ -15,9 +15,9 @@ from friso.shown.drawing.figure import Axis, Figure, Map, Panel, Series
 from friso.shown.drawing.palette import INK
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.experiments.hunting import CRITERIA, runs_document, share_document
-from friso.studies.rig.moves_on_rails import (
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.experiments.hunting import CRITERIA, runs_document, share_document
+from friso_thesis.studies.rig.moves_on_rails import (
     RailRuns,
     crossover,
     crossover_key,
@@ -29,7 +29,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, rig_log
+from friso_thesis.studies.rig.outcome import Outcome, rig_log
 
 RELATIVE_CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
 """Crossovers relative to the stage's. The range is that of the thesis's rig (Table 3, Fig. 16); the steps are our

@@ -17,7 +17,7 @@ from friso.equations.motions.there_and_back import CRUISE
 from friso.progress import silent
 from friso.stage import Stage
 from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT
-from friso.studies.rig.experiments.frf import (
+from friso_thesis.studies.rig.experiments.frf import (
     CROSSOVER_SETTINGS,
     MeasuredLoop,
     Plant,
@@ -27,7 +27,9 @@ from friso.studies.rig.experiments.frf import (
     open_loops,
     stable_settings,
 )
-from friso.studies.rig.moves_on_rails import (
+from friso_thesis.studies.rig.in_position import InPosition, in_position
+from friso_thesis.studies.rig.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
+from friso_thesis.studies.rig.moves_on_rails import (
     RailRuns,
     crossover,
     distance,
@@ -39,9 +41,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import excite, freed, locked_stage, pace, rig_log, travel
-from friso_thesis.studies.rig.in_position import InPosition, in_position
-from friso_thesis.studies.rig.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
+from friso_thesis.studies.rig.outcome import excite, freed, locked_stage, pace, rig_log, travel
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover, limits_of_crossover
 from friso_thesis.studies.thesis.settings import settings
 

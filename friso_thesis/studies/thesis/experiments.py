@@ -15,18 +15,18 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from friso.engine.simulate import simulate
-from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
-from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import record
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
 from friso.identification.readings.passes import passes
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
-from friso.studies.rig.experiments.constant_speed import passes_log
-from friso.studies.rig.outcome import freed, locked_stage, pace
 from friso_thesis.studies.describing.response import mass_line
+from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
+from friso_thesis.studies.identification.stick_slip import StickSlip, static_from_stick_slip
+from friso_thesis.studies.rig.experiments.constant_speed import passes_log
 from friso_thesis.studies.rig.in_position import InPosition
+from friso_thesis.studies.rig.outcome import freed, locked_stage, pace
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import (
     RAIL_SEED,

@@ -11,9 +11,9 @@ import numpy as np
 
 from friso.quantities import percent
 from friso.shares import share_interval
-from friso.studies.rig.moves_on_rails import RailRuns
 from friso_thesis.studies.rig.in_position import FORCE_BITS, InPosition, NoisyStandstill
 from friso_thesis.studies.rig.measured_cycles import MOTORS
+from friso_thesis.studies.rig.moves_on_rails import RailRuns
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, RELEASE_DISTANCES, CyclesOnRails, MovesOnRails
 from friso_thesis.studies.thesis.claims import BESIDE, Evidence, Finding, FindingTable, Part, judges, number_text

@@ -7,8 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.quantities import percent
-from friso.studies.rig.experiments.frf import MOTOR_CONSTANT_RATIOS, MeasuredLoop, crossing_near_target, highest_stable
-from friso.studies.rig.outcome import SLIDING
+from friso_thesis.studies.rig.experiments.frf import (
+    MOTOR_CONSTANT_RATIOS,
+    MeasuredLoop,
+    crossing_near_target,
+    highest_stable,
+)
+from friso_thesis.studies.rig.outcome import SLIDING
 from friso_thesis.studies.thesis.as_built import AS_BUILT, RigLoops
 from friso_thesis.studies.thesis.claims import Evidence, Part, number_text
 from friso_thesis.studies.thesis.reading import about, words

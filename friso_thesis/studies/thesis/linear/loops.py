@@ -21,7 +21,7 @@ from friso.frequency.members import Members, in_series, limit_cases
 from friso.frequency.settings import settings as frequency_settings
 from friso.frequency.system import DriveTiming
 from friso.stage import Stage
-from friso.studies.rig.experiments.frf import CROSSOVER_SETTINGS as MEASURED_SETTINGS
+from friso_thesis.studies.rig.experiments.frf import CROSSOVER_SETTINGS as MEASURED_SETTINGS
 from friso_thesis.studies.thesis.studies import LOCKED
 
 IDENTIFIED: Mapping[str, Any] = {"masses.stage": "0.75 kg", TUNED_MASS: "2.5 kg"}

@@ -15,8 +15,8 @@ from friso.interface.inputs import LOGGER, Changes, ExperimentName, Seed, StageL
 from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.virtual_rig.run import as_built_keys
+from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS
 
 if TYPE_CHECKING:
     from friso.shown.pages import Report

@@ -26,9 +26,9 @@ from friso.identification.readings.friction_velocity import FrictionVelocity, fr
 from friso.identification.readings.passes import passes
 from friso.stage import Stage
 from friso.stage.tables import moving_mass
-from friso.studies.rig.outcome import RigLog, interval, longest_travel, pace, quicker, rig_log, travel
 from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs
+from friso_thesis.studies.rig.outcome import RigLog, interval, longest_travel, pace, quicker, rig_log, travel
 
 FASTER_CROSSOVERS = (4.0, 3.0, 2.0, 1.5, 1.0)
 """Crossovers over the stage's own that are tried in turn (friso's choice)."""

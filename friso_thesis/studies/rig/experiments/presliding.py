@@ -28,8 +28,10 @@ from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.tables import friction_law
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.outcome import (
+from friso.virtual_rig.run import as_built_keys, run
+from friso.virtual_rig.task import standing
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.outcome import (
     Excitation,
     Outcome,
     RigLog,
@@ -41,8 +43,6 @@ from friso.studies.rig.outcome import (
     rig_log,
     travel,
 )
-from friso.virtual_rig.run import as_built_keys, run
-from friso.virtual_rig.task import standing
 
 TRAVEL_PLACES = 3
 """Number of places along the travel (friso's choice)."""

@@ -18,9 +18,9 @@ from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
-from friso.studies.rig.outcome import free_stage, interval, locked_stage, pace, quicker
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, point_to_point
+from friso_thesis.studies.rig.outcome import free_stage, interval, locked_stage, pace, quicker
 
 RAIL_COUNT = 20
 """Rails on which a machine is repeated (friso's choice)."""

@@ -21,8 +21,10 @@ from friso.shown.drawing.palette import BLUE, GREEN, INK, LIGHT, ORANGE, PINK, S
 from friso.shown.drawing.phases import phases
 from friso.shown.drawing.prefixes import listed, pretty, with_unit
 from friso.stage import Stage
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.outcome import (
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import standing
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.outcome import (
     WIDE_STROKE,
     Outcome,
     RigLog,
@@ -38,8 +40,6 @@ from friso.studies.rig.outcome import (
     rig_log,
     travel,
 )
-from friso.virtual_rig.run import run
-from friso.virtual_rig.task import standing
 
 LOCKED_PLACES, FREE_PLACES = 10, 3
 """Places along the travel at which the plant is identified, locked (Fig. 29) and free (the thesis shows one)."""

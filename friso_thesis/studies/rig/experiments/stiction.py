@@ -14,16 +14,16 @@ import numpy as np
 from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.rail import friction_factors
 from friso.errors import InputError
-from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.progress import Progress
 from friso.shown.drawing.figure import Array, Axis, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, INK, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit, with_unit
 from friso.stage import Stage
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.outcome import Outcome, RigLog, freed, friction, interval, pace, rig_log, travel
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import legs
+from friso_thesis.studies.identification.stick_slip import StickSlip, static_from_stick_slip
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.outcome import Outcome, RigLog, freed, friction, interval, pace, rig_log, travel
 
 STICTION_RAILS = 10
 """Number of rails, each drawn anew (friso's choice); the thesis has "multiple experiments"."""

@@ -10,5 +10,5 @@ QUESTION = Question(
     takes=("experiment", "stage"),
     details=True,
     files=("truth/stage.toml",),
-    choices=Choices.of_registry("Experiments", "friso.studies.rig.experiments:RIG_EXPERIMENTS"),
+    choices=Choices.of_registry("Experiments", "friso_thesis.studies.rig.experiments:RIG_EXPERIMENTS"),
 )

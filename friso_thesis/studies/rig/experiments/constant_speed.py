@@ -23,8 +23,10 @@ from friso.shown.drawing.palette import BLUE, GREEN, ORANGE, PINK, VERMILLION
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage import Stage
 from friso.stage.tables import moving_mass
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.many_speeds import (
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import legs
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.many_speeds import (
     SAMPLES_PER_PERIOD,
     STANDING_TIME,
     ManySpeeds,
@@ -34,7 +36,7 @@ from friso.studies.rig.many_speeds import (
     mean_friction,
     slow_sliding,
 )
-from friso.studies.rig.outcome import (
+from friso_thesis.studies.rig.outcome import (
     Outcome,
     RigLog,
     freed,
@@ -46,8 +48,6 @@ from friso.studies.rig.outcome import (
     stopped,
     travel,
 )
-from friso.virtual_rig.run import run
-from friso.virtual_rig.task import legs
 
 PASS_DURATIONS = (480.0, 120.0)
 """Durations of the two passes in periods of the crossover. On the thesis's rig they give 2.5 and 10 mm/s."""

@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 
 from friso.equations.continuous import slow_gains
-from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.progress import Progress
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.drawing.palette import BLUE, LIGHT, VERMILLION
 from friso.shown.drawing.prefixes import range_with_unit, with_unit
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.outcome import FIXED_MASS, Outcome, RigLog, freed, interval, pace, rig_log
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import staircase
+from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.outcome import FIXED_MASS, Outcome, RigLog, freed, interval, pace, rig_log
 
 STEP_SIZE, STEP_DIRECTIONS = 0.3, (1, 1, -1, -1, 1, -1)
 """Size of a step in strokes (0.3 mm on the thesis's rig, Sec. 4.2.2), and directions of the steps (friso's choice)."""

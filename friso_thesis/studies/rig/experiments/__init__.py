@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # the names are asked for by --help
     from friso.progress import Progress
     from friso.shown.drawing.figure import Figure
     from friso.stage import Stage
-    from friso.studies.rig.outcome import Outcome
+    from friso_thesis.studies.rig.outcome import Outcome
 
 
 class RigExperiment:
@@ -42,7 +42,7 @@ class RigExperiment:
 
 
 RIG_EXPERIMENTS: Registry[RigExperiment] = Registry(
-    "friso.studies.rig.experiments", "EXPERIMENT", "friso.rig_experiments", RigExperiment
+    "friso_thesis.studies.rig.experiments", "EXPERIMENT", "friso.rig_experiments", RigExperiment
 )
 """All experiments of the rig. Every module of this folder, and every module named by an installed package, declares an
 object of its class."""

@@ -25,8 +25,10 @@ from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
-from friso.studies.rig.experiments import RigExperiment
-from friso.studies.rig.moves_on_rails import (
+from friso.virtual_rig.run import RecordedRuns
+from friso.virtual_rig.task import MoveTask
+from friso_thesis.studies.rig.experiments import RigExperiment
+from friso_thesis.studies.rig.moves_on_rails import (
     PEAK_BAND,
     RailRuns,
     at_crossovers,
@@ -40,9 +42,7 @@ from friso.studies.rig.moves_on_rails import (
     run_moves,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, pace, rig_log
-from friso.virtual_rig.run import RecordedRuns
-from friso.virtual_rig.task import MoveTask
+from friso_thesis.studies.rig.outcome import Outcome, pace, rig_log
 
 RELATIVE_CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
 """Crossovers over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others friso's choice."""

@@ -6,8 +6,8 @@ from typing import Any
 
 from friso.shown.documents import entries, plain_json
 from friso.shown.drawing.figure import Figure
-from friso.studies.rig.experiments import RIG_EXPERIMENTS
-from friso.studies.rig.outcome import Outcome
+from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS
+from friso_thesis.studies.rig.outcome import Outcome
 
 
 def sentences(outcome: Outcome) -> list[str]:

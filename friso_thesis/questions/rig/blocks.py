@@ -10,11 +10,11 @@ import numpy as np
 
 from friso.axis import LINEAR, unit_shown
 from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
-from friso.questions.rig.words import rig_document, rig_figures, sentences
 from friso.shown.blocks import AnswerBlock
 from friso.shown.files import Content
 from friso.stage import Stage
-from friso.studies.rig.outcome import Outcome, RigLog
+from friso_thesis.questions.rig.words import rig_document, rig_figures, sentences
+from friso_thesis.studies.rig.outcome import Outcome, RigLog
 
 
 def blocks(outcome: Outcome) -> list[AnswerBlock]:
