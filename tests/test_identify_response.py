@@ -11,13 +11,12 @@ from scipy.linalg import expm
 
 import friso
 from friso.frequency.analysis import linear
-from friso.identification.estimate import Estimate
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.response.analysis import analyse, visible
 from friso.identification.response.closed_loop import crossovers, feedback
-from friso.identification.response.departure import Drag, departure, explained, friction_from_departure, slid
+from friso.identification.response.departure import departure
 from friso.identification.response.estimators import local_polynomial, multisine
 from friso.identification.response.mass_line import mass_lines, straight_lines
 from friso.identification.response.masses import fit_one_mass, fit_two_mass, two_masses, widened
@@ -582,43 +581,6 @@ def test_departure_from_the_mass_line() -> None:
     none = departure(exact(mass_line, frequency, 0.05, rng), mass_line)
     assert not none.frequency.determined
     assert "follows the model down" in none.frequency.reason
-
-
-def test_coulomb_friction_behind_a_departure() -> None:
-    """Simulated: mass with Coulomb friction under a multisine; the level comes back from its response alone."""
-    level, mass, sign = 0.15, 0.5, -1.0
-    rng, lines = np.random.default_rng(29), np.arange(1, 60)
-    inputs = np.stack([played(rng, rig, lines, 1).input for _ in range(2)])
-    inputs /= np.std(inputs)
-    paths, velocities = slid(np.tile(inputs, 8), DT, mass, level, 3.0)
-    records = [ResponseRecord(sign * np.tile(one, 8), path, DT) for one, path in zip(inputs, paths, strict=True)]
-    response = multisine(records)
-    result = friction_from_departure(response, list(velocities), (0.4, 6.0), sign)
-    assert result.coulomb.holds(level)
-    assert result.coulomb.half_width < 0.5 * level
-    explanation = explained(result, response, sign * inputs, DT, (0.4, 6.0))
-    assert explanation.left < 0.4
-    low = {factor: np.mean(np.abs(item.response[1:6])) for factor, item in explanation.responses.items()}
-    assert low[0.5] < low[1.0] < low[2.0]  # the smaller the force, the more friction holds the mass back
-
-
-def test_sliding_mass_against_its_closed_form() -> None:
-    """A constant force above friction accelerates by the difference, one below does not move."""
-    steps = np.repeat([[2.0], [0.9]], 500, axis=1)
-    position, velocity = slid(steps, 1e-3, 0.5, 1.0, 0.0)
-    assert velocity[:, -1] == pytest.approx([1.0, 0.0])
-    assert position[:, -1] == pytest.approx([0.25, 0.0], rel=0.01)
-    released = np.where(np.arange(4000) < 1000, 5.0, 0.0)[None]
-    end = slid(released, 1e-3, 0.5, 1.0, 20.0)[0][0, -1]
-    assert abs(end) <= 1.0 / 20.0 + 1e-9  # it sticks where friction holds the spring
-
-
-@pytest.mark.parametrize(("value", "factors", "key"), [(0.0, (1.0,), "friction.coulomb"), (0.1, (0.5, 2.0), "factors")])
-def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...], key: str) -> None:
-    estimate = Estimate.normal("x", "N", value, 0.01, "")
-    drag = Drag(estimate, estimate, estimate, estimate, 1.0, 1.0, 0.1, ())
-    with refused(key):
-        explained(drag, exact(dragged, np.arange(1.0, 30), 0.05, None), [np.ones(100)], DT, (1, 20), factors)
 
 
 @pytest.mark.parametrize(("cart", "lowest"), [("stuck", 2400 / (1 + 2400 / 1e5)), ("sliding", 1.7)])

@@ -24,7 +24,6 @@ from friso.identification.kind import (
 from friso.identification.logs.log import Log
 from friso.identification.readings.course import Course
 from friso.identification.response.analysis import Bench, analyse, predicted
-from friso.identification.response.departure import Drag
 from friso.identification.response.mass_line import StraightLine
 from friso.identification.response.masses import TwoMass
 from friso.identification.response.response import FrequencyResponse
@@ -194,48 +193,6 @@ def _departure(bench: Bench, name: str) -> Figure:
     return Figure(f"{name}_departure", "Departure from the linear model", caption, (panel,))
 
 
-def _amplitudes(bench: Bench, name: str) -> Figure:
-    """Draw measured and simulated accelerations per input at low frequency."""
-    assert bench.explanation is not None
-    assert bench.drag is not None
-    top = max(response.frequency[-1] for response in bench.explanation.responses.values())
-    high = 2 * bench.departs.frequency.high if bench.departs else top
-    measured = _rising(bench.driven, high)
-    lines = [Series(*measured, "measured", INK, width=1.8)]
-    for (factor, response), colour in zip(bench.explanation.responses.items(), FACTOR_COLOURS, strict=False):
-        label = "simulated" if factor == 1 else f"simulated, {factor:g} times the input"
-        lines.append(Series(*_rising(response, high), label, colour, "solid" if factor == 1 else "dashed"))
-    level = Limit((1 / bench.drag.mass.value,), "mass line", GREY, "dotted")
-    limits, unit = _around(*(line.y for line in lines)), _unit(bench.driven, "/s^2")
-    size = Axis("Acceleration per input", unit, limits, log=True, prefixed=False)
-    panel = Panel("", Axis.of_frequency(measured[0]), size, tuple(lines), limits=(level,))
-    caption = (
-        f"A mass with a Coulomb friction of {with_interval(bench.drag.coulomb)} on a spring, simulated with the "
-        f"recorded input, a smaller and a larger one: it accounts for {percent(1 - bench.explanation.left, 3)} of the "
-        "departure. The response depends on the size of the input: it is not linear."
-    )
-    return Figure(f"{name}_amplitudes", "Friction at low frequency", caption, (panel,))
-
-
-def _rising(response: FrequencyResponse, high: float) -> tuple[Array, Array]:
-    """Return the frequencies [Hz] up to `high`, and the size of acceleration over input at each."""
-    chosen = (response.frequency > 0) & (response.frequency <= high)
-    hertz = response.frequency[chosen]
-    return hertz, np.abs(response.response[chosen]) * (2 * np.pi * hertz) ** 2
-
-
-def _friction(bench: Bench) -> str:
-    """Say how much of the response's departure from the linear model friction explains.
-
-    The fraction is that of a simulated mass with Coulomb friction on a spring.
-    """
-    assert bench.explanation is not None
-    share = 1 - bench.explanation.left
-    verb = "explains" if share > 0.5 else "does not explain"
-    accounted = percent(max(share, 0.0), 3)
-    return f"A simulated mass with Coulomb friction on a spring {verb} this: it accounts for {accounted}."
-
-
 def _place(line: StraightLine) -> str:
     """Write the kind of a mass line and the band of frequencies that it covers."""
     return f"{line.kind}, {range_with_unit(line.low, line.high, 'Hz')}"
@@ -263,11 +220,6 @@ def _line_numbers(line: StraightLine) -> dict[str, Any]:
     """Return a straight line fitted to a frequency response, for the document."""
     band = {"low_hz": line.low, "high_hz": line.high, **estimates_document(line, "level", "value")}
     return band | entries(line, "kind", "sign")
-
-
-def _drag_numbers(drag: Drag) -> dict[str, Any]:
-    """Return mass, damping, stiffness and Coulomb friction at low frequency, for the document."""
-    return estimates_document(drag, "mass", "damping", "stiffness", "coulomb") | entries(drag, "warnings")
 
 
 class FrequencyKind(ExperimentKind[Bench]):
@@ -364,19 +316,15 @@ class FrequencyKind(ExperimentKind[Bench]):
         ]
         if result.departs is not None:
             facts.append(("Departs from the linear model below", with_interval(result.departs.frequency)))
-        if result.drag is not None:
-            facts.append(("Coulomb friction, from the departure", with_interval(result.drag.coulomb)))
-            facts.append(("Spring beside it", with_interval(result.drag.stiffness)))
         facts += [(f"{log}, predicted by another log", _outputs(errors)) for log, errors in result.aside]
         return tuple(facts)
 
     def sentences(self, result: Bench) -> tuple[str, ...]:
-        """Say what the response shows, and whether friction explains where it is not linear."""
+        """Say what the response shows, and where it is not linear."""
         sentences = [f"{text[0].upper()}{text[1:]}." for text in (result.seen.words[-1:] if result.seen else ())]
         if result.departs is not None and result.departs.frequency.determined:
             below = digits(result.departs.frequency.value, "Hz")
             sentences.append(f"Below about {below} the response departs from the linear model.")
-            sentences += [_friction(result)] if result.explanation is not None else []
         return tuple(sentences)
 
     def headline(self, result: Bench) -> str:
@@ -413,8 +361,6 @@ class FrequencyKind(ExperimentKind[Bench]):
             "seen": list(result.seen.words) if result.seen else [],
             "departure": estimate_document(result.departs.frequency) if result.departs else None,
             "realisations_differ": result.departs.differ if result.departs else None,
-            "friction": _drag_numbers(result.drag) if result.drag else None,
-            "departure_left_by_friction": result.explanation.left if result.explanation else None,
             "aside": [{"log": name, "errors": list(errors)} for name, errors in result.aside],
             "warnings": list(result.warnings),
         }
@@ -424,8 +370,6 @@ class FrequencyKind(ExperimentKind[Bench]):
         figures = [_bode(result, name), *_levels(result, name)]
         if result.departs is not None:
             figures.append(_departure(result, name))
-        if result.explanation is not None:
-            figures.append(_amplitudes(result, name))
         return figures
 
     def doubts(self, result: Bench) -> Sequence[str]:

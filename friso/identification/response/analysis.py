@@ -14,21 +14,13 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import external
 from friso.identification.response.closed_loop import feedback
-from friso.identification.response.departure import (
-    Departure,
-    Drag,
-    Explanation,
-    departure,
-    explained,
-    friction_from_departure,
-)
+from friso.identification.response.departure import Departure, departure
 from friso.identification.response.estimators import local_polynomial, multisine
 from friso.identification.response.mass_line import KINDS, StraightLine, mass_lines, straight_lines
 from friso.identification.response.masses import TwoMass, fit_two_mass, needs_two, widened
@@ -47,8 +39,7 @@ class Bench:
 
     `driven` and `other` are the responses from force to position of the driven mass and, if measured, of the other
     mass. Mass lines, modes and the two-mass model are fitted within `band` [Hz]. At low frequency, `departs` says where
-    friction bends the response off the mass line. `drag` is the friction that explains it, and `explanation` a
-    simulated test of this.
+    friction bends the response off the mass line.
 
     `aside` has, for every log, the relative errors with which the model of another log predicts its outputs. `warnings`
     say what was not found, and why.
@@ -63,8 +54,6 @@ class Bench:
     two_masses: TwoMass | None
     seen: Visible | None
     departs: Departure | None
-    drag: Drag | None
-    explanation: Explanation | None
     aside: tuple[tuple[str, tuple[float, ...]], ...]
     warnings: tuple[str, ...]
 
@@ -133,7 +122,6 @@ def analyse(
         warnings.append(f"no two masses: {seen} the band of the model, {used[0]:.3g} to {used[1]:.3g} Hz")
         model = None
     upper = driven.between(*used)
-    drag, explanation = _friction(warnings, positions, driven, departs, model, period)
     if model and not needs_two(model, driven, other):
         warnings.append("no two masses: one mass, with viscous friction and a spring to ground, explains the response")
         model = None
@@ -149,8 +137,6 @@ def analyse(
         two_masses=model,
         seen=_attempt(warnings, "limit cases", visible, upper, modes),
         departs=departs,
-        drag=drag,
-        explanation=explanation,
         aside=_left_out(warnings, runs, used),
         warnings=tuple(dict.fromkeys([*driven.warnings, *warnings])),
     )
@@ -255,46 +241,6 @@ def _of_all(
     The scatter is that of fits to single realisations.
     """
     return widened(fit_two_mass(driven, other, band), [runs.single(i, band) for i in range(len(runs.logs))])
-
-
-def _friction(
-    warnings: list[str],
-    records: Sequence[ResponseRecord],
-    driven: FrequencyResponse,
-    departs: Departure | None,
-    model: TwoMass | None,
-    period: float | None,
-) -> tuple[Drag | None, Explanation | None]:
-    """Return the friction that bends the response off the mass line, and a test of it.
-
-    The test is a simulation with the estimated friction. Either result is None if it fails; `warnings` then get the
-    reason.
-
-    Either is None if it fails; `warnings` then get the reason.
-    """
-    if not records or departs is None or model is None or not departs.frequency.determined:
-        return None, None
-    step = records[0].sample_time
-    rigid = settings.frequency_of_one_body * model["antiresonance frequency"].value
-    limits = (float(driven.frequency[0]) / 2, min(2 * departs.frequency.high, rigid))
-    smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
-    speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]
-    drag = _attempt(warnings, "friction level", friction_from_departure, driven, speeds, limits, model.signs[0])
-    if drag is None or not drag.coulomb.determined or not np.isfinite(drag.coulomb.value):
-        return drag, None
-    once = _attempt(warnings, "explanation", lambda: [_last_period(record, period) for record in records])
-    if once is None:
-        return drag, None
-    return drag, _attempt(warnings, "explanation", explained, drag, driven, once, step, limits)
-
-
-def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
-    """Return the input over the last whole period.
-
-    `period` [s] is the approximate period; None means that it is searched. Raises InputError where nothing repeats.
-    """
-    periods = find_periods(record.driving, None if period is None else period / record.sample_time)
-    return record.input[periods.stop - periods.samples : periods.stop]
 
 
 def _left_out(

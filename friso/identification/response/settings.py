@@ -15,9 +15,6 @@ class ResponseSettings(Settings):
     frequency_above_friction: float = setting(1 / 7, "")
     """Frequency below which friction may distort a response, relative to its highest measured frequency."""
 
-    frequency_of_one_body: float = setting(0.4, "")
-    """Frequency up to which both masses move as one (within a factor of 1.2), relative to the antiresonance's."""
-
     # Responses to arbitrary excitation.
     order_of_local_polynomials: int = setting(2, "")
     """Order of the local polynomials of response and transient."""
