@@ -829,8 +829,7 @@ def test_a_cell_of_a_map_and_the_leaf_springs_have_what_is_pinned(served: Served
     assert "pinned" in [trace["name"] for trace in part["figures"][0]["data"]]
     leaves = Path(friso.example("thesis_leaves"))
     part = served.ask("flexure", leaves, {"flexure.thickness": "0.2 mm"}, pinned=True)[-1]
-    assert [drawing["label"] for drawing in part["drawings"]] == ["", "pinned"]
-    assert len({drawing["svg"] for drawing in part["drawings"]}) == 2
+    assert "flexure_drawing" in [figure["name"] for figure in part["figures"]]
 
 
 def test_a_report_has_page_figures_document_and_stage_file(served: Served, undrawn: None) -> None:

@@ -707,15 +707,6 @@ def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browse
     page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
-def test_the_drawing_of_the_leaf_springs_goes_with_its_picture(browsed: Browsed) -> None:
-    """The drawing is part of the page: an address of its own (blob:) would be kept as long as the page."""
-    page = browsed.page
-    browsed.add("leaves.toml", Path(friso.example("thesis_leaves")).read_text(encoding="utf-8"))
-    page.click("#tab-flexure")
-    page.wait_for_function("() => document.querySelector('.drawn img')?.naturalWidth > 0")
-    assert page.get_attribute(".drawn img", "src").startswith("data:image/svg+xml,")
-
-
 def test_of_a_log_that_says_nothing_roles_units_and_scales_are_told(browsed: Browsed, tmp_path: Path) -> None:
     """The page then asks for what the command line is given; a refusal names the dropped file."""
     page = browsed.page

@@ -10,7 +10,6 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -56,7 +55,15 @@ DESIGN = method.design
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "specs" / "thesis.toml"
-FIGURES = ("design_map", "design_front", "design_modes", "design_window", "design_damping", "design_settling")
+FIGURES = (
+    "design_map",
+    "design_front",
+    "design_drawing",
+    "design_modes",
+    "design_window",
+    "design_damping",
+    "design_settling",
+)
 SMALL = DesignSettings(
     front_population=40,
     front_generations=25,
@@ -182,12 +189,11 @@ def test_all_files_are_written_and_the_stages_load(
     designed: Design, spec: Path, folder: Path, quick: None, capsys: pytest.CaptureFixture
 ) -> None:
     pictures = {f"{name}.svg" for name in FIGURES}
-    own = {"design.toml", "worst.toml", "design.html", "design_drawing.svg"}
+    own = {"design.toml", "worst.toml", "design.html"}
     assert {path.name for path in folder.iterdir()} == pictures | own | {MARKER}
     stage, worst = friso.load(folder / "design.toml"), friso.load(folder / "worst.toml")
     assert stage.flat()["joint.stiffness"] == pytest.approx(designed.fitted.choice.beams.drive[0], rel=0.02)
     assert worst.flat()["friction.static"] == designed.verification.worst.flat()["friction.static"]
-    assert ElementTree.parse(folder / "design_drawing.svg").getroot().tag.endswith("svg")
     command(RIG, spec, out=folder)  # once more
     assert "next: friso check" in capsys.readouterr().out
 
@@ -364,7 +370,6 @@ def test_the_page_stands_alone_and_shows_all(designed: Design, folder: Path) -> 
     page = Page((folder / "design.html").read_text(encoding="utf-8"))
     assert all(address.startswith("data:") for address in page.loads)
     assert page.tags.count("img") == len(FIGURES)
-    assert page.tags.count("svg") >= 1
     for step in steps(designed):
         assert all(sentence in page.text for sentence in (step.title, *step.sentences))
     for _, sentence in verdicts(designed):

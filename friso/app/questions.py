@@ -277,9 +277,7 @@ def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     ghost = KEPT.answer(friso.flexure, pinned, work) if pinned else None
     work.notes.clear()
     answer = KEPT.answer(friso.flexure, asked.machine, work)
-    drawn = {"": answer, "pinned": ghost} if ghost else {"": answer}
-    drawings = [{"label": label, "svg": item.files()["flexure_drawing.svg"]} for label, item in drawn.items()]
-    yield parts_of(answer, ghosts_of(ghost), drawings=drawings, **_lines("flexure", asked))
+    yield parts_of(answer, ghosts_of(ghost), **_lines("flexure", asked))
 
 
 OPTIONS: Mapping[str, tuple[str, ...]] = {

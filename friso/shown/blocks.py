@@ -45,9 +45,6 @@ class AnswerBlock:
     text: str = ""
     """Drawing or file as text for a fixed-width font."""
 
-    svg: Callable[[], str] = str
-    """Function that makes a drawing as SVG, which the page alone shows."""
-
     columns: Sequence[str | ColouredLabel] = ()
     rows: Sequence[tuple[str, Sequence[str]]] = ()
     """Rows of the table: a name, and a text for each column."""

@@ -194,9 +194,8 @@ export class Pictures {
     for (const box of this.plots.children) if (answer.figures?.some((figure) => figure.name === box.dataset.name)) mark(box, version, ANSWER, free);
     if (answer.kind === "partly" && !answer.sentences.length && this.shown !== "map") return this.tell.shown(answer, this.shown, version); // its words follow
     const words = this.shown === "check" ? [] : answer.sentences;
-    const drawn = (answer.drawings ?? []).map((item) => this.drawn(item));
     const working = answer.kind === "partly" ? [el("progress", { "aria-label": "Progress" })] : [];
-    this.below.replaceChildren(...working, ...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
+    this.below.replaceChildren(...working, ...paragraphs([...words, ...answer.notes]), ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
     mark(this.below, version);
     this.tell.shown(answer, this.shown, version);
   }
@@ -214,12 +213,6 @@ export class Pictures {
 
   numeric() {
     return this.machine.tables.filter((item) => item.present).flatMap((item) => item.keys);
-  }
-
-  drawn({ label, svg }) {
-    const address = `data:image/svg+xml,${encodeURIComponent(svg)}`; // goes with the picture
-    const of = label ? `: ${label}` : "";
-    return el("figure", { class: "drawn" }, el("img", { src: address, alt: `The leaf springs, to scale${of}` }), label ? el("figcaption", {}, label) : null);
   }
 
   // ---------------------------------------------------------------- maps

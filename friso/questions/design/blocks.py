@@ -1,4 +1,4 @@
-"""Give the one block of `friso design`, the drawing of its leaf springs, and its stage files."""
+"""Give the one block of `friso design`, and its stage files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from friso.design_method.choice import Candidate, Confirmed
 from friso.design_method.geometry import Geometry
@@ -17,12 +16,10 @@ from friso.design_method.requirements import Relaxation
 from friso.design_method.settings import settings
 from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.materials import materials
 from friso.questions.design.figures import design_figures
 from friso.questions.design.steps import requirement_rows, steps
 from friso.questions.design.window import lower, upper
 from friso.questions.design.words import need_words, refusal, so_far, verdicts
-from friso.questions.flexure.drawing import drawing_svg
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json, unit_suffix
 from friso.shown.files import Content
@@ -49,32 +46,22 @@ def blocks(design: Design | UnfinishedDesign) -> list[AnswerBlock]:
 
 
 def page_values(design: Design) -> dict[str, Any]:
-    """Return the steps that the page shows, with the drawing and how much of each requirement is used."""
+    """Return the steps that the page shows, with how much of each requirement is used."""
     return {
         "spec": design.spec,
         "steps": steps(design),
         "leaves": LEAVES_STEP,
-        "drawing": Markup(_drawing(design)),
         "requirements": requirement_rows(design),
     }
 
 
 def further_files(design: Design) -> dict[str, Content]:
-    """Return the drawing, and the stage files: the design, and the worst machine that was tried with it."""
+    """Return the stage files: the design, and the worst machine that was tried with it."""
     return {
         NOT_VERIFIED: None,
         "design.toml": design.stage.to_toml(),
         "worst.toml": design.verification.worst.to_toml(),
-        "design_drawing.svg": _drawing(design),
     }
-
-
-def _drawing(design: Design) -> str:
-    """Return the dimensioned drawing of the leaf springs as SVG."""
-    choice = design.fitted.choice
-    data = materials()[choice.geometry.sheet.material]
-    material = f"{data.name}, {data.grade}"
-    return drawing_svg(choice.beams.mechanism, design.fitted.task.stroke, title=design.stage.name, material=material)
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:

@@ -12,8 +12,10 @@ from friso.design_method.method import Design, UnfinishedDesign
 from friso.design_method.population import Corners
 from friso.design_method.verification import MachineOutcomes
 from friso.frequency.crossover import COMFORTABLE_MARGIN, Range
+from friso.materials import materials
 from friso.questions.design.window import limit_name, stiffest, view
 from friso.questions.design.words import hertz, size
+from friso.questions.flexure.drawing import drawing_figure
 from friso.questions.flexure.figures import modes_figure
 from friso.questions.flexure.numbers import newtons_per
 from friso.questions.map.words import QUIET
@@ -45,8 +47,12 @@ def design_figures(design: Design | UnfinishedDesign) -> tuple[Figure, ...]:
     """Return all figures in the order in which they are read; none of an unfinished design."""
     if isinstance(design, UnfinishedDesign):
         return ()
-    modes = replace(modes_figure(design.fitted.choice.beams), name="design_modes")
-    figures = (_map(design), _front(design), modes, window_figure(design), _damping(design), _settling(design))
+    choice = design.fitted.choice
+    modes = replace(modes_figure(choice.beams), name="design_modes")
+    data = materials()[choice.geometry.sheet.material]
+    leaves = drawing_figure(choice.beams.mechanism, design.fitted.task.stroke, f"{data.name}, {data.grade}")
+    drawing = replace(leaves, name="design_drawing")
+    figures = (_map(design), _front(design), drawing, modes, window_figure(design), _damping(design), _settling(design))
     return tuple(replace(figure, subject=design.stage.name) for figure in figures)
 
 

@@ -107,7 +107,7 @@ BINDING_SHARE = 0.95
 def leaves_step(design: Design) -> DesignStep:
     """Return the step that chooses the leaf springs, with reasons."""
     sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
-    figures = ("design_front", "design_modes")
+    figures = ("design_front", "design_drawing", "design_modes")
     return DesignStep(f"Leaf springs: {words.leaves(design)}", sentences, _numbers(design), figures)
 
 

@@ -7,8 +7,6 @@ from typing import Any
 
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.evaluation import Evaluation
-from friso.materials import materials
-from friso.questions.flexure.drawing import drawing_svg
 from friso.questions.flexure.figures import COLOURS, flexure_figures
 from friso.questions.flexure.numbers import rows
 from friso.questions.flexure.words import sentences, warnings
@@ -34,25 +32,12 @@ def blocks(flexure: BothModels) -> list[AnswerBlock]:
         title=flexure.stage.name,
         sentences=sentences(flexure),
         colours=[GREEN, *(VERMILLION for _ in warnings(flexure))],
-        svg=partial(_drawing, flexure),
         columns=[Category(name, COLOURS[name]) for name in flexure.models],
         rows=rows(flexure),
         draw=partial(flexure_figures, flexure),
         numbers=partial(flexure_document, flexure),
     )
     return [block]
-
-
-def further_files(flexure: BothModels) -> dict[str, str]:
-    """Return the drawing."""
-    return {"flexure_drawing.svg": _drawing(flexure)}
-
-
-def _drawing(flexure: BothModels) -> str:
-    """Return the dimensioned drawing of the mechanism as SVG."""
-    data = materials().get(str(flexure.stage.flat().get("flexure.material")))
-    material = f"{data.name}, {data.grade}" if data else ""
-    return drawing_svg(flexure.mechanism, flexure.best.stroke, title=flexure.stage.name, material=material)
 
 
 def flexure_document(flexure: BothModels) -> dict[str, Any]:

@@ -10,7 +10,8 @@ import numpy as np
 from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels
 from friso.leaf_springs.evaluation import Evaluation, Mode
 from friso.leaf_springs.mechanism import Mechanism
-from friso.questions.flexure.layout import block_size
+from friso.materials import materials
+from friso.questions.flexure.drawing import block_size, drawing_figure
 from friso.shown.drawing.figure import Array, Axis, Dash, Figure, Markers, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREY, LIGHT, ORANGE, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
@@ -28,7 +29,9 @@ LINE_POINTS = 101
 
 def flexure_figures(flexure: BothModels) -> tuple[Figure, ...]:
     """Return all figures in the order in which they are read."""
-    figures = (_force(flexure), _support(flexure), modes_figure(flexure.best))
+    data = materials().get(str(flexure.stage.flat().get("flexure.material")))
+    drawing = drawing_figure(flexure.mechanism, flexure.best.stroke, f"{data.name}, {data.grade}" if data else "")
+    figures = (drawing, _force(flexure), _support(flexure), modes_figure(flexure.best))
     return tuple(replace(figure, subject=flexure.stage.name) for figure in figures)
 
 

@@ -322,7 +322,7 @@ def _lettering(item: Lettering, panel: Panel, suffix: str) -> dict[str, Any]:
     across, up, right, above = SIDES[item.side]
     text = "<br>".join(f"<b>{html.escape(line)}</b>" for line in item.text.splitlines())
     place = {"x": _at(item.x, panel.x), "y": _at(item.y, panel.y), "xref": f"x{suffix}", "yref": f"y{suffix}"}
-    shift = {"xanchor": across, "yanchor": up, "xshift": right, "yshift": above}
+    shift = {"xanchor": across, "yanchor": {"center": "middle"}.get(up, up), "xshift": right, "yshift": above}
     shift |= {"bgcolor": item.ground, "borderpad": 1} if item.ground else {}
     return {"text": text, "showarrow": False, "font": {"color": item.colour}, **place, **shift}
 
