@@ -99,7 +99,7 @@ def test_an_end_just_above_coulomb_friction_is_found() -> None:
     assert not attracts(stage, 0.107 / 0.2222)
 
 
-def test_where_judgementbegins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
+def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
     """At half its static friction the locked rig settles; with a little more it hunts. The first lines say so."""
     case = check(rig.replace({"friction.static": "1.4 N", "joint.locked": True}))["locked"]
     margin = case.static_friction
@@ -185,7 +185,7 @@ def test_the_lower_bandwidth_advised_keeps_a_factor_from_hunting() -> None:
     assert slower(hunts(lower=AttractionEnd(0.29, 0.28, True))).just_beyond  # below the bandwidths searched
 
 
-def test_judgementagain_on_the_side_advised_is_in_the_first_sentences() -> None:
+def test_hunting_again_on_the_side_advised_is_in_the_first_sentences() -> None:
     """A stage hunts below 0.7 times its bandwidth and from 1.16 to 2.57 times: whoever makes it faster has to know."""
     again = BandwidthWindow(AttractionEnd(1.1597, 1.1487, True), AttractionEnd(2.57, 2.59, True))
     far = BandwidthWindow(AttractionEnd(0.3, 0.29, True), AttractionEnd(0.4, 0.41, True))
@@ -207,7 +207,7 @@ def test_judgementagain_on_the_side_advised_is_in_the_first_sentences() -> None:
     assert "1.16" not in rest
 
 
-def test_little_reserve_is_told_with_what_brings_judgementback() -> None:
+def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:
     near = ParameterMargin(False, None, AttractionEnd(1.1, 1.05, True), (1 / 3, 3.0))
     far = ParameterMargin(False, None, AttractionEnd(1.6, 1.5, True), (1 / 3, 3.0))
     assert any("1.1 times" in text for text in thin_margins(made_up_case(near, settles())))
@@ -242,7 +242,7 @@ def margin_of(attracts: bool, roughly: Callable[..., Any], thoroughly: Callable[
 
 
 @pytest.mark.inner
-def test_where_judgementbegins_is_found_between_the_factors_tried_first() -> None:
+def test_where_hunting_begins_is_found_between_the_factors_tried_first() -> None:
     """A swing lasts only from 0.8 to 0.9 times a parameter: the nearest end below is that of this window."""
 
     def hunts(factors: np.ndarray) -> np.ndarray:
@@ -257,7 +257,7 @@ def test_where_judgementbegins_is_found_between_the_factors_tried_first() -> Non
 
 
 @pytest.mark.inner
-def test_judgementbeyond_an_end_is_told() -> None:
+def test_hunting_beyond_an_end_is_told() -> None:
     """More than 1.3 times a parameter stops the hunting, but from 2.2 times on it is there again."""
 
     def hunts(factors: np.ndarray) -> np.ndarray:
@@ -289,7 +289,7 @@ def test_scarce_work_leaves_a_side_open() -> None:
 
 
 @pytest.mark.inner
-def test_a_rough_survey_alone_does_not_tell_that_judgementhas_no_end() -> None:
+def test_a_rough_survey_alone_does_not_tell_that_hunting_has_no_end() -> None:
     """On a drawn axis with a leaking integral rough surveys saw hunting up to 3 times the friction; it ends at 2.2."""
     margin = margin_of(True, lambda factors: factors > 0, lambda factors: factors < 2.2)
     assert margin.below is None
@@ -298,7 +298,7 @@ def test_a_rough_survey_alone_does_not_tell_that_judgementhas_no_end() -> None:
 
 
 @pytest.mark.inner
-def test_judgementthat_only_a_thorough_search_sees_has_its_end_found() -> None:
+def test_hunting_that_only_a_thorough_search_sees_has_its_end_found() -> None:
     margin = margin_of(False, lambda factors: factors > 5, lambda factors: factors > 2.2)
     assert margin.above is not None
     assert margin.above.outside <= 2.2 <= margin.above.inside

@@ -405,7 +405,8 @@ def check_of(verdict: str, **more: Any) -> Any:
         (check_of("failed"), True),
         (check_of("settles", certain=False, reason="too much work"), True),
         (check_of("settles", failure="the run stopped"), True),
-        (check_of("settles", stage=SimpleNamespace(friction=None, unknown_keys=())), True),
+        (check_of("settles", stage=SimpleNamespace(states_friction=False, unknown_keys=())), True),
+        (check_of("settles", stage=friso.load(EXAMPLES / "ball_screw_axis.toml").replace({"friction": None})), False),
     ],
 )
 def test_only_a_sure_verdict_leaves_without_a_warning(check: Any, warns: bool) -> None:

@@ -132,8 +132,7 @@ class EdgeSearch:
         """Narrow down the edge by surveys where no orbit can be followed to it, updating `place`.
 
         Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
-        them until they are close together, and goes on from farther off if an attractor is found there, as beyond the
-        end of an orbit. Raises Beyond if an attractor exists up to the end of the search.
+        them until they are close together. Raises Beyond if an attractor exists up to the end of the search.
         """
         reach, ahead, place.kind = edge_settings.reach_log, self._ahead(place.at), "seen"
         place.outside = _nearer(ahead, place.outside, self.farthest)
@@ -152,18 +151,8 @@ class EdgeSearch:
                 continue
             place.outside = float(factors[last])
             end = AttractionEnd(place.at, place.outside, bool(survey.decided[last:].all()))
-            if end.reserve > edge_settings.edge_bracket_share:
-                continue
-            _, farther = self._just_beyond(place.at)
-            survey = self._told(farther, _followed_from([motion.distance for motion in place.motions]))
-            beyond = np.flatnonzero(survey.attracts)
-            if not beyond.size:
-                sure = end.certain and bool(survey.decided.all()) and self._surely_attracts(place)
-                return replace(end, certain=sure)
-            place.at, place.motions = float(farther[beyond[-1]]), survey.take(beyond[-1:]).motions
-            if place.at == self.farthest:
-                raise Beyond
-            place.outside = self._still_ahead(place.at, place.outside)
+            if end.reserve <= edge_settings.edge_bracket_share:
+                return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
         """Tell whether the stage surely hunts at `place`, by a closed orbit or a thorough survey."""
@@ -179,9 +168,6 @@ class EdgeSearch:
         Where return maps do not decide, runs also start from `distances` [m], shape (n,). At the factors numbered
         `confirm`, runs check the maps.
         """
-        if not len(factors):
-            nothing = np.zeros(0, bool)
-            return Attractors((), nothing, np.zeros(0), (), nothing, nothing, nothing)
         begun, stages = np.broadcast_to(distances, (len(factors), len(distances))), self.path.stages(factors)
         survey = what_attracts(stages, distances=begun, confirm=confirm)
         return replace(survey, decided=survey.decided & (survey.attracts | surely_surveyed(stages, survey)))

@@ -264,7 +264,8 @@ def _where_it_slides(
     Intervals hold those of clearly better models of faster samples: where friction falls with speed, no line through it
     is right. Raises InputError as `inverse_model` does.
     """
-    top = max(float(np.abs(_carried(log, part, band).velocity).max(initial=0.0)) for part in log.segments)
+    moved = [_carried(log, part, band, cart_share) for part in log.segments]
+    top = max(float(np.abs(motion.velocity).max(initial=0.0)) for motion in moved)
     models, first = [], None
     for share in identification_settings.speed_shares_of_sliding:
         try:
@@ -395,7 +396,7 @@ def _rows(
     moved = moved_in(log, log["position"][part], band)
     v, a = moved.velocity, moved.acceleration
     if cart_share:
-        carried = _carried(log, part, band)
+        carried = _carried(log, part, band, cart_share)
         v, a = carried.velocity, cart_share * carried.acceleration + (1 - cart_share) * a
     cutoff = identification_settings.smoothing_bandwidths * band
     force, sign = (smoothed(one, log.sample_time, cutoff) for one in (log["force"][part], np.sign(v)))
@@ -418,9 +419,9 @@ def _rows(
     return time[kept], columns[kept], forces[kept], position[kept]
 
 
-def _carried(log: Log, part: slice, band: float) -> FilteredMotion:
-    """Return the motion of the body on the bearing in a segment: the cart's, if measured."""
-    return moved_in(log, on_bearing(log)[part], band)
+def _carried(log: Log, part: slice, band: float, cart_share: float) -> FilteredMotion:
+    """Return the motion in a segment of the body on the bearing: the cart's, if it has a share of the mass."""
+    return moved_in(log, (on_bearing(log) if cart_share else log["position"])[part], band)
 
 
 def _decimated(columns: np.ndarray, step: int) -> np.ndarray:

@@ -13,6 +13,7 @@ from friso.identification.logs.word_lists import channel_words
 
 RATES, STEPS = (channel_words()[name] for name in ("sample_rate", "sample_time"))
 """Names of a sample rate and of a sample time, in lower case without separators."""
+_OF_A_CLOCK = re.compile("|".join(sorted(RATES | STEPS)))
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """Characters around a key and its value that belong to neither."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
@@ -53,7 +54,7 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str, decimal
     intervals, scalars = list[tuple[float, str]](), {}
     for line, stated, value in pairs:
         name, unit = split_heading(stated)
-        key = re.sub(r"[\W\d_]+", "", name.lower())
+        key = _letters(name)
         asked = key in RATES | STEPS and len(value) < settings.characters_of_an_amount
         amount = _AMOUNT.fullmatch(value) if asked else None
         grouped = amount and _GROUPED.fullmatch(amount["number"])
@@ -94,13 +95,19 @@ def _pairs_of_fields(line: str, delimiter: str) -> list[tuple[str, str]]:
         return [pair] if (pair := _pair(line)) else []
     pairs = []
     for i, cell in enumerate(fields):
+        if not _OF_A_CLOCK.search(_letters(cell)):
+            continue
         key, value = _pair(cell) or (cell.rstrip(" :="), "")
-        behind = fields[i + 1 :] if value else fields[i + 2 :]
-        value = value or "".join(fields[i + 1 : i + 2])
-        unit = behind[0] if behind and _seconds(1.0, behind[0].strip("[]()")) is not None else ""
-        goes_on = not unit and bool(behind) and behind[0][0].isdigit()  # decimals or thousands behind a comma
+        value, *behind = [value, *fields[i + 1 : i + 2]] if value else [*fields[i + 1 : i + 3], ""]
+        unit = next((one for one in behind if _seconds(1.0, one.strip("[]()")) is not None), "")
+        goes_on = not unit and any(one[:1].isdigit() for one in behind)  # decimals or thousands behind a comma
         pairs += [] if goes_on else [(key, f"{value} {unit}".strip())]
     return pairs
+
+
+def _letters(text: str) -> str:
+    """Return the letters of a text alone, in lower case."""
+    return re.sub(r"[\W\d_]+", "", text.lower())
 
 
 def _pair(line: str) -> tuple[str, str] | None:

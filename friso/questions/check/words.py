@@ -436,7 +436,7 @@ def _outlook(case: Case) -> list[str]:
         says.insert(0, f"{_capital(_to(case, case.faster))} gives it reserve.")
     if away:
         says.insert(0, f"{_capital(away)}.")
-    return [*says, *_possible_again(below), *_unsearched(case)]
+    return [*says, *_possible_again(case, below), *_unsearched(case)]
 
 
 def _unsearched(case: Case) -> list[str]:
@@ -521,9 +521,10 @@ def _places(case: Case, side: int, factor: float) -> list[str]:
     return [_window(case, window) for window in _hunting_windows(case) if window.lies(side, factor)]
 
 
-def _possible_again(places: Sequence[str]) -> list[str]:
-    """Say in which ranges of the bandwidth hunting is possible again; empty without any."""
-    return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
+def _possible_again(case: Case, places: Sequence[str]) -> list[str]:
+    """Say in which ranges of the bandwidth hunting is possible, beside that of the edge if there is one."""
+    again = " again" if case.judgement.margin else ""
+    return [f"Hunting is possible{again} {listed(places, 'and')}."] if places else []
 
 
 def _loop_lost(case: Case) -> list[str]:
@@ -586,7 +587,7 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     if judgement.margin or CheckPart.BANDWIDTHS in judgement.given_up:
         told = [place for advice in (case.faster, case.slower) if advice for place in _beyond(case, advice)]
         others = [place for window in _hunting_windows(case) if (place := _window(case, window)) not in told]
-        return [*cure, *_possible_again(others), *_unsearched(case)]
+        return [*cure, *_possible_again(case, others), *_unsearched(case)]
     if judgement.hunting.target is None:
         return cure
     still = "is still possible" if judgement.hunting.certain else "was still found"
