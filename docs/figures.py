@@ -16,7 +16,6 @@ from pathlib import Path
 
 import friso
 from friso.interface.answer import Answer
-from friso.questions.flexure.svg import arrow, box, circle, leader, path, sheet, words
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.drawing.matplotlib_renderer import image
 from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
@@ -30,32 +29,6 @@ MADE = DOCS / "figures.json"
 def rig() -> Stage:
     """The thesis rig."""
     return friso.load(friso.example("thesis_rig"))
-
-
-def machine() -> bytes:
-    """The machine: rail, cart on its bearing, joint, stage with actuator and sensor, controller."""
-    spring = [(62 + k * 2.5, 34 + (3 if k % 2 else -3)) for k in range(1, 8)]
-    parts = [
-        box((5, 52), (135, 56), fill="url(#leaf-hatch)"),
-        box((20, 28), (54, 48), fill="#dbe9f4"),
-        *(circle((x, 50), 2.0, "#ffffff") for x in (26, 37, 48)),
-        words((37, 39), "cart", "middle"),
-        path([(54, 34), (62, 34), *spring, (82, 34), (88, 34)]),
-        path([(54, 44), (70, 44)]),
-        path([(76, 41), (76, 47)]),
-        path([(70, 40), (70, 48)], "outline"),
-        path([(76, 44), (88, 44)]),
-        box((88, 24), (118, 48), fill="#f6e3d3"),
-        words((103, 37), "stage", "middle"),
-        path([(103, 18), (122, 18)], "push"),
-        arrow((122, 18), (1, 0), "#D55E00"),
-        words((100, 14), "force of the actuator"),
-        *leader((37, 50), (30, 64), ["friction: sticks, then falls with speed"]),
-        *leader((72, 31), (60, 20), ["joint (the friction isolator)"]),
-        *leader((73, 47), (90, 64), ["limiter: end of the stroke"]),
-        *leader((118, 40), (122, 34), ["sensor"]),
-    ]
-    return sheet(150, 72, "A cart on a bearing carries a stage on a compliant joint", parts).encode()
 
 
 def hunting() -> bytes:
@@ -151,7 +124,6 @@ def _first(answer: Answer) -> bytes:
 
 
 FIGURES: Mapping[str, Callable[[], bytes]] = {
-    "machine.svg": machine,
     "hunting.png": hunting,
     "thesis_rig.png": thesis_rig,
     "thesis_cycles.png": thesis_cycles,

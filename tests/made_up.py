@@ -140,6 +140,7 @@ def fake_stage(
         unknown_keys=(),
         assumed_keys=(),
         friction=object(),
+        states_friction=True,
         doubt="",
         axis_kind=LINEAR,
         conditions=None,

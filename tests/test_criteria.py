@@ -305,6 +305,6 @@ def test_an_end_is_made_of_arrays_of_one_length() -> None:
 )
 def test_a_run_off_its_reference_is_said_to_creep_only_where_it_hardly_moves(deviation: np.ndarray, word: str) -> None:
     late = deviation[TIME >= 0.75 * DURATION]
-    measures: Any = SimpleNamespace(outcome=["creeps"], peak_to_peak=[np.ptp(late)])
+    measures: Any = SimpleNamespace(outcome=["creeps"], peak_to_peak=[np.ptp(late)], offset=[0.0])
     said = conclusion("axis", measures, deviation)
     assert [other for other in ("creeps", "ever farther", "come to rest") if other in said] == [word]

@@ -94,7 +94,8 @@ RECORDED = {"identify_friction.png"}
 @pytest.mark.parametrize("page", [ROOT / "README.md", *DOCS.glob("*.md")], ids=lambda page: page.name)
 def test_every_picture_of_the_docs_has_a_function_that_makes_it(page: Path) -> None:
     pictures = {name for name in PLACED.findall(page.read_text(encoding="utf-8")) if "/" not in name}
-    assert pictures - RECORDED <= set(module("figures").FIGURES)
+    drawn = {name for name in pictures if name.endswith(".svg")}  # by hand
+    assert pictures - drawn - RECORDED <= set(module("figures").FIGURES)
 
 
 @pytest.mark.thorough
