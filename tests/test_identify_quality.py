@@ -416,7 +416,7 @@ def along_the_way(log: Log) -> dict[str, np.ndarray]:
     [
         (late, "shifting the force 16 ms earlier"),
         (averaged, "averaging the motion over 65 ms and shifting the force 32 ms earlier"),
-        (along_the_way, "a force that varies with position, by 15 N"),
+        (along_the_way, "a force that varies with position, by 1"),  # of 16 N, by 9 places in all
         (lambda log: {"force": np.clip(log["force"], -15, 15)}, "56 % of the force samples lie at its extremes"),
         (lambda log: {"force": log["force"] + 59.5}, "a constant force of 60 N exceeds the friction"),
         (lambda log: {"force": log["force"] + 8 * np.sin(2 * np.pi * 9.0 * log.time)}, "near 9"),

@@ -407,7 +407,8 @@ def _rows(
         columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
     if averaged > 1:
         columns = uniform_filter1d(columns, averaged, axis=0)
-    slides = np.abs(v) > slowest
+    kept_band = identification_settings.decimation_bandwidths * band  # vibration beyond it would count samples by turns
+    slides = np.abs(smoothed(v, log.sample_time, kept_band)) > slowest
     forces = np.stack([force, (force + np.r_[force[0], force[:-1]]) / 2], axis=1) * slides[:, None]
     columns = np.hstack([columns, extra]) * slides[:, None]
     rate = 2 * identification_settings.decimation_bandwidths * band
