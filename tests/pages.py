@@ -45,6 +45,6 @@ class Page(HTMLParser):
 
 
 def packed_values(page: str) -> list[Any]:
-    """The values that a page carries packed as JSON, in its order: what plotly draws, or the data of a map."""
-    texts = re.findall(r'<script type="application/gzip" (?:class="figure"|id="data")>(.*?)</script>', page)
+    """The values that a page carries packed as JSON, in its order: what plotly draws."""
+    texts = re.findall(r'<script type="application/gzip" class="figure">(.*?)</script>', page)
     return [json.loads(gzip.decompress(base64.b64decode(text))) for text in texts]

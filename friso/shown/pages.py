@@ -36,6 +36,9 @@ def made_with() -> str:
 OWN_TEMPLATES = "friso.shown"
 """The package with friso's own templates, which other packages' templates extend."""
 
+_SCRIPT = resources.files(OWN_TEMPLATES) / "templates" / "page.js"
+"""The script of every page with figures."""
+
 
 @dataclass(frozen=True)
 class Report:
@@ -44,7 +47,7 @@ class Report:
     The `condition` stands before the answer. `computed` says how the result was computed; it follows the version of
     friso and has no full stop. The command's own template, if there is one, is the file templates/COMMAND.html in the
     package that the field `templates` names. It extends `page.html` and changes its parts: style, answer, sections,
-    footer; `values` are what it names besides. Pages that are `scripted` load plotly even without figures.
+    footer; `values` are what it names besides.
     """
 
     command: str
@@ -55,7 +58,6 @@ class Report:
     stage_file: str = ""
     source: str = ""
     version: str = field(default_factory=made_with)
-    scripted: bool = False
     templates: str = OWN_TEMPLATES
     values: Mapping[str, Any] = field(default_factory=dict)
 
@@ -88,12 +90,12 @@ class Report:
         draw_beforehand(self.figures, [ON_PAGE])
         sections = [(block, [_shown_figure(figure) for figure in block.figures]) for block in self.blocks]
         figures = [figure for _, several in sections for figure in several]
-        scripts = plotly_renderer.script() if figures or self.scripted else None
+        scripts = plotly_renderer.script() if figures else None
         values: dict[str, Any] = {
             "figures": figures,
             "drawn_blocks": sections,
             "plotly": scripts,
-            "page_script": script("page"),
+            "page_script": Markup(_SCRIPT.read_text(encoding="utf-8")),
             **{part.name: getattr(self, part.name) for part in fields(self)},
         }
         assert not values.keys() & self.values.keys()  # a command's value must not replace one of these
@@ -104,11 +106,6 @@ class Report:
 def _shown_figure(figure: Figure) -> tuple[Figure, Markup, Markup]:
     """Return a figure, and how it looks on a page with scripts and on paper."""
     return figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)
-
-
-def script(name: str) -> Markup:
-    """Return a script of friso/shown/templates, to stand in a page."""
-    return Markup((resources.files("friso.shown") / "templates" / f"{name}.js").read_text(encoding="utf-8"))
 
 
 def environment(package: str = OWN_TEMPLATES) -> Environment:

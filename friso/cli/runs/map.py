@@ -39,7 +39,7 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
             The files go beside the store, or into a folder given by --out.
             """
             if elsewhere is not None:
-                return [*elsewhere.write(answer.files(progress), progress), *answer.exports]
-            return write_beside(answer.files_beside(progress), place, shown.overwrite, progress)
+                return [*elsewhere.write(answer.files(), progress), *answer.exports]
+            return write_beside(answer.files_beside(), place, shown.overwrite, progress)
 
         show(answer, shown, write, f"the runs are in {place}, but no figure was written")
