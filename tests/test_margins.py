@@ -237,7 +237,8 @@ def margin_of(attracts: bool, roughly: Callable[..., Any], thoroughly: Callable[
     sketched = {"sketched": lambda stages: Sketch(roughly(stages), np.ones(len(stages), bool))}
     judgement = SimpleNamespace(hunting=SimpleNamespace(surveyed=answers(lambda _: np.array([attracts]), np.ones(1))))
     path = replace(key_path({"key": 1.0}, "key"), stages=lambda factors: factors)  # type: ignore[arg-type,return-value]
-    with patched({path_search: search | sketched, edge_search: search | {"has_a_map": lambda stages: True}}):
+    own = {"has_a_map": lambda stages: True, "bends": lambda stages: False}
+    with patched({path_search: search | sketched, edge_search: search | own}):
         return _margin(path, judgement)  # type: ignore[arg-type]
 
 

@@ -22,7 +22,7 @@ from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.cycle.shooting import close
 from friso.hunting.path import AttractionEnd, LossKind, ParameterPath
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import has_a_map, what_attracts
+from friso.hunting.what_attracts import bends, has_a_map, what_attracts
 
 
 @dataclass
@@ -132,7 +132,9 @@ class EdgeSearch:
         """Narrow down the edge by surveys where no orbit can be followed to it, updating `place`.
 
         Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
-        them until they are close together. Raises Beyond if an attractor exists up to the end of the search.
+        them until they are close together. Raises Beyond if an attractor exists up to the end of the search. The edge
+        is not certain where gains follow a schedule or windows remember the past: there a swing was found to attract
+        again between the factors of the search, narrower than these are apart.
         """
         reach, ahead, place.kind = edge_settings.reach_log, self._ahead(place.at), "seen"
         place.outside = _nearer(ahead, place.outside, self.farthest)
@@ -152,7 +154,8 @@ class EdgeSearch:
             place.outside = float(factors[last])
             end = AttractionEnd(place.at, place.outside, bool(survey.decided[last:].all()))
             if end.reserve <= edge_settings.edge_bracket_share:
-                return replace(end, certain=end.certain and self._surely_attracts(place))
+                sure = end.certain and not bends(self.path.stages(np.array([place.at])))
+                return replace(end, certain=sure and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
         """Tell whether the stage surely hunts at `place`, by a closed orbit or a thorough survey."""

@@ -244,6 +244,13 @@ def map_may_decide(stages: Ensemble) -> bool:
     return has_a_map(stages) and not stages.remember and not stages.structure.follows_drive
 
 
+def bends(stages: Ensemble) -> bool:
+    """Tell whether gains of the stages follow a schedule, or windows of their controllers remember the past."""
+    controller = stages.structure.controller
+    against = controller.settings if controller else NO_SETTINGS
+    return against.past_decides or any(name in against for name in SCHEDULES)
+
+
 def has_a_map(stages: Ensemble) -> bool:
     """Tell whether the sticking distance alone may decide how stages go on.
 
@@ -262,7 +269,6 @@ def has_a_map(stages: Ensemble) -> bool:
     if not settings.maps_decide:
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))
-    controller = stages.structure.controller
-    against = controller.settings if controller else NO_SETTINGS
-    undecided = stands_anywhere or against.past_decides or any(name in against for name in SCHEDULES)
-    return not (stages.chatters or undecided or winds_up_at_a_limit(stages) or stages.outer_integrals)
+    return not (
+        stages.chatters or stands_anywhere or bends(stages) or winds_up_at_a_limit(stages) or stages.outer_integrals
+    )
