@@ -9,9 +9,6 @@ from typing import Any
 
 from friso.shown.drawing import plotly_renderer
 
-NAMESPACES = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
-"""The names by which pictures say what they are; nothing is loaded from there."""
-
 
 class Page(HTMLParser):
     """Tags, addresses that a browser would load, and the text outside scripts and styles."""

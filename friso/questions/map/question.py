@@ -152,10 +152,8 @@ class SweepAnswer(Answer):
 
         if not self.drawable:
             return {}
-        from friso.shown.drawing.images import ON_PAGE
-
         (figure,) = self.figures()
-        return {**image_files(figure, "map", shown=[ON_PAGE]), "map.html": self.page().html()}
+        return {**image_files(figure, "map"), "map.html": self.page().html()}
 
     def files_beside(self) -> Mapping[Path, Content]:
         """Return the figure and the page beside the store, and the exports."""
