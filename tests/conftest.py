@@ -100,17 +100,7 @@ def unprinted() -> Iterator[None]:
     own. Figures that are files are drawn, but for tests that ask for `undrawn`."""
     from friso.shown import pages  # slow
 
-    with patched({pages: {"image": lambda *_, **__: b"<svg/>"}}):
-        yield
-
-
-@pytest.fixture(scope="session", autouse=True)
-def drawn_here() -> Iterator[None]:
-    """Figures are drawn in this process: others would take a second for each command. tests/test_drawing.py has those
-    of its own."""
-    from friso.shown.drawing import images
-
-    with patched({images: {"usable_cores": lambda: 1}}):
+    with patched({pages: {"image": lambda *_, **__: b""}}):
         yield
 
 
@@ -126,9 +116,9 @@ def unhurried() -> Iterator[None]:
 @pytest.fixture
 def printed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages hold their prints all the same."""
-    from friso.shown.drawing import images
+    from friso.shown import files
 
-    monkeypatch.setattr("friso.shown.pages.image", images.image)
+    monkeypatch.setattr("friso.shown.pages.image", files.image)
 
 
 @pytest.fixture

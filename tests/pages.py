@@ -9,9 +9,6 @@ from typing import Any
 
 from friso.shown.drawing import plotly_renderer
 
-NAMESPACES = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
-"""The names by which pictures say what they are; nothing is loaded from there."""
-
 
 class Page(HTMLParser):
     """Tags, addresses that a browser would load, and the text outside scripts and styles."""
@@ -45,6 +42,6 @@ class Page(HTMLParser):
 
 
 def packed_values(page: str) -> list[Any]:
-    """The values that a page carries packed as JSON, in its order: what plotly draws, or the data of a map."""
-    texts = re.findall(r'<script type="application/gzip" (?:class="figure"|id="data")>(.*?)</script>', page)
+    """The values that a page carries packed as JSON, in its order: what plotly draws."""
+    texts = re.findall(r'<script type="application/gzip" class="figure">(.*?)</script>', page)
     return [json.loads(gzip.decompress(base64.b64decode(text))) for text in texts]

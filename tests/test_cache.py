@@ -15,7 +15,6 @@ from pathlib import Path
 
 import psutil
 import pytest
-from filelock import FileLock
 from patience import LIMIT, wait_until
 from systems import posix
 
@@ -283,32 +282,6 @@ def test_where_the_disk_is_full_kernels_are_compiled_and_not_kept(caplog: pytest
     assert caplog.text.count("temporary folder and not kept: No space left") == 1
     with pytest.raises(OSError, match="No space left"):  # all disks are full
         building.built_entries([cache.CodeRequest("full", "what needs room", "full_builder", b"always")])
-
-
-ASKING = """
-import sys
-from friso.platform.helper_process import HelperProcess
-HelperProcess("sleeping", sys.argv[1], paths=sys.path).ask(1e6)
-"""
-SLEEPING = """
-import sys, time
-from filelock import FileLock
-from friso.platform.helper_process import answer_questions
-with FileLock(sys.argv[1]):
-    answer_questions(time.sleep, orphaned=False)
-"""
-
-
-@posix
-def test_a_helper_that_may_not_be_orphaned_ends_in_the_midst_of_its_work(tmp_path: Path) -> None:
-    (tmp_path / "sleeping.py").write_text(SLEEPING)
-    held = FileLock(tmp_path / "held")
-    environ = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *filter(None, sys.path)])}
-    with subprocess.Popen([sys.executable, "-c", ASKING, held.lock_file], env=environ) as parent:
-        wait_until(Path(held.lock_file).exists)
-        time.sleep(0.5)  # it works
-        parent.kill()
-    held.acquire(timeout=LIMIT)
 
 
 @posix

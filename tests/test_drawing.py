@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import html
 import io
 import json
 import os
@@ -14,11 +13,9 @@ import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
-from urllib.parse import unquote
-from xml.etree import ElementTree
 
 import matplotlib
+import matplotlib.image
 import numpy as np
 import pytest
 from fontTools import subset
@@ -29,11 +26,10 @@ from hypothesis.extra.numpy import arrays
 from made_up import both_joints, digests, mpl_arrays, plotly_arrays, same, small_figure
 from pages import packed_values
 
-from friso.axis import ROTARY, speaking_of
 from friso.quantities import percent
 from friso.questions.check.figures import check_figures
-from friso.shown import pages
-from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
+from friso.shown import files, pages
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import KEPT_PER_BUCKET, MOST_BUCKETS, drawable, thin
 from friso.shown.drawing.figure import Axis, Figure, Map, Panel, Series
 from friso.shown.drawing.palette import GREY
@@ -47,7 +43,7 @@ from friso.shown.drawing.prefixes import choose, pretty, range_with_unit, swing_
     [
         (lambda: Series(np.zeros(3), np.zeros(2), "wave", "#000"), r"\(3,\), y \(2,\); expected one length"),
         (lambda: Map(np.zeros(2), np.zeros(3), np.zeros((2, 3)), "peaks", ""), r"\(2, 3\), expected .* = \(3, 2\)"),
-        (lambda: images.save(small_figure(), Path("figure.gif")), "got 'gif', expected one of png, svg, pdf"),
+        (lambda: files.save(small_figure(), Path("figure.gif")), "got 'gif', expected one of png, svg, pdf"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(asked, message):
@@ -201,50 +197,6 @@ def test_figures_drawn_in_threads_are_those_drawn_alone():
         assert [*together] == 2 * alone
 
 
-def test_figures_are_drawn_beside_as_they_are_here(monkeypatch):
-    """Separate processes draw the figures; a process that ended after waiting too long is replaced."""
-    monkeypatch.setattr(images, "usable_cores", lambda: 2)
-    figures = [small_figure(), small_figure()]
-    with speaking_of(ROTARY), images.drawing_beside() as artists:
-        here = images.image(figures[0], *images.ON_PAGE)
-        artists.processes[0].kill()
-        images.draw_beforehand(figures, [images.ON_PAGE])
-        monkeypatch.delattr(matplotlib_renderer, "image")
-        assert [images.image(figure, *images.ON_PAGE) for figure in figures] == [here, here]
-
-
-def test_a_figure_that_no_process_draws_is_drawn_here(monkeypatch):
-    monkeypatch.setattr(images, "usable_cores", lambda: 2)
-    monkeypatch.setattr(images, "PROGRAM", "friso.shown.drawing.no_such_program")
-    with images.drawing_beside():
-        images.draw_beforehand([figure := small_figure()], [images.Image("png")])
-        assert images.image(figure, "png").startswith(b"\x89PNG")
-
-
-def test_what_is_drawn_at_the_end_is_given_up(monkeypatch):
-    """A figure is not handed to a new process, for which an interrupted command used to wait seconds."""
-    asked, killed = Event(), Event()
-
-    class Drawing:
-        def ask(self, _):
-            asked.set()
-            killed.wait()
-            raise EOFError
-
-        def kill(self):
-            killed.set()
-
-        def end(self):
-            return ""
-
-    monkeypatch.setattr(images, "_artist", Drawing)
-    artists = images.Artists()
-    artists.begin([small_figure()], (images.Image("png"),))
-    asked.wait()
-    artists.end()
-    assert len(artists.processes) == 1
-
-
 def test_dollars_and_markup_in_names_are_text():
     figure = replace(small_figure(), subject=r"$\frac{1}$ <b>&", title="_x$")
     panel = replace(figure.panels[0], title="<script>$", series=(replace(figure.panels[0].series[0], label="_$a"),))
@@ -294,47 +246,21 @@ def test_fonts_of_a_pdf_hold_letters_alone():
     assert subset.Options().drop_tables == usual
 
 
-def test_apostrophes_of_a_picture_do_not_end_its_attributes() -> None:
-    """Within the address of a picture, quotation marks are apostrophes."""
-    picture = """<svg a="it's" b="2 % &amp; #">d'or</svg>"""
-    address = re.search(r'src="([^"]*)"', f'<img src="{pages._plain(picture)}">')
-    assert address is not None
-    shown = ElementTree.fromstring(unquote(html.unescape(address[1])))
-    assert (shown.attrib, shown.text) == ({"a": "it's", "b": "2 % & #"}, "d'or")
+def test_a_print_is_the_figure_without_its_heading() -> None:
+    """The rest stays as it is, to the dot."""
+    whole, bare = (read_image(files.image(small_figure(), "png", headed)) for headed in (True, False))
+    cut = len(whole) - len(bare)
+    assert cut == pytest.approx(matplotlib_renderer.HEADER_HEIGHT * matplotlib_renderer.DOTS_PER_INCH, abs=1)
+    assert np.array_equal(whole[cut:], bare)
+    untitled = replace(small_figure(), title="", subject="")
+    assert files.image(untitled, "png", headed=False) == files.image(untitled, "png")
+    address = str(pages.print_image(small_figure()))
+    assert address.startswith("data:image/png;base64,")
 
 
-LINE = "M 1.04 -2 L 1.04 0.5 L 1.06 0.5 L 1.07 0.52 L -3.26 0.5 z M 10 20.25 L 0 0 "
-
-
-def test_lines_in_less_text_end_where_they_did() -> None:
-    """Each coordinate is exact to a tenth: rounding does not add up, and a second line begins anew.
-
-    Coordinates that do not change are left out.
-    """
-    shorter = re.sub(r'(?<= d=")[^"]*', pages._shortened, f'<path d="{LINE}"/>')
-    assert shorter == '<path d="M1-2l0 2.5 .1 0-4.4 0zM10 20.2l-10-20.2"/>'
-    curved = re.sub(r'(?<= d=")[^"]*', pages._shortened, '<path d="M 0 1.25 Q 0.25 3 -4 5 z"/>')
-    assert curved == '<path d="M0 1.25Q0.25 3 -4 5z"/>'
-
-
-def test_a_print_has_every_place_of_its_lines() -> None:
-    """Within half a tenth of a point, as its file has them."""
-    file = matplotlib_renderer.image(small_figure(), "svg").decode()
-    print_ = unquote(html.unescape(pages._plain(file))).replace("'", '"')
-    lines, shorter = ([*map(places, re.findall(r'<path d="([^"Q]*)"', text))] for text in (file, print_))
-    assert len(lines) == len(shorter) > 5
-    for line, short in zip(lines, shorter, strict=True):
-        assert all(np.abs(short - place).max(axis=1).min() < 0.051 for place in line)
-
-
-def places(path: str) -> np.ndarray:
-    """The ends of the pieces of a line, (n, 2)."""
-    at, ends = np.zeros(2), []
-    for command, text in re.findall(r"([MLlz])([^MLlz]*)", path):
-        for x, y in np.reshape([float(number) for number in re.findall(r"-?(?:\d+\.?\d*|\.\d+)", text)], (-1, 2)):
-            at = at * (command == "l") + np.array([x, y])
-            ends.append(at)
-    return np.array(ends)
+def read_image(content: bytes) -> np.ndarray:
+    """The dots of a PNG."""
+    return np.asarray(matplotlib.image.imread(io.BytesIO(content)))
 
 
 @pytest.mark.parametrize(

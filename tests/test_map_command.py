@@ -21,6 +21,7 @@ from systems import posix
 import friso as friso_api
 from friso.errors import InputError, StoreError
 from friso.questions.map.study import refuse_overwriting, stored_study
+from friso.shown.pages import Report
 from friso.studies.metadata import annotate_metadata
 from friso.studies.metric import with_usual
 
@@ -251,10 +252,11 @@ def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     assert friso_inside(tmp_path, "map", "a.zarr").returncode == 2
     (tmp_path / "a.html").unlink()
 
-    def appears(*arguments: object) -> None:
+    def appears(page: Report) -> str:
         (tmp_path / "a.html").write_text("precious")
+        return ""
 
-    monkeypatch.setattr("friso.questions.map.question.drawn_runs", appears)
+    monkeypatch.setattr(Report, "html", appears)
     done = friso_inside(tmp_path, "map", "a.zarr")
     assert (done.returncode, "the runs are in a.zarr" in done.stderr) == (1, True)
     assert {path.name for path in tmp_path.iterdir()} == {"a.zarr", "a.html"}

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
 import math
 import re
 import subprocess
 import sys
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,26 +17,27 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import to_hex
-from pages import NAMESPACES, Page, packed_values
+from pages import Page, packed_values
 from snapshots import Snapshots
 
 import friso
 from friso.axis import ROTARY, speaking_of
-from friso.questions.map.cells import axes_of, look, pick
-from friso.questions.map.data import MISSING_HEIGHT, MOST_CELLS
-from friso.questions.map.figures import MOST_SLICES, map_figure, map_panel
+from friso.questions.map.cells import axes_of
+from friso.questions.map.figures import MOST_SLICES, map_figure, map_panel, marked_figure
 from friso.questions.map.findings import headline, statement
-from friso.questions.map.page import map_files, map_html, marked_figure
+from friso.questions.map.question import SweepAnswer
 from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of, no_number, quantity
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.colours import painted, ramp, scale
-from friso.shown.drawing.drawable import cell_edges, colour_key, drawable
+from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, colour_key, drawable, pick
 from friso.shown.drawing.figure import Category, Cloud, Figure, Map
+from friso.studies.study import Request
 
 CROSSOVER, STROKE, LOCKED = "controller.crossover", "joint.stroke", "joint.locked"
 DAMPING = "joint.limiter_damping"
 UNITS = {CROSSOVER: "Hz", STROKE: "m", DAMPING: "N*s/m", LOCKED: ""}
-RERUN = "friso simulate --cell map.zarr {indices}"
+RERUN = "friso simulate --cell map.zarr {}"
+RIG = friso.load(friso.example("thesis_rig"))
 
 
 def numbers(text: str) -> list[float]:
@@ -211,7 +210,6 @@ def words_map(**options: Any) -> Any:
         (lambda: map_figure(plain(), marker={STROKE: 1e-3}), "joint.stroke, expected a value of controller.crossover"),
         (lambda: words_map(marker={LOCKED: "maybe", STROKE: 0.0}), "got 'maybe', expected one of locked, free"),
         (lambda: map_panel(plain().expand_dims({LOCKED: [True]})), "got runs over joint.locked, .*, expected two axes"),
-        (lambda: map_html(plain(), "peaks", "friso simulate"), r"got 'friso simulate', expected \{indices\} in it"),
         (lambda: replace(only_map(map_figure(plain(), "peaks")), codes=np.zeros(2)), r"\(2,\), expected .*\(5, 4\)"),
         (lambda: Cloud(np.zeros(2), np.zeros(2), np.zeros(3), "Peaks", ""), "expected one length"),
     ],
@@ -391,113 +389,77 @@ def test_a_large_map_is_a_picture_inside_a_vector_file():
 # ---------------------------------------------------------------- page
 
 
-def page_data(page: str) -> dict[str, Any]:
-    (data,) = packed_values(page)
-    return data
+def page_of(runs: xr.Dataset, metric: str = "peaks", store: str = "map.zarr") -> str:
+    """The page of made-up runs in a store."""
+    study = Request(RIG, {STROKE: ([0.0, 1e-3], "m")}, None, {}, False).study([])
+    parts = {"stage": RIG, "study": study, "metric": metric, "store": Path(store), "exports": (), "edges": None}
+    return SweepAnswer(runs, **parts).page().html()
 
 
-def unpacked(text: str, kind: str) -> np.ndarray:
-    return np.frombuffer(base64.b64decode(text), dtype=kind)
-
-
-def where(runs: xr.Dataset) -> list[float | None]:
-    """Return the machine's coordinates on the axes of a page."""
-    return [axis["machine"] for axis in page_data(map_html(runs, "peaks", RERUN))["axes"]]
+def told(runs: xr.Dataset, metric: str = "peaks") -> list[Any]:
+    """The traces of a map that tell something of their points under the mouse."""
+    figure = map_figure(runs, metric, rerun=RERUN)
+    return [trace for trace in plotly_renderer.render(figure).data if trace.text is not None]
 
 
 def test_the_machine_that_was_swept_stands_in_its_map():
-    rig = friso.load(friso.example("thesis_rig"))
-    attrs = {"stage": rig.to_toml()}
-    outside = plain(stage=rig.replace({CROSSOVER: "27 Hz"}).to_toml())
-    assert where(plain(**attrs)) == [8, 1]  # Hz, mm
-    assert where(plain(**attrs, links='{"masses.cart": "0.7 * mass"}')) == [None, None]
-    assert where(plain()) == [None, None]  # whose stage is none
-    assert where(outside) == [None, 1]
-    assert [item.label for item in marked_figure(plain(**attrs), "peaks").panels[0].markers] == ["this machine"]
-    assert not marked_figure(outside, "peaks").panels[0].markers
+    attrs = {"stage": RIG.to_toml()}
+    outside = plain(stage=RIG.replace({CROSSOVER: "27 Hz"}).to_toml())
+    (marker,) = marked_figure(plain(**attrs), "peaks").panels[0].markers
+    assert (marker.label, marker.x.tolist(), marker.y.tolist()) == ("this machine", [8], [1e-3])
+    for other in (plain(**attrs, links='{"masses.cart": "0.7 * mass"}'), plain(), outside):
+        assert not marked_figure(other, "peaks").panels[0].markers
 
 
-def test_a_click_finds_every_value_of_its_cell():
+def test_a_cell_under_the_mouse_names_the_command_of_its_run():
+    """On every kind of map, whatever the order of its values, cells without a number too."""
     runs = troubled().isel({CROSSOVER: [2, 0, 3, 1]})
-    data = page_data(map_html(runs, "peaks", RERUN))
-    assert (data["metric"], data["rerun"], data["sampled"], data["order"]) == ("peaks", RERUN, False, [0, 1])
-    assert data["indices"] == [[1, 3, 0, 2], [0, 1, 2, 3, 4]]
-    places = np.ix_(*data["indices"])
-    crossover, stroke = data["axes"]
-    assert (crossover["label"], crossover["unit"], stroke["unit"]) == ("Crossover", "Hz", "mm")
-    assert crossover["values"] == [1.0, 6.0, 11.0, 16.0]
-    assert stroke["values"] == pytest.approx([0, 0.25, 0.5, 0.75, 1.0])
-    shown = {item["name"]: item for item in data["variables"]}
-    assert list(shown) == ["peaks", "peak_to_peak", "period", "settling_time_10um", "outcome"]
-    for name in list(shown)[:-1]:
-        expected = runs[name].values[places].ravel() * (1e6 if name == "peak_to_peak" else 1.0)
-        assert unpacked(shown[name]["numbers"], "<f4") == pytest.approx(expected, rel=1e-5, nan_ok=True)
-    assert (shown["peak_to_peak"]["unit"], shown["peak_to_peak"]["label"]) == ("µm", "Peak to peak, last quarter")
-    texts = {item["name"]: item for item in data["texts"]}
-    for name in ("outcome", "status"):
-        words = np.array(texts[name]["words"])[unpacked(texts[name]["codes"], "<u4")]
-        assert words.tolist() == runs[name].values[places].ravel().tolist()
-    samples = page_data(map_html(sampled(), "outcome", RERUN))
-    assert (samples["sampled"], samples["order"], samples["indices"]) == (True, [0, 1, 2], [list(range(12))])
-    assert [len(axis["values"]) for axis in samples["axes"]] == [12, 12, 12]
-    single = page_data(map_html(plain().isel({CROSSOVER: 0}), "peaks", RERUN))
-    assert (single["order"], single["indices"]) == ([0], [[0, 1, 2, 3, 4]])
-
-
-@pytest.mark.parametrize("name", ["peaks", "outcome", "settling_time_10um"])
-def test_the_page_colours_cells_as_the_figure_does(name: str):
-    runs = troubled()
-    shown = look(runs, name)
-    item = {item["name"]: item for item in page_data(map_html(runs, name, RERUN))["variables"]}[name]
-    codes = unpacked(item["codes"], "u1").astype(float)
-    codes[codes == MISSING_HEIGHT] = np.nan
-    assert np.array_equal(codes, shown.codes.values.ravel(), equal_nan=True)
-    assert item["kinds"] == [{"label": category.label, "colour": category.colour} for category in shown.categories]
-    drawn = scale(only_map(drawable(map_figure(runs, name))))
-    assert (item["low"], item["high"]) == pytest.approx((drawn.low, drawn.high))
-    assert [colour for _, colour in item["stops"]] == [colour for _, colour in drawn.stops]
+    for metric in ("peaks", "outcome"):
+        for trace in told(runs, metric):
+            assert trace.hovertemplate.endswith("<br>friso simulate --cell map.zarr<br>%{text}<extra></extra>")
+            assert trace.text.tolist() == [[f"{i} {j}" for i in (1, 3, 0, 2)] for j in range(5)]
+    deep = made_up({LOCKED: [True, False], STROKE: np.array([1e-3, 0.0]), CROSSOVER: [2.0, 4.0]})
+    numbered = [trace for trace in told(deep) if trace.customdata is not None]
+    expected = [[[f"{k} 1 {i}", f"{k} 0 {i}"] for i in range(2)] for k in range(2)]
+    assert [trace.text.tolist() for trace in numbered] == expected
+    for trace in numbered:
+        cell = np.array([[text.split() for text in row] for row in trace.text.tolist()], int)
+        assert np.array_equal(deep["peaks"].values[tuple(np.moveaxis(cell, -1, 0))], trace.customdata)
+    (cloud, others) = told(sampled())
+    assert sorted([*cloud.text, *others.text], key=int) == [str(k) for k in range(12)]
+    assert others.text.tolist() == ["3"]
+    line = troubled().isel({CROSSOVER: 0, STROKE: [4, 3, 2, 1, 0]})
+    for metric, count in (("peaks", 4), ("outcome", 5)):
+        at = [(float(x), text) for trace in told(line, metric) for x, text in zip(trace.x, trace.text, strict=True)]
+        assert {round(x / 0.25): text for x, text in at} == {k: str(4 - k) for k in range(5)}, metric
+        assert len(told(line, metric)) == count
+    assert not any(trace.text is not None for trace in plotly_renderer.render(map_figure(runs)).data)
 
 
 def test_the_page_opens_offline_and_says_what_it_shows():
-    page = map_html(troubled(), "peaks", RERUN)
+    page = page_of(troubled())
     parsed = Page(page)
     assert page.count(plotly_renderer.script()) == 1
-    assert all(address.startswith("data:image/svg+xml,") for address in parsed.loads)
+    assert all(address.startswith("data:image/png;base64,") for address in parsed.loads)
     assert "default-src 'none'" in page
-    assert {*re.findall(r"https?://[^\"'<> ]*", page.replace(plotly_renderer.script(), ""))} <= NAMESPACES
+    assert not re.findall(r"https?://[^\"'<> ]*", page.replace(plotly_renderer.script(), ""))
     lines = ["1 to 16 Hz, 4 values", "0 to 1 mm, 5 values", "step budget used up"]
-    lines += ["13 swing, 4 rest, 1 failed, 1 invalid, 1 not run", "relative tolerance 0.0001", 'name = "Rig"']
+    lines += ["13 swing, 4 rest, 1 failed, 1 invalid, 1 not run", "relative tolerance 0.0001", 'name = "Thesis rig"']
     assert all(text in parsed.text for text in lines)
-    assert "In this page" not in parsed.text
-
-
-def test_a_map_is_laid_out_once_for_its_page_and_its_files(
-    printed: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """On the page its note is a text beside the figure, and is left out of the figure."""
-    drawn: list[Figure] = []
-    render = matplotlib_renderer.render
-    monkeypatch.setattr(matplotlib_renderer, "render", lambda figure: drawn.append(figure) or render(figure))
-    files = map_files(plain(), "peaks", RERUN, lambda: None)
-    for form in matplotlib_renderer.IMAGE_FORMATS:
-        files[form](tmp_path / f"map.{form}")
-    assert len(drawn) == 1
-    shown, bare = (render(figure) for figure in (drawn[0], replace(drawn[0], title="", subject="", note="")))
-    cut = ET.fromstring(matplotlib_renderer.image(drawn[0], "svg", headed=False, noted=False))
-    assert float(cut.attrib["height"].removesuffix("pt")) == pytest.approx(72 * bare.get_figheight(), abs=6)
-    assert shown.get_figheight() > bare.get_figheight() + 0.3
+    assert "shows at most" not in parsed.text
 
 
 def test_a_page_too_large_is_thinned_and_says_so():
     runs = made_up({CROSSOVER: np.linspace(1, 16, 1000), STROKE: np.linspace(0, 1e-3, 400)})[["peaks", "outcome"]]
-    page = map_html(runs, "peaks", RERUN)
-    data = page_data(page)
-    rows, columns = (np.array(indices) for indices in data["indices"])
-    assert 0.9 * MOST_CELLS < len(rows) * len(columns) <= MOST_CELLS
-    assert f"{len(rows)} of the 1000 " in Page(page).text
-    peaks = unpacked(data["variables"][0]["numbers"], "<f4")
-    assert np.array_equal(peaks, runs.peaks.values[np.ix_(rows, columns)].ravel())
-    assert data["axes"][0]["values"] == pytest.approx(np.linspace(1, 16, 1000)[rows], rel=1e-5)
+    assert f"{MOST_CELLS} of its 400000 cells" in Page(page_of(runs)).text
+    trace, *_ = told(runs)
+    assert 0.9 * MOST_CELLS < trace.z.size <= MOST_CELLS
+    assert (len(trace.y), len(trace.x)) == trace.z.shape == trace.text.shape
+    i, j = np.array([text.split() for text in trace.text.ravel()], int).T
+    assert np.array_equal(runs.peaks.values[i, j], trace.z.ravel())
+    assert trace.x[i.reshape(trace.z.shape)[0].argmax()] == pytest.approx(16)
+    deep = made_up({CROSSOVER: np.linspace(1, 16, 500), STROKE: np.linspace(0, 1e-3, 400), LOCKED: [True, False]})
+    assert 0.9 * MOST_CELLS < sum(one.z.size for one in told(deep) if one.customdata is not None) <= MOST_CELLS
 
 
 EVIL = '</script><script>alert("x")</script><img src=x onerror=alert(1)>$&'
@@ -511,12 +473,10 @@ def test_names_states_and_words_cannot_inject_markup():
         table["peaks"].attrs["units"] = table[CROSSOVER].attrs["units"] = word
         return table
 
-    plain_page, page = map_html(runs("word"), "peaks", RERUN), map_html(runs(EVIL), "peaks", EVIL + "{indices}")
+    plain_page, page = page_of(runs("word")), page_of(runs(EVIL), store=EVIL)
     assert sorted(Page(page).tags) == sorted(Page(plain_page).tags)
     assert EVIL in Page(page).text
-    data = page_data(page)
-    assert data["rerun"] == EVIL + "{indices}"
-    assert EVIL in data["axes"][1]["words"]
+    assert "<script>alert" not in json.dumps(packed_values(page))
     own = page.replace(plotly_renderer.script(), "").replace("&lt;script&gt;alert", "").replace("onerror=alert", "")
     assert "alert" not in own
     figure = map_figure(runs(EVIL), "peaks")
@@ -530,7 +490,7 @@ sys.path.insert(0, {tests!r})
 import test_map_views as t
 for figure in t.EVERY.values():
     print(hashlib.sha256(t.matplotlib_renderer.image(figure, "svg")).hexdigest())
-print(hashlib.sha256(t.map_html(t.troubled(), "peaks", t.RERUN).encode()).hexdigest())
+print(hashlib.sha256(t.page_of(t.troubled()).encode()).hexdigest())
 """
 
 
@@ -546,7 +506,7 @@ def test_files_are_the_same_bytes_in_every_process(request, tmp_path, printed):
         timeout=300,
     )
     here = [matplotlib_renderer.image(figure, "svg") for figure in EVERY.values()]
-    here.append(map_html(troubled(), "peaks", RERUN).encode())
+    here.append(page_of(troubled()).encode())
     assert done.stdout.split() == [hashlib.sha256(content).hexdigest() for content in here]
 
 

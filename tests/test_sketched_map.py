@@ -12,10 +12,10 @@ from friso.equations.scaled_friction import with_friction
 from friso.hunting import check, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, SWINGS
 from friso.hunting.return_map.settings import ReturnMapSettings
-from friso.questions.map.data import page_data
 from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import caveats, message, own_place
 from friso.questions.map.question import SweepAnswer
+from friso.shown.drawing import plotly_renderer
 from friso.stage import Stage
 
 SPEEDS = np.array([0.6, 0.9, 1.0, 1.3, 1.7])
@@ -127,9 +127,11 @@ def test_regions_of_a_map_are_written_on_and_the_stage_points_to_the_nearest_edg
     assert arrow.end[1] == 1.0
     assert (panel.x.second.unit, panel.x.second.factor) == ("Hz", 8.0)  # type: ignore[union-attr]
     assert (panel.y.second.unit, panel.y.second.factor) == ("N", 3.0)  # type: ignore[union-attr]
-    picture = page_data(sketched.data, "sketch", "{indices}", figure=map_figure(sketched.data, "sketch"))["picture"]
-    assert picture["layout"]["xaxis91"]["matches"] == "x"
-    assert page_data(sketched.data, "outcome", "{indices}", figure=map_figure(sketched.data))["picture"] is None
+    drawn = plotly_renderer.render(map_figure(sketched.data, "sketch", rerun="again {}"))
+    assert drawn.to_plotly_json()["layout"]["xaxis91"]["matches"] == "x"
+    (cells,) = (trace for trace in drawn.data if trace.type == "heatmap" and np.isfinite(trace.z).any())
+    assert cells.hovertemplate.endswith("<br>again %{text}<extra></extra>")  # over the regions too
+    assert cells.text[1, 2] == "2 1"
 
 
 def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(locked: Stage, sketched: SweepAnswer) -> None:

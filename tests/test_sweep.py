@@ -22,10 +22,8 @@ from friso.hunting.verdict import judge
 from friso.stage import Stage
 from friso.studies.axes import Samples
 from friso.studies.metric import usual_metrics
-from friso.studies.settings import StudySettings
 from friso.studies.study import Request, study_of
 from friso.studies.sweep import sweep
-from friso.studies.traces import traces
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
@@ -39,21 +37,6 @@ def judged(stage: Stage, measures: Measures) -> str:
     if expected.target and ends_in(stage.flat(), 1, expected.target)[0][0]:
         return "hunts"
     return judge(stage, measures, 1e-6).verdict
-
-
-def test_a_run_that_is_drawn_has_the_extremes_of_the_run_alone(rig: Stage) -> None:
-    """A cell that no stage may have is not drawn."""
-    axes = {"joint.locked": [True, False], "joint.stroke": (np.array([-1e-3, 1e-3]), "m")}
-    study = Request(rig, axes, None, {}, False).study(usual_metrics())
-    drawn = traces(study)
-    assert np.isnan(drawn.deviations).all(axis=1).tolist() == [True, False, True, False]
-    bins, in_bin = StudySettings().trace_bins, StudySettings().samples_per_bin
-    cell, interval = 3, drawn.duration / (bins * in_bin)
-    alone = friso.simulate(study.cell_stage((1, 1)), study.rtol, interval).data
-    deviation = (alone["position"] - alone["reference"]).values[: bins * in_bin].reshape(bins, in_bin)
-    for pick in (np.min, np.max):
-        extremes = pick(drawn.deviations[cell].reshape(bins, 2), axis=1)
-        assert extremes == pytest.approx(pick(deviation, axis=1), abs=1e-12)
 
 
 @pytest.mark.inner

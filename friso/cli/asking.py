@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,20 +56,17 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     """
     if question.answers_interrupted:
         answers_interrupts()
-    target, beside = None, nullcontext()
+    target = None
     if shown.out is not None:
         from friso.interface.output_folder import OutputFolder
-        from friso.shown.drawing.images import drawing_beside
 
         target = OutputFolder(question.name, shown.out, shown.overwrite, [*_paths([*about, *options.values()])])
         target.check(question.files)
-        beside = drawing_beside()
-    with beside:
-        with ProgressBar(question.during) as progress, named_as_options(question.options):
-            answer = question.function(*about, **options, **kept, progress=progress)
-        speak_of(answer.axis_kind)
-        with whole_answer():
-            show(answer, shown, None if target is None else lambda progress: target.write(answer.files(), progress))
+    with ProgressBar(question.during) as progress, named_as_options(question.options):
+        answer = question.function(*about, **options, **kept, progress=progress)
+    speak_of(answer.axis_kind)
+    with whole_answer():
+        show(answer, shown, None if target is None else lambda progress: target.write(answer.files(), progress))
 
 
 def tried(write: Callable[[], list[Path]], nothing: str) -> tuple[list[Path], str]:

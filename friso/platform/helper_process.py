@@ -1,6 +1,6 @@
 """Run Python processes that answer questions of this one, one at a time.
 
-A process ends by itself if no question comes for a while, or when its parent ends.
+A process ends by itself if no question comes for a while, or its parent has ended.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from threading import Thread, Timer
@@ -61,13 +60,8 @@ class HelperProcess:
         self._process.kill()
 
 
-def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> None:
-    """Answer the questions on standard input until there are no more, or none comes for a while.
-
-    Unless the process may be `orphaned`, it ends at once when the process that started it has ended.
-    """
-    if not orphaned:
-        Thread(target=_end_with, args=[os.getppid()], daemon=True).start()
+def answer_questions(answer: Callable[[Any], Any]) -> None:
+    """Answer the questions on standard input until there are no more, or none comes for a while."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C on a terminal: the parent ends this process
     answers, sys.stdout = sys.stdout, sys.stderr  # output of plug-ins must not mix with answers
     while True:
@@ -81,13 +75,3 @@ def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> Non
         patience.cancel()
         pickle.dump(answer(question), answers.buffer)
         answers.buffer.flush()
-
-
-def _end_with(parent: int) -> None:
-    """End this process as soon as its parent has ended; check twice a second.
-
-    It has no effect on Windows, which does not report a new parent.
-    """
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)

@@ -171,15 +171,6 @@ class StudySettings(Settings):
     surveyed_block: int = setting(32, "")
     """Cells of a block with surveys of a hundred runs each, so that an interruption costs seconds."""
 
-    trace_bins: int = setting(150, "")
-    """Points of a drawn line of a run, a few hundred pixels wide."""
-
-    samples_per_bin: int = setting(20, "")
-    """Samples per drawn point. Fewer miss the extremes of fast motion."""
-
-    traces_together: int = setting(256, "")
-    """Traces computed together, some tens of megabytes."""
-
     points_of_a_loop: int = setting(1000, "")
     """Samples of a period of a hysteresis loop. Fewer cut its corners."""
 

@@ -31,7 +31,6 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
     from friso.identification.sources import OpenQuestions
     from friso.interface.output_folder import OutputFolder
     from friso.questions.identify.blocks import STAGE
-    from friso.shown.drawing.images import drawing_beside
 
     assert shown.out is not None  # the option has a default
     read = [*about[0], *options.get("predict", ()), *([options["stage"]] if "stage" in options else [])]
@@ -51,8 +50,7 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
             example = _command(error.options) if error.options else ""
             raise InputError(error.key, error.actual, error.expected, example, error.origin) from None
     speak_of(answer.axis_kind)
-    with drawing_beside():
-        show(answer, shown, lambda progress: [*target.write(answer.files(), progress), *kept])
+    show(answer, shown, lambda progress: [*target.write(answer.files(), progress), *kept])
 
 
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:

@@ -17,7 +17,6 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     from friso.axis import speak_of
     from friso.interface.output_folder import output_folder
     from friso.questions.map.study import write_beside
-    from friso.shown.drawing.images import drawing_beside
 
     (source,) = about
     if options.get("check"):
@@ -27,19 +26,18 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     if source.is_dir():
         store, elsewhere = None, output_folder(question.name, shown.out, shown.overwrite)
     options = {**options, "overwrite": shown.overwrite, "out": store}
-    with drawing_beside():
-        with ProgressBar() as progress, named_as_options(question.options):
-            answer = question.function(source, **options, beside=elsewhere is None, progress=progress)
-        speak_of(answer.axis_kind)
-        place = answer.store or source
+    with ProgressBar() as progress, named_as_options(question.options):
+        answer = question.function(source, **options, beside=elsewhere is None, progress=progress)
+    speak_of(answer.axis_kind)
+    place = answer.store or source
 
-        def write(progress: Progress) -> list[Path]:
-            """Write figure, page and exports, and return their paths.
+    def write(progress: Progress) -> list[Path]:
+        """Write figure, page and exports, and return their paths.
 
-            The files go beside the store, or into a folder given by --out.
-            """
-            if elsewhere is not None:
-                return [*elsewhere.write(answer.files(progress), progress), *answer.exports]
-            return write_beside(answer.files_beside(progress), place, shown.overwrite, progress)
+        The files go beside the store, or into a folder given by --out.
+        """
+        if elsewhere is not None:
+            return [*elsewhere.write(answer.files(), progress), *answer.exports]
+        return write_beside(answer.files_beside(), place, shown.overwrite, progress)
 
-        show(answer, shown, write, f"the runs are in {place}, but no figure was written")
+    show(answer, shown, write, f"the runs are in {place}, but no figure was written")

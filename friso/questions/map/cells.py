@@ -6,7 +6,6 @@ Axes are put in order, numbers are scaled, and cells without a number get the re
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
@@ -276,16 +275,3 @@ def _state(outcome: str | None, status: str | None) -> Category | None:
     if outcome == "failed" or (outcome is None and reason not in ("", "done")):
         return map_words.FAILED
     return None
-
-
-def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
-    """Return evenly spread indices along each dimension, together at most `most` combinations.
-
-    `sizes` are the lengths of the dimensions. The longest one is thinned first.
-    """
-    counts = list(sizes)
-    while math.prod(counts) > most and max(counts) > 1:
-        counts[counts.index(max(counts))] -= 1
-    return tuple(
-        np.linspace(0, size - 1, number).round().astype(int) for size, number in zip(sizes, counts, strict=True)
-    )

@@ -11,7 +11,7 @@ import xarray as xr
 
 from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
-from friso.hunting.criteria import ATTRACTED, CREEPS, RESTS, SWINGS
+from friso.hunting.criteria import ATTRACTED, CREEPS, PEAK_RULE, RESTS, SWINGS
 from friso.questions.map import words as map_words
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.questions.map.places import machine_of
@@ -291,13 +291,34 @@ def sentences(runs: xr.Dataset, study: Study, metric: str, edges: MapEdges | Non
 
 
 def details(runs: xr.Dataset, study: Study, metric: str, edges: MapEdges | None = None) -> list[str]:
-    """Return further statements on a map, the number of cells with every word, and why cells have no result."""
-    words = "; ".join(filter(None, (map_words.tally(runs, name) for name in map_words.tallied())))
-    size = " x ".join(map(str, study.shape))
-    extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}."
-    further = _all_sentences(runs, study, metric, edges)[MOST_SENTENCES:]
+    """Return further statements on a map."""
     shares = statements(runs, metric)[0 if message(runs, metric, edges) else 1 :]
-    return [*shares, *further, extent, *caveats(runs, metric)]
+    return [*shares, *_all_sentences(runs, study, metric, edges)[MOST_SENTENCES:], *caveats(runs, metric)]
+
+
+def facts(runs: xr.Dataset, metric: str) -> list[tuple[str, list[str]]]:
+    """Return the table of a map: what was varied, how accurately, the cells with every word, and what words mean."""
+    rows = [("Stage", name)] if (name := str(runs.attrs.get("name", ""))) else []
+    rows += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
+    rows.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
+    for name in map_words.tallied():
+        rows += [(map_words.variable(name), words)] if (words := map_words.tally(runs, name)) else []
+    rows += meanings(runs)
+    judged = metric in map_words.tallied()
+    rows += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and not judged else []
+    links = json.loads(runs.attrs.get("links", "{}"))
+    rows += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []
+    rows += [(f"Without result: {grouped(number)}", reason) for reason, number in failures(runs).items()]
+    return [(label, [text]) for label, text in rows]
+
+
+def basis(runs: xr.Dataset) -> str:
+    """Say how the runs were made, and by which rules they are judged."""
+    return (
+        f", relative tolerance {float(runs.attrs['rtol']):g}. Outcomes tell what each run does at its end, verdicts "
+        "are on the stage by what attracts it, from fewer starts than friso check tries, and peaks are maxima of the "
+        f"position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2)"
+    )
 
 
 def _all_sentences(runs: xr.Dataset, study: Study, metric: str, edges: MapEdges | None) -> list[str]:

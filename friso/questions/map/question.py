@@ -29,7 +29,6 @@ from friso.questions.map.study import (
     Varied,
     as_stored,
     coloured_by,
-    drawn_runs,
     export_files,
     path_beside,
     place_of_store,
@@ -54,6 +53,7 @@ if TYPE_CHECKING:
     from friso.shown.blocks import AnswerBlock
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Content, Files
+    from friso.shown.pages import Report
     from friso.studies.edges import MapEdges
 
 CONFIRMED_FROM = 10_000_000
@@ -106,14 +106,17 @@ class SweepAnswer(Answer):
     def blocks(self) -> Sequence[AnswerBlock]:
         """Return which share of the map swings or hunts, and where; with the map, unless it has too many cells."""
         from friso.questions.map.document import map_document
-        from friso.questions.map.figures import map_figure
-        from friso.questions.map.findings import details, sentences
+        from friso.questions.map.figures import marked_figure
+        from friso.questions.map.findings import details, facts, sentences
         from friso.shown.blocks import AnswerBlock
+
+        again = f"friso simulate --cell {shell_word(str(self.store))} {{}}" if self.store else ""
+        again = again or 'friso.simulate(runs.cell("{}"))'
 
         def draw() -> list[Figure]:
             """Draw the map, with the condition under which it holds."""
-            figures = [map_figure(self.result, self.metric, edges=self.edges)] if self.drawable else []
-            return [replace(figure, note=self.condition + figure.note) for figure in figures]
+            figure = marked_figure(self.result, self.metric, self.edges, again, self.condition)
+            return [figure] if self.drawable else []
 
         says = [
             *sentences(self.result, self.study, self.metric, self.edges),
@@ -121,7 +124,10 @@ class SweepAnswer(Answer):
         ]
         numbers = partial(map_document, self.result, self.study, self.store, self.metric, self.edges)
         more = partial(details, self.result, self.study, self.metric, self.edges)
-        return [AnswerBlock(sentences=says, long_details=more, draw=draw, numbers=numbers)]
+        return [
+            AnswerBlock(sentences=says, long_details=more, draw=draw, numbers=numbers),
+            AnswerBlock(title="The map", columns=["Value"], rows=facts(self.result, self.metric), behind=True),
+        ]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that runs the cell with the largest swing at its end.
@@ -134,30 +140,26 @@ class SweepAnswer(Answer):
         cell = " ".join(map(str, np.unravel_index(swings.argmax(), swings.shape)))
         return [f"friso simulate --cell {shell_word(str(self.store))} {cell}"]
 
-    def files(self, progress: Progress = silent) -> Files:
-        """Return the figure in all formats and the page, by name."""
-        return {f"map.{form}": content for form, content in self._views(progress).items()}
+    def page(self) -> Report:
+        """Return the page, with the version of friso that made the runs."""
+        from friso.questions.map.findings import basis
 
-    def files_beside(self, progress: Progress = silent) -> Mapping[Path, Content]:
-        """Return the figure and the page beside the store, and the exports.
+        return replace(super().page(), computed=basis(self.result), version=self.result.attrs["friso"])
 
-        A map of too many cells has no figure or page. The runs that the page draws are computed here, and reported to
-        `progress`.
-        """
-        views = {} if self.store is None else self._views(progress)
-        beside = {path_beside(self.store, form): content for form, content in views.items() if self.store is not None}
-        return {**beside, **export_files(self.result, [*self.exports])}
-
-    def _views(self, progress: Progress) -> Files:
-        """Return the figure in all formats and the page, by format; nothing for too many cells."""
-        from friso.questions.map.page import map_files
+    def files(self) -> Files:
+        """Return the figure in all formats and the page, by name; nothing for too many cells."""
+        from friso.shown.files import image_files
 
         if not self.drawable:
             return {}
-        again = 'friso.simulate(runs.cell("{indices}"))'
-        if self.store is not None:
-            again = f"friso simulate --cell {shell_word(str(self.store))} {{indices}}"
-        return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, progress), self.edges)
+        (figure,) = self.figures()
+        return {**image_files(figure, "map"), "map.html": self.page().html()}
+
+    def files_beside(self) -> Mapping[Path, Content]:
+        """Return the figure and the page beside the store, and the exports."""
+        views = {} if self.store is None else self.files()
+        beside = {path_beside(self.store, name.removeprefix("map.")): views[name] for name in views if self.store}
+        return {**beside, **export_files(self.result, [*self.exports])}
 
 
 class StoreAnswer(Answer):
@@ -215,7 +217,7 @@ def sweep(
     beside: bool = False,
     progress: Progress = silent,
 ) -> SweepAnswer | StoreAnswer:
-    """Where does it hunt: two (or more) keys swept; a Zarr store, a figure, and a page whose cells can be clicked.
+    """Where does it hunt: two (or more) keys swept; a Zarr store, a figure, and a page whose cells name their runs.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from friso.errors import InputError, StoreError
 from friso.interface.inputs import Changes, axes_of, pairs_of, wrong
 from friso.interface.output_folder import check_file, check_store_folder, drafts_of, refuse_place, written
 from friso.platform.system import shell_word
-from friso.progress import Progress, silent
+from friso.progress import Progress
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues, Samples
@@ -32,15 +32,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from friso.shown.files import Content
-    from friso.studies.traces import Traces
 
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
 
 USUAL_AXES = {"speed": "0.4..2.5:41:log", "friction": "0.3..3:41:log"}
 """Axes of a map for which none were named: what one may choose, and what nobody knows."""
-
-MOST_DRAWN_CELLS = 4096
-"""Largest number of cells for which a page includes every run."""
 
 BYTES_PER_NUMBER = 8
 """Bytes per number in a store before compression."""
@@ -175,16 +171,6 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     return InputError("yes", size, "--yes, or fewer points; nothing was run", "yes=True")
 
 
-def drawn_runs(study: Study, progress: Progress = silent) -> Traces | None:
-    """Simulate the runs of all cells, for the page to draw.
-
-    Returns None for more than MOST_DRAWN_CELLS cells.
-    """
-    from friso.studies.traces import traces
-
-    return None if study.cells > MOST_DRAWN_CELLS else traces(study, progress)
-
-
 def place_of_store(folder: str | os.PathLike[str]) -> Path:
     """Return the absolute folder of a store, so that even "." or ".." has a name.
 
@@ -259,9 +245,9 @@ NOTE_WAIT = 10.0
 
 def _views(store: Path) -> list[Path]:
     """Return the paths of the figure in all formats and of the page beside a store."""
-    from friso.questions.map.page import FORMS
+    from friso.shown.drawing.figure import IMAGE_FORMATS
 
-    return [path_beside(store, form) for form in FORMS]
+    return [path_beside(store, form) for form in (*IMAGE_FORMATS, "html")]
 
 
 def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Map numbers to colours, with one scale for both renderers and the map page."""
+"""Map numbers to colours, with one scale for both renderers."""
 
 from __future__ import annotations
 

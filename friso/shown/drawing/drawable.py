@@ -7,7 +7,7 @@ arrays.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
@@ -39,6 +39,44 @@ def drawable(figure: Figure) -> Figure:
     Limits are drawn as series.
     """
     return _escaped_part(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
+
+
+MOST_CELLS = 250_000
+"""Largest number of cells in a figure on a page: more take a browser seconds to open and colour."""
+
+
+def with_fewer_cells(figure: Figure) -> Figure:
+    """Return a figure with maps and clouds thinned evenly, to at most MOST_CELLS cells together."""
+    most = MOST_CELLS // max(1, sum(len(panel.coloured) for panel in figure.panels))
+
+    def thinned(field: Field) -> Field:
+        """Return a map or cloud with evenly spread rows and columns, or points."""
+        at = pick(field.z.shape, most)
+        cells = np.ix_(*at)
+        codes = None if field.codes is None else field.codes[cells]
+        told = None if field.told is None else field.told.of(cells)
+        return replace(field, x=field.x[at[-1]], y=field.y[at[0]], z=field.z[cells], codes=codes, told=told)
+
+    return replace(
+        figure,
+        panels=tuple(
+            replace(panel, maps=tuple(map(thinned, panel.maps)), clouds=tuple(map(thinned, panel.clouds)))
+            for panel in figure.panels
+        ),
+    )
+
+
+def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
+    """Return evenly spread indices along each dimension, together at most `most` combinations.
+
+    `sizes` are the lengths of the dimensions. The longest one is thinned first.
+    """
+    counts = list(sizes)
+    while math.prod(counts) > most and max(counts) > 1:
+        counts[counts.index(max(counts))] -= 1
+    return tuple(
+        np.linspace(0, size - 1, number).round().astype(int) for size, number in zip(sizes, counts, strict=True)
+    )
 
 
 def _escaped_part(part: Any) -> Any:
@@ -236,7 +274,8 @@ def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
 def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
     """Return markers with their coordinates times the factors of both axes."""
     finite = np.isfinite(markers.x) & np.isfinite(markers.y)
-    return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
+    told = None if markers.told is None else markers.told.of(finite)
+    return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor, told=told)
 
 
 def prefixed(field: Field, x_factor: float = 1.0, y_factor: float = 1.0) -> Field:

@@ -8,8 +8,8 @@ renderers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -82,6 +82,21 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Told:
+    """What a page tells of a point under the mouse, besides its values: a `text` with {} for the point's own of `each`.
+
+    `each` holds texts in the shape of the points.
+    """
+
+    text: str
+    each: np.ndarray
+
+    def of(self, points: Any) -> Told:
+        """Return what is told of some points, given by a mask or indices."""
+        return replace(self, each=self.each[points])
+
+
+@dataclass(frozen=True)
 class Markers:
     """Single points x, y, both (n,), never thinned, such as counted peaks."""
 
@@ -90,6 +105,7 @@ class Markers:
     label: str
     colour: str
     symbol: Symbol = "circle"
+    told: Told | None = None
 
     def __post_init__(self) -> None:
         _same_length(self.label, self.x, self.y)
@@ -193,7 +209,7 @@ class Coloured:
 
     `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`. If `colours` are given,
     they are those of the whole numbers 0, 1, 2, ... instead. A `ramp` has other colours from little to much. `codes`,
-    of the shape of z, are indices into `categories`; where a code is NaN, z counts.
+    of the shape of z, are indices into `categories`; where a code is NaN, z counts. A page tells what is `told`.
     """
 
     x: Array
@@ -207,6 +223,7 @@ class Coloured:
     categories: tuple[Category, ...] = ()
     codes: Array | None = None
     ramp: tuple[str, ...] = ()
+    told: Told | None = None
 
     def __post_init__(self) -> None:
         """Check that codes have the shape of the numbers. Raises ValueError if they have not."""

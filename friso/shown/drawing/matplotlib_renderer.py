@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import io
 import math
-import re
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from functools import cached_property
 from threading import RLock
 from typing import Any
 
@@ -31,7 +29,7 @@ from friso.errors import InputError
 from friso.quantities import quoted
 from friso.shown.drawing.drawable import SIDES, drawable, second_ticks, word_ticks
 from friso.shown.drawing.figure import IMAGE_FORMATS, Area, Axis, Band, Figure, Markers, Panel, Series
-from friso.shown.drawing.matplotlib_maps import LINE_HEIGHT, add_colour_bars, add_footer, draw_coloured, footer_height
+from friso.shown.drawing.matplotlib_maps import add_colour_bars, add_footer, draw_coloured, footer_height
 from friso.shown.drawing.palette import GREY, INK
 
 FIGURE_WIDTH = 9.0  # [inch]
@@ -136,80 +134,20 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
     return places
 
 
-def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
-    """Return the figure as the bytes of a file.
+def image(figure: Figure, form: str, headed: bool = True) -> bytes:
+    """Return the figure as the bytes of a file; without its heading, which is cut off, unless `headed`.
 
-    The image has the heading if `headed`, and the note if `noted`. `form` is one of the formats
-    of images. Raises ValueError for any other.
+    `form` is one of the formats of images. Raises ValueError for any other.
     """
     if form not in IMAGE_FORMATS:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(IMAGE_FORMATS)}, e.g. 'png'")
-    with _style():
-        return _laid_out(figure).image(form, headed, noted)
-
-
-class _LaidOut:
-    """A figure that was drawn on a canvas once, so that all its parts have fixed places."""
-
-    def __init__(self, figure: Figure) -> None:
-        """Draw the figure once, which fixes the places of its parts."""
-        self.figure, self.canvas = figure, render(figure)
-        if engine := self.canvas.get_layout_engine():
-            engine.execute(self.canvas)
-        self.canvas.set_layout_engine(None)  # with any, each format is drawn twice
-        self.heading = self.canvas._suptitle  # type: ignore[attr-defined]
-        self.notes = [text for text in self.canvas.texts if text is not self.heading]
-
-    def image(self, form: str, headed: bool, noted: bool) -> bytes:
-        """Return the figure as the bytes of a file in the format `form`.
-
-        Without `headed` or `noted`, heading or note is cut off. All images show one drawing of the same lines and
-        letters.
-        """
-        height = self.canvas.get_figheight()
-        low = 0.0 if noted else LINE_HEIGHT * len(self.notes)
-        high = height - (HEADER_HEIGHT if self.heading and not headed else 0.0)
-        if form == "svg":
-            return _cut(self.lines, height, low, high)
-        for text in self.canvas.texts:
-            text.set_visible(headed if text is self.heading else noted)
-        return self._printed(form, None if headed and noted else Bbox([[0, low], [FIGURE_WIDTH, high]]))
-
-    @cached_property
-    def lines(self) -> bytes:
-        """Return the whole figure as SVG."""
-        for text in self.canvas.texts:
-            text.set_visible(True)
-        return _LINE.sub(_rounded, self._printed("svg", None))
-
-    def _printed(self, form: str, area: Bbox | None) -> bytes:
-        """Return an area of the canvas, or all of it, as the bytes of a file."""
-        stream = io.BytesIO()
-        with _letters_alone() if form == "pdf" else nullcontext():
-            dots = DOTS_PER_INCH if form == "png" else FINER_FACTOR * DOTS_PER_INCH  # resolution of pictures inside
-            self.canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area, dpi=dots)
+    with _style(), _letters_alone() if form == "pdf" else nullcontext():
+        canvas, stream = _laid_out(figure), io.BytesIO()
+        cut = 0.0 if headed or canvas.get_suptitle() == "" else HEADER_HEIGHT
+        area = Bbox([[0, 0], [FIGURE_WIDTH, canvas.get_figheight() - cut]])
+        dots = DOTS_PER_INCH if form == "png" else FINER_FACTOR * DOTS_PER_INCH  # resolution of pictures inside
+        canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area if cut else None, dpi=dots)
         return stream.getvalue()
-
-
-_LINE, _LONG, _FRAME = (
-    re.compile(rb' (?:d|x|y)="[^"]+"|translate\([^()]+\)'),
-    re.compile(rb"-?(?<!\d)\d+\.\d{3,}"),
-    re.compile(rb'height="[^"]*" viewBox="[^"]*"'),
-)
-
-
-def _rounded(line: re.Match[bytes]) -> bytes:
-    """Round the coordinates in a line of an SVG to a hundredth of a point."""
-    return _LONG.sub(lambda place: f"{float(place[0]):.2f}".rstrip("0").rstrip(".").encode(), line[0])
-
-
-def _cut(lines: bytes, height: float, low: float, high: float) -> bytes:
-    """Cut an SVG of some height to the part from `low` to `high`, all [inch] from below."""
-    if (low, high) == (0.0, height):
-        return lines
-    seen = 72 * (high - low)
-    frame = f'height="{seen:g}pt" viewBox="0 {72 * (height - high):g} {72 * FIGURE_WIDTH:g} {seen:g}"'
-    return _FRAME.sub(frame.encode(), lines, count=1)
 
 
 @contextmanager
@@ -235,20 +173,23 @@ def _letters_alone() -> Iterator[None]:
         subset.Options = usual
 
 
-def _laid_out(figure: Figure) -> _LaidOut:
-    """Lay a figure out, and keep the last figures for their next format.
+def _laid_out(figure: Figure) -> Canvas:
+    """Return a figure on a canvas on which all parts have fixed places, and keep the last ones for their next format.
 
     A page, for example, shows a figure that is also written as a file.
     """
-    for kept in tuple(_last):
-        if kept.figure is figure:
-            return kept
-    laid_out = _LaidOut(figure)
-    _last.append(laid_out)
-    return laid_out
+    for kept, canvas in tuple(_last):
+        if kept is figure:
+            return canvas
+    canvas = render(figure)
+    if engine := canvas.get_layout_engine():
+        engine.execute(canvas)
+    canvas.set_layout_engine(None)  # with any, each format is drawn twice
+    _last.append((figure, canvas))
+    return canvas
 
 
-_last: deque[_LaidOut] = deque(maxlen=6)
+_last: deque[tuple[Figure, Canvas]] = deque(maxlen=6)
 
 _one_at_a_time = RLock()
 """Lock for drawing: Matplotlib's parameters belong to the process, and a canvas may be kept, but friso app draws in

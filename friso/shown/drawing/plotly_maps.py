@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.shown.drawing.colours import ColourScale, painted, scale
 from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
-from friso.shown.drawing.figure import Array, Axis, Coloured, Figure, Map, Panel
+from friso.shown.drawing.figure import Array, Axis, Coloured, Figure, Map, Panel, Told
 from friso.shown.drawing.palette import GREY, INK
 
 BAR_WIDTH_SHARE = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
@@ -20,6 +20,7 @@ LINE_HEIGHT = 17  # [px] one line of the note
 KEY_ROW, KEY_SPACE = 19, 11  # [px] a row of a legend, and what lies about the one beneath a figure
 KEY_LETTER, KEY_MARK = 6.6, 45  # [px] one letter of a legend, and the sign of an entry
 LETTER_WIDTH = 6.1  # [px] of the note
+TOLD_LETTERS = 30  # letters in a line of what is told under the mouse, for which a telephone has room
 
 DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
 SYMBOLS: dict[str, dict[str, Any]] = {
@@ -65,18 +66,33 @@ def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, An
     where = f"{_hover('x', panel.x)}, {_hover('y', panel.y)}"
     if values is not field.codes:
         where += f": %{{customdata:.4~g}} {html.escape(field.unit)}"
-    text = {"hovertemplate": f"{where}<extra></extra>", "showlegend": False}
+    text = {"hovertemplate": f"{where}{told_text(field.told)}<extra></extra>", "showlegend": False}
     if isinstance(field, Map):
         x, y = _cells(field.x, panel.x), _cells(field.y, panel.y)
         numbers_shown = None if values is field.codes else field.z
         cells = {"type": "heatmap", "x": x, "y": y, "z": values, "customdata": numbers_shown}
-        return {**cells, **colouring, **text, **place}
+        cells["hoverongaps"] = False  # numbers and categories have cells of their own
+        return {**cells, **colouring, **text, **told_each(field.told), **place}
     numbers_shown = np.isfinite(values)
     names = {"zmin": "cmin", "zmax": "cmax"}
     marker = {names.get(name, name): value for name, value in colouring.items()}
     marker |= {"color": values[numbers_shown], "size": 6, "line": {"color": GREY, "width": 0.4}}
     numbers = {"x": field.x[numbers_shown], "y": field.y[numbers_shown], "customdata": field.z[numbers_shown]}
+    numbers |= told_each(field.told and field.told.of(numbers_shown))
     return {"type": "scatter", "mode": "markers", "marker": marker, **numbers, **text, **place}
+
+
+def told_text(told: Told | None) -> str:
+    """Return what is told of a point under the mouse, on lines of its own; "" if nothing is."""
+    if told is None:
+        return ""
+    lines = textwrap.wrap(told.text, TOLD_LETTERS, break_long_words=False, break_on_hyphens=False)
+    return "%{text}".join("".join(f"<br>{html.escape(line)}" for line in lines).rsplit("{}", 1))
+
+
+def told_each(told: Told | None) -> dict[str, Any]:
+    """Return the texts of points as plotly takes them."""
+    return {} if told is None else {"text": told.each, "hoverlabel": {"align": "left"}}
 
 
 def _cells(centres: Array, axis: Axis) -> Array:

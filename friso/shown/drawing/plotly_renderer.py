@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import html
-import json
 import math
 import textwrap
 from dataclasses import dataclass, replace
@@ -21,8 +20,8 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from friso.shown.drawing import plotly_maps
-from friso.shown.drawing.drawable import SIDES, drawable, log_ticks, second_ticks, word_ticks
-from friso.shown.drawing.figure import Area, Arrow, Axis, Band, Figure, Lettering, Markers, Panel, Series
+from friso.shown.drawing.drawable import SIDES, drawable, log_ticks, second_ticks, with_fewer_cells, word_ticks
+from friso.shown.drawing.figure import Area, Arrow, Axis, Band, Figure, Lettering, Markers, Panel, Series, Told
 from friso.shown.drawing.packing import packed, packed_json
 from friso.shown.drawing.palette import DARK, GREY, INK
 
@@ -70,15 +69,9 @@ def fragment(figure: Figure) -> str:
     )
 
 
-def plain_parts(figure: Figure) -> dict[str, Any]:
-    """Return traces and layouts of a figure for a page whose own script draws it, ready for JSON."""
-    parts = parts_of_both(figure)
-    return json.loads(json.dumps(parts, default=lambda array: _single(array)))
-
-
 def parts_of_both(figure: Figure) -> dict[str, Any]:
     """Return `parts`, with the layout and colour bars that differ on a narrow screen."""
-    prepared = drawable(figure)
+    prepared = drawable(with_fewer_cells(figure))
     return _on_both(_laid_out(prepared, WIDE_PAGE_WIDTH), _laid_out(replace(prepared, columns=1), NARROW_PAGE_WIDTH))
 
 
@@ -132,7 +125,7 @@ def parts(figure: Figure, width: int = WIDE_PAGE_WIDTH) -> dict[str, Any]:
     Plotly does not validate them, because that would take ten times as long as making them. `width` is the least width
     [px] for the axes of all columns.
     """
-    return _laid_out(drawable(figure), width)
+    return _laid_out(drawable(with_fewer_cells(figure)), width)
 
 
 def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
@@ -430,14 +423,14 @@ def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, A
     """Return the trace of single points, on the axes in `place`."""
     style = {"color": marker.colour, **plotly_maps.SYMBOLS[marker.symbol]}
     drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
-    return {**drawn, **_text(marker.label, panel), **place}
+    return {**drawn, **_text(marker.label, panel, marker.told), **plotly_maps.told_each(marker.told), **place}
 
 
-def _text(label: str, panel: Panel) -> dict[str, Any]:
+def _text(label: str, panel: Panel, told: Told | None = None) -> dict[str, Any]:
     """Return name and hover text of a line; plotly reads both as HTML."""
     x_unit, y_unit = html.escape(panel.x.unit), html.escape(panel.y.unit)
     hover = f"%{{x:.5~g}} {x_unit}, %{{y:.5~g}} {y_unit}"
-    return {"name": html.escape(label), "hovertemplate": hover}
+    return {"name": html.escape(label), "hovertemplate": hover + plotly_maps.told_text(told)}
 
 
 def _suffix(number: int) -> str:

@@ -107,7 +107,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
             "places": {verdict.claim.id: s.key for s in parts for verdict in s.verdicts},
             "sections": parts,
             "figure_links": [(number, keys[figure.name]) for number, figure in numbered.items()],
-            "images": {figure.name: _printed(figure) for figure in figures},
+            "images": {figure.name: print_image(figure) for figure in figures},
             "interactive": {
                 figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in figures
             },
@@ -200,16 +200,6 @@ def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
     if place.isdigit():
         return f"Figure {place}"
     return place if place.startswith("Sec. ") else ", ".join(dict.fromkeys(item.claim.where for item in group))
-
-
-def _printed(figure: Figure) -> Markup:
-    """Return the figure for paper as a data URL, which holds the whole image.
-
-    Maps are drawn in pixels, because thousands of cells as lines would make megabytes.
-    """
-    if not any(panel.maps for panel in figure.panels):
-        return print_image(figure)
-    return print_image(figure, "png", noted=False)
 
 
 def _counts(verdicts: Iterable[ClaimVerdict]) -> dict[str, int]:
