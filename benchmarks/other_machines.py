@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+import friso
 from benchmarks.report import print_table
 
 CHECKOUT = Path(__file__).parent.parent
@@ -85,7 +86,7 @@ def answers(command: list[str], folder: Path) -> Answers:
     between = time.perf_counter()
     subprocess.run([*command, "map", "stage.toml", *MAP, "--out", "runs.zarr"], cwd=folder, check=True)
     seconds = (between - begin, time.perf_counter() - between)
-    return Answers(json.loads(checked.stdout), xr.open_zarr(folder / "runs.zarr").load(), seconds)
+    return Answers(json.loads(checked.stdout), friso.read_store(folder / "runs.zarr").load(), seconds)
 
 
 def differences(here: Answers, there: Answers) -> list[tuple[str, str]]:

@@ -24,7 +24,6 @@ CASES = {
     "logs": 40,
     "stores": 20,
     "store-faults": 8,
-    "store-views": 10,
     "store-exchanges": 10,
     "store-versions": 20,
 }
@@ -72,7 +71,7 @@ def test_who_refuses_everything_fails(monkeypatch: pytest.MonkeyPatch, name: str
         raise friso.InputError("", "this", "that")
 
     if name == "stores":
-        monkeypatch.setattr("benchmarks.trust.writing.check_store", refused)
+        monkeypatch.setattr("benchmarks.trust.writing.read_store", refused)
         assert campaign.run_part(name, 3, range(20)).failures
     else:
         monkeypatch.setitem(READERS, name, replace(READERS[name], read=refused))

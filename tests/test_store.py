@@ -12,12 +12,10 @@ import signal
 import subprocess
 import sys
 import time
-import zipfile
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import partial
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,15 +29,12 @@ from systems import posix
 import friso as friso_api
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
-from friso.studies import store as storing
-from friso.studies import store_files
 from friso.studies.axes import Samples
+from friso.studies.checked_store import CheckedStore
 from friso.studies.execute import local_crew
-from friso.studies.metadata import annotate_metadata, checked_metadata, digest
-from friso.studies.sealed_store import SealedStore
 from friso.studies.settings import StudySettings
-from friso.studies.store import Store, check_store, read_store
-from friso.studies.store_files import LOCK, keep_arrays, kept_arrays, make
+from friso.studies.store import Store, _sum_at, own_at, read_store
+from friso.studies.store_files import LOCK, make
 from friso.studies.study import Request, Study, study_of
 from friso.studies.sweep import run_in_store, sweep
 
@@ -71,7 +66,7 @@ def test_a_store_holds_what_the_sweep_in_memory_gives_and_is_not_run_again(
     rig: Stage, whole: xr.Dataset, tmp_path: Path
 ) -> None:
     same(sweep(rig, AXES, store=tmp_path / "a.zarr"), whole)
-    same(xr.open_zarr(tmp_path / "a.zarr"), whole)
+    same(xr.open_zarr(tmp_path / "a.zarr")[[*whole.data_vars]], whole)
     with Store.opened(tmp_path / "a.zarr", study_on(rig)) as store:
         assert list(store.missing()) == []
 
@@ -198,43 +193,12 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, first: 
 def test_chunks_that_a_power_cut_took_are_run_again(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
     path = tmp_path / "a.zarr"
     sweep(rig, AXES, store=path)
-    chunks = [sorted((path / name).glob("[0-9]*")) for name in ("peaks", "outcome")]
+    chunks = [sorted((path / name).glob("c.*")) for name in ("peaks", "outcome")]
     chunks[0][1].unlink()
     chunks[1][3].write_bytes(b"")
     with Store.opened(path, study_on(rig)) as store:
         assert len(list(store.missing())) == 2
     same(sweep(rig, AXES, store=path), whole)
-
-
-def unreadable_archive(stream: BinaryIO) -> None:
-    """An archive with the header of an array that ends within a bracket, of which NumPy raises a TokenError."""
-    with zipfile.ZipFile(stream, "w") as archive:
-        archive.writestr("peaks.npy", b"\x93NUMPY\x01\x00\x0a\x00{'descr': \n")
-
-
-def test_kept_arrays_are_whole_and_no_larger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Arrays that are damaged, of another file, or with too much in them are not taken."""
-    file, arrays = tmp_path / "0.npz", {"peaks": np.ones(5), "outcome": np.full(5, "rests")}
-    keep_arrays(file, arrays)
-    whole = kept_arrays(file)
-    assert whole is not None
-    assert {name: values.tolist() for name, values in whole.items()} == {
-        name: values.tolist() for name, values in arrays.items()
-    }
-    content = file.read_bytes()
-    for place in range(len(content)):
-        file.write_bytes(content[:place] + bytes([content[place] ^ 8]) + content[place + 1 :])
-        assert kept_arrays(file) is None
-    (tmp_path / "1.npz").write_bytes(content)
-    assert kept_arrays(tmp_path / "1.npz") is None
-    with monkeypatch.context() as patch:  # what others write, with a sound digest
-        patch.setattr(np, "savez_compressed", unreadable_archive)
-        keep_arrays(file, {})
-    assert kept_arrays(file) is None
-    keep_arrays(file, {**arrays, "more": np.zeros(10**6)})
-    monkeypatch.setattr(store_files, "MOST_EXPANDED", 10**6)
-    monkeypatch.setattr(np, "load", lambda *arguments, **named: pytest.fail("it was expanded"))
-    assert kept_arrays(file) is None
 
 
 def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -247,14 +211,14 @@ def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monke
 
 
 def test_anything_else_is_refused(rig: Stage, tmp_path: Path) -> None:
-    """A file, folders of others, and a store without checksums of an earlier friso."""
+    """A file, folders of others, and a store of an earlier friso."""
     folder, file = tmp_path / "folder", tmp_path / "file"
     folder.mkdir()
     (folder / "thesis.txt").write_text("precious")
     file.write_text("precious")
     foreign = xr.Dataset({"verdict": ("x", np.zeros(3))})
     foreign.to_zarr(tmp_path / "foreign.zarr", zarr_format=2)
-    foreign.assign_attrs(equations="0.1.0").to_zarr(tmp_path / "old.zarr", zarr_format=2)
+    foreign.assign_attrs(equations="0.3.0 (123)", friso="0.3.0").to_zarr(tmp_path / "old.zarr", zarr_format=2)
     for path in (folder, file, tmp_path / "foreign.zarr"):
         with refused(kind=StoreError):
             sweep(rig, AXES, store=path)
@@ -263,8 +227,11 @@ def test_anything_else_is_refused(rig: Stage, tmp_path: Path) -> None:
         sweep(rig, AXES, store=file / "below.zarr")
     with refused(kind=StoreError):
         read_store(tmp_path / "absent.zarr")
-    with pytest.raises(StoreError, match=r"earlier friso[\s\S]*under a new name"):
-        read_store(tmp_path / "old.zarr")
+    for use in (read_store, lambda path: sweep(rig, AXES, store=path)):
+        with pytest.raises(StoreError, match=r"friso 0.3 or earlier[\s\S]*under a new name[\s\S]*friso map"):
+            use(tmp_path / "old.zarr")
+    with Store.opened(tmp_path / "old.zarr", study_on(rig), overwrite=True) as store:  # no files of others are in it
+        assert store.read()["peaks"].isnull().all()
 
 
 HOLD = """
@@ -298,7 +265,7 @@ def test_a_store_is_there_whole_or_not_at_all(rig: Stage, tmp_path: Path, monkey
     def fails(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(xr.Dataset, "to_zarr", fails)
+    monkeypatch.setattr(zarr, "create_group", fails)
     with (
         refused(),
         Store.opened(tmp_path / "a.zarr", study_on(rig)),
@@ -316,11 +283,6 @@ def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path
     with Store.opened(path, study):
         size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
     assert size < 3e6  # the axes themselves
-    (path / ".blocks").mkdir()
-    for name in ("0.0.0", "00.0.0", "0.0", "9999999.0.0", "notes"):
-        (path / ".blocks" / name).write_text("")
-    state = check_store(path)
-    assert (state.blocks > 1e8, state.done, state.damaged) == (True, 1, ["0.0.0"])
     with pytest.raises(InputError, match=r"yes[\s\S]*8e\+12 cells"):
         friso_api.sweep(path)
 
@@ -355,10 +317,6 @@ def finished(rig: Stage, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-SEALED = (".zmetadata", ".zmetadata.copy")
-"""The metadata, in the order in which they are looked for."""
-
-
 @pytest.fixture
 def stored(finished: Path, tmp_path: Path) -> Path:
     """A copy of the finished store."""
@@ -372,31 +330,23 @@ def flip(file: Path, place: float) -> None:
     file.write_bytes(content)
 
 
-def test_a_chunk_that_may_not_be_read_is_named_beside_those_that_are_damaged(
-    stored: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    flip(stored / "period" / "1.0", 0.6)
-    real, closed = store_files.digest_of, stored / "peaks" / "0.0"
-
-    def may_not(file: Path) -> str | None:
-        if file == closed:
-            raise PermissionError(errno.EACCES, "Permission denied", str(file))
-        return real(file)
-
-    monkeypatch.setattr(store_files, "digest_of", may_not)
-    state = check_store(stored)
-    assert (state.damaged, state.unreadable) == (["1.0"], [str(closed)])
+def unfinished(path: Path) -> list[str]:
+    """Return the blocks of a store that a resumed study would run, as Zarr numbers them."""
+    store = Store(path, study_of(read_store(path)))
+    return [store._number(block) for block in store.missing()]
 
 
 @pytest.mark.parametrize(("name", "place"), [("peaks", 0.2), ("period", 0.6), ("status", 0.99), ("outcome", 0.6)])
 def test_a_damaged_block_is_run_again(
     stored: Path, finished: Path, rig: Stage, name: str, place: float, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Results of a block with a flipped bit are never used, and the store says that it is not whole."""
-    with Store.opened(stored, study_on(rig)) as store:
-        assert store.state().damaged == []
-        flip(stored / name / "1.0", place)
-        assert store.state().damaged == ["1.0"]
+    """Results of a block with a flipped bit are never used, by friso or by other programs."""
+    assert unfinished(stored) == []
+    flip(stored / name / "c.1.0", place)
+    with pytest.raises(StoreError, match=rf"{name}/c\.1\.0"):
+        read_store(stored)[name].load()
+    with pytest.raises(ValueError, match="checksum"):
+        xr.open_zarr(stored)[name].load()
     with Store.opened(stored, study_on(rig)) as store:
         assert len(list(store.missing())) == 1
     assert "block 1.0" in caplog.text
@@ -404,75 +354,61 @@ def test_a_damaged_block_is_run_again(
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
 
+WRITTEN_ONCE = ("zarr.json", ".friso/zarr.json", "peaks/zarr.json", "joint.stroke/zarr.json", "joint.stroke/c.0")
+"""Files of a store that are not run again."""
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("place", np.linspace(0.01, 0.99, 9))
-def test_metadata_that_are_damaged_like_their_copy_are_refused(stored: Path, place: float) -> None:
-    before = read_store(stored).attrs
-    for name in SEALED:
-        flip(stored / name, place)
+@pytest.mark.parametrize("name", WRITTEN_ONCE)
+def test_damage_to_what_is_written_once_is_refused(stored: Path, name: str, place: float) -> None:
+    before = read_store(stored).load()
+    flip(stored / name, place)
     with suppress(StoreError):
-        assert read_store(stored).attrs == before  # blank space
+        xr.testing.assert_identical(read_store(stored).load(), before)  # blank space
 
 
 CUT = b"cut"
 
 
-@pytest.mark.parametrize("content", [CUT, b"", b"{}", b"[1]", b"null", b'{"metadata": 3}', b"\xff\x00", b"[" * 100_000])
-def test_metadata_of_any_content_are_written_anew_from_their_copy(
-    stored: Path, rig: Stage, content: bytes, caplog: pytest.LogCaptureFixture
-) -> None:
-    """If the copy is damaged too, the store is refused."""
-    runs, file = read_store(stored).load(), stored / ".zmetadata"
-    whole = file.read_bytes()
-    damaged = whole[: len(whole) // 2] if content == CUT else content
-    file.write_bytes(damaged)
-    xr.testing.assert_identical(read_store(stored).load(), runs)
-    assert (check_store(stored).files, check_store(stored).damaged) == ([".zmetadata"], [])
-    with Store.opened(stored, study_on(rig)):
-        assert [(stored / name).read_bytes() for name in SEALED] == [whole, whole]
-    assert ".zmetadata was damaged" in caplog.text
-    for name in SEALED:
-        (stored / name).write_bytes(damaged)
-    with refused(kind=StoreError):
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "content", [CUT, b"", b"{}", b"[1]", b"null", b'{"attributes": 3}', b"\xff\x00", b"[" * 100_000]
+)
+@pytest.mark.parametrize("name", WRITTEN_ONCE)
+def test_any_other_content_or_none_is_refused(stored: Path, rig: Stage, name: str, content: bytes) -> None:
+    """The refusal names a way out, which works."""
+    file, other = stored / name, Request(rig, {"controller.crossover": "2 Hz..3 Hz:2"}).study()
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2] if content == CUT else content)
+    for use in (read_store, lambda path: sweep(rig, AXES, store=path)):
+        with pytest.raises(StoreError, match="--overwrite"):
+            use(stored)
+    file.unlink()
+    with pytest.raises(StoreError, match="--overwrite"):
         read_store(stored)
+    with Store.opened(stored, other, overwrite=True) as store:
+        assert store.read()["outcome"].shape == (2,)
 
 
-def test_what_another_process_notes_before_a_store_is_locked_stays(
-    stored: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    real = storing.lock_store
-
-    def noted_before(path: Path) -> AbstractContextManager[FileLock]:
-        annotate_metadata(path, notes={"metric": "peaks"})
-        return real(path)
-
-    monkeypatch.setattr(storing, "lock_store", noted_before)
-    with Store.opened(stored, study_on(rig)) as store:
-        assert store.notes["metric"] == "peaks"
-
-
-def test_missing_metadata_and_damaged_axes_are_refused(stored: Path) -> None:
-    flip(stored / "joint.stroke" / "0", 0.8)
-    with refused(kind=StoreError):
-        read_store(stored)
-    for name in SEALED:
-        (stored / name).unlink()
-    with refused(kind=StoreError):
-        read_store(stored)
-
-
-def test_a_store_once_checked_pickles_and_its_metadata_are_not_read_again(stored: Path) -> None:
-    runs, metadata = read_store(stored), checked_metadata(stored)
-    for name in metadata.all_files:
-        (stored / name).unlink()
+def test_a_checked_store_pickles_and_shows_its_study_alone(stored: Path, rig: Stage) -> None:
+    """What is put in its place later is not mixed with it."""
+    runs, source = read_store(stored), CheckedStore(stored, checksum=own_at(stored).checksum)
     other = pickle.loads(pickle.dumps(runs))
     assert other.encoding["source"] == str(stored)
     assert float(other["peaks"][0, 0]) == float(runs["peaks"][0, 0])
-    group = zarr.open_consolidated(SealedStore.at(stored, metadata).with_read_only(True), mode="r", zarr_format=2)
+    group: Any = zarr.open_group(source.with_read_only(True), mode="r", zarr_format=3)
     assert group["peaks"].shape == runs["peaks"].shape
+    with Store.opened(stored, replace(study_on(rig), rtol=1e-4), overwrite=True):
+        pass
+    with local_crew(2) as crew:
+        run_in_store(replace(study_on(rig), rtol=1e-4), stored, crew)
+    with pytest.raises(StoreError, match=r"peaks/c\.0\.0"):
+        other["peaks"][0].load()
 
 
+@pytest.mark.slow
 @posix
-@pytest.mark.parametrize("name", [*SEALED, ".zattrs", "peaks/.zarray", "joint.stroke/0", ".blocks/0.0", "peaks/0.0"])
+@pytest.mark.parametrize("name", [*WRITTEN_ONCE, ".friso/0.0", "peaks/c.0.0"])
 @pytest.mark.parametrize("kind", ["pipe", "device", "link", "huge"])
 def test_what_is_no_file_of_a_store_is_not_read(stored: Path, name: str, kind: str, tmp_path: Path) -> None:
     file = stored / name
@@ -488,43 +424,35 @@ def test_what_is_no_file_of_a_store_is_not_read(stored: Path, name: str, kind: s
     else:
         with file.open("wb") as stream:
             stream.truncate(1 << 40)
-    for read in (read_store, check_store):
-        with pytest.raises(StoreError, match=re.escape(name)):
-            read(stored)
+    with pytest.raises(StoreError):
+        read_store(stored)["peaks"].load()
 
 
-def test_a_folder_in_place_of_a_file_and_a_file_in_place_of_a_folder_are_refused(
-    stored: Path, finished: Path, rig: Stage
-) -> None:
-    """Checking the store, continuing it and replacing it all refuse it; once they are removed, it is written again."""
-    study, other = study_on(rig), Request(rig, AXES).study(rtol=1e-4)
-    files = [stored / name for name in (".zgroup", "peaks/.zarray", ".blocks/0.0", "peaks/0.0")]
-    for path in [*files, *(stored / name for name in (".blocks", "peaks"))]:
-        if path.is_dir():
-            shutil.rmtree(path)
-        path.unlink(missing_ok=True)
-        mine = path / "mine" if path in files else path
-        mine.parent.mkdir(parents=True, exist_ok=True)
-        mine.write_text("mine")
-        uses = (
-            partial(check_store, stored),
-            partial(sweep, rig, AXES, store=stored),
-            lambda: Store.opened(stored, other, overwrite=True).__enter__(),
-        )
-        for use in uses:
-            with pytest.raises(StoreError, match=re.escape(path.relative_to(stored).as_posix())):
-                use()
-        assert mine.read_text() == "mine"
-        shutil.rmtree(path) if path in files else path.unlink()
-        with Store.opened(stored, study):
-            assert check_store(stored).files == []
+@pytest.mark.parametrize("name", ["peaks/zarr.json", ".friso/0.0", "peaks/c.0.0", "peaks", "joint.stroke"])
+def test_what_is_mine_in_place_of_a_file_or_a_folder_stays(stored: Path, finished: Path, rig: Stage, name: str) -> None:
+    """Reading, continuing and replacing the store all refuse it."""
+    path, aside = stored / name, stored.with_name("aside")
+    path.rename(aside)
+    mine = path / "mine" if aside.is_file() else path
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text("mine")
+    uses = (
+        lambda: read_store(stored)["peaks"].load(),
+        lambda: friso_api.sweep(rig, AXES, metric="outcome", out=stored),
+        lambda: Store.opened(stored, Request(rig, AXES).study(rtol=1e-4), overwrite=True).__enter__(),
+    )
+    for use in uses:
+        with pytest.raises(StoreError):
+            use()
+    assert mine.read_text() == "mine"
+    shutil.rmtree(path) if mine != path else path.unlink()
+    aside.rename(path)
     sweep(rig, AXES, store=stored)
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
-    assert check_store(stored).damaged == []
 
 
 @posix
-@pytest.mark.parametrize("name", [".blocks", "peaks", "joint.stroke"])
+@pytest.mark.parametrize("name", [".friso", "peaks", "joint.stroke"])
 def test_nothing_is_written_where_a_link_in_a_store_leads(stored: Path, rig: Stage, name: str, tmp_path: Path) -> None:
     (stored / name).rename(tmp_path / "elsewhere")
     (stored / name).symlink_to(tmp_path / "elsewhere")
@@ -535,51 +463,50 @@ def test_nothing_is_written_where_a_link_in_a_store_leads(stored: Path, rig: Sta
     assert all(file.read_bytes() == b"mine" for file in (tmp_path / "elsewhere").iterdir())
 
 
-@contextmanager
-def sealed_again(stored: Path) -> Iterator[dict[str, Any]]:
-    """Yield the metadata of a store for changes, and write them back with a matching digest.
-
-    Someone who knows friso could forge a store in this way.
-    """
-    document = json.loads((stored / ".zmetadata").read_text())
-    yield document["metadata"]
-    entry = document["friso"]
-    entry["sha256"] = digest([document["metadata"], {key: entry[key] for key in entry if key != "sha256"}])
-    for name in SEALED:
-        (stored / name).write_text(json.dumps(document))
+def change_in(document: dict[str, Any], change: dict[str, Any]) -> None:
+    """Change a JSON document in some of its places."""
+    for key, value in change.items():
+        if isinstance(value, dict) and isinstance(document.get(key), dict):
+            change_in(document[key], value)
+        else:
+            document[key] = value
 
 
-FOREIGN = (
-    {"dtype": "|O", "filters": [{"id": "vlen-utf8"}, {"id": "pickle"}]},
-    {"compressor": {"id": "pickle"}},
-    {"dtype": "|S8"},
-    {"chunks": [10**12]},
-    {"chunks": [-1]},
-    {"dtype": "<U9999", "chunks": [10**5]},
-)
+def change_file(file: Path, change: dict[str, Any]) -> None:
+    document = json.loads(file.read_text())
+    change_in(document, change)
+    file.write_text(json.dumps(document))
+
+
+PLAIN = [{"name": "bytes", "configuration": {"endian": "little"}}]
 
 
 @pytest.mark.parametrize(
     ("name", "change"),
     [
-        *((f"{array}/.zarray", change) for array in ("joint.stroke", "peaks") for change in FOREIGN),
-        (".zattrs", {"rtol": 1e300}),
-        ("peaks/.zarray", {"chunks": [1, 1]}),
-        ("peaks/.zarray", {"dimension_separator": "/"}),
-        ("joint.stroke/.zarray", {"shape": [10**11]}),  # an axis is not longer than what is there of it
-        ("extra/.zarray", {"shape": [10**13], "chunks": [10**6]}),  # a measure is as large as its axes
-        *((name, {"written": "by others"}) for name in ("../mine/.zattrs", "/mine/.zarray", "peaks/../../.zarray")),
+        ("zarr.json", {"attributes": {"rtol": 1e300}}),
+        ("zarr.json", {"consolidated_metadata": {"metadata": {"../mine": {"shape": [1]}}}}),
+        ("peaks/zarr.json", {"chunk_grid": {"configuration": {"chunk_shape": [1, 1]}}}),
+        ("peaks/zarr.json", {"chunk_grid": {"configuration": {"chunk_shape": [10**12, 10**12]}}}),
+        ("peaks/zarr.json", {"chunk_grid": {"configuration": {"chunk_shape": [-1, 16]}}}),
+        ("peaks/zarr.json", {"shape": [10**12, 16]}),
+        ("peaks/zarr.json", {"data_type": {"name": "raw_bytes", "configuration": {"length_bytes": 10**12}}}),
+        ("peaks/zarr.json", {"codecs": [*PLAIN, {"name": "pickle"}]}),
+        ("joint.stroke/zarr.json", {"codecs": [*PLAIN, {"name": "pickle"}]}),
+        ("joint.stroke/zarr.json", {"shape": [10**11]}),  # an axis is not longer than what is there of it
+        ("joint.stroke/zarr.json", {"chunk_grid": {"configuration": {"chunk_shape": [10**12]}}, "shape": [10**6]}),
     ],
 )
 def test_what_a_store_states_is_such_as_friso_states(stored: Path, name: str, change: dict[str, Any]) -> None:
     """Arrays that friso does not write are not decoded, and no file outside the store is named."""
-    with sealed_again(stored) as metadata:
-        if name.startswith("extra"):
-            metadata[name] = metadata["peaks/.zarray"]
-            metadata["extra/.zattrs"] = {"_ARRAY_DIMENSIONS": ["y"]}
-        metadata[name] = metadata.get(name, {}) | change
+    array, _, _ = name.rpartition("/")
+    change_file(stored / name, change)
+    if array:
+        change_file(stored / "zarr.json", {"consolidated_metadata": {"metadata": {array: change}}})
+    with suppress(OSError, ValueError):  # as someone who knows friso could forge it
+        change_file(stored / ".friso/zarr.json", {"attributes": {"checksum": _sum_at(stored, "outcome")}})
     with pytest.raises(StoreError):
-        read_store(stored)
+        read_store(stored)["peaks"].load()
 
 
 @posix
@@ -588,26 +515,16 @@ def test_what_lies_deeper_than_files_of_a_store_is_not_looked_at(stored: Path, r
     (stored / "a" / "b").mkdir(parents=True)
     (stored / "a" / "b" / "c").symlink_to(tmp_path)
     sweep(rig, AXES, store=stored)
-    assert check_store(stored).damaged == []
+    assert unfinished(stored) == []
 
 
-def test_metadata_of_an_equal_number_of_another_kind_are_damaged(stored: Path) -> None:
-    (stored / ".zgroup").write_text('{"zarr_format": 2.0}')
-    assert check_store(stored).files == [".zgroup"]
-
-
-def test_a_store_of_a_newer_friso_says_so(stored: Path) -> None:
-    document = json.loads((stored / ".zmetadata").read_text())
-    document["friso"]["format"] += 1
-    document["metadata"][".zattrs"]["friso"] = "9.9.9"
-    for name in SEALED:
-        (stored / name).write_text(json.dumps(document))
-    with refused(kind=StoreError) as error:
+def test_a_store_of_another_version_says_so(stored: Path) -> None:
+    change_file(stored / ".friso/zarr.json", {"attributes": {"format": 4}})
+    with pytest.raises(StoreError, match=r"another friso[\s\S]*run again"):
         read_store(stored)
-    assert "newer friso (9.9.9)" in str(error.value)
 
 
-@pytest.mark.parametrize("damaged", [(), SEALED])
+@pytest.mark.parametrize("damaged", [(), ("zarr.json",)])
 def test_a_store_of_another_study_or_a_damaged_one_is_replaced_when_told(
     stored: Path, rig: Stage, damaged: tuple[str, ...]
 ) -> None:
@@ -650,7 +567,7 @@ def test_what_is_no_store_is_not_replaced_even_when_told(stored: Path, rig: Stag
         (stored / name).unlink()
     (stored / "mine").rmdir()
     with Store.opened(stored, other, overwrite=True) as store:
-        assert store.missing()
+        assert [*store.missing()]
     foreign = tmp_path / "flow.zarr"
     (foreign / "data").mkdir(parents=True)
     for attributes in (None, '{"equations": "Navier-Stokes"}'):
@@ -665,7 +582,7 @@ def test_leftovers_of_a_killed_run_are_removed(rig: Stage, tmp_path: Path) -> No
     left, being_made = (tmp_path / f".a.zarr.{digit * 32}" for digit in "ab")
     for draft in (left, being_made):
         draft.mkdir()
-        (draft / ".zgroup").write_text("{}")
+        (draft / "zarr.json").write_text("{}")
     study = study_on(rig)
     with FileLock(being_made / LOCK), Store.opened(tmp_path / "a.zarr", study):
         assert not left.exists()
@@ -680,45 +597,51 @@ def exchange(first: Path, second: Path) -> None:
     spare.rename(second)
 
 
-@pytest.mark.parametrize("names", [["peaks"], ["outcome"], ["peaks", ".blocks"], None])
+def file_of(store: Path, name: object, number: str) -> Path:
+    """Return the chunk of a variable in a block, or the block's record (".friso")."""
+    return store / str(name) / (number if name == ".friso" else f"c.{number}")
+
+
+@pytest.mark.parametrize("names", [["peaks"], ["outcome"], ["peaks", ".friso"], None])
 def test_exchanged_chunks_are_run_again(
     stored: Path, finished: Path, rig: Stage, names: list[str] | None, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The chunks are intact, but belong to other cells, even if all that belongs to the cells is exchanged (None)."""
-    for name in names or [*read_store(stored).data_vars, ".blocks"]:
-        exchange(stored / str(name) / "0.0", stored / str(name) / "1.0")
-    assert check_store(stored).damaged == ["0.0", "1.0"]
+    for name in names or [*read_store(stored).data_vars, ".friso"]:
+        exchange(file_of(stored, name, "0.0"), file_of(stored, name, "1.0"))
+    assert unfinished(stored) == ["0.0", "1.0"]
     sweep(rig, AXES, store=stored)
     assert "block 0.0" in caplog.text
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
 
-@pytest.mark.parametrize("damage", ["exchanged", "missing", "foreign", "entry", "unreadable"])
+@pytest.mark.parametrize("damage", ["exchanged", "missing", "foreign", "record", "unreadable"])
 def test_damaged_cells_are_not_handed_out(stored: Path, damage: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error names variable and cells; the others are read."""
+    """The error names the chunk; the others are read."""
     runs, first = read_store(stored), slice(0, Store(stored, study_of(read_store(stored))).blocks[0])
+    chunk = stored / "peaks" / "c.0.0"
     if damage == "exchanged":
-        exchange(stored / "peaks" / "0.0", stored / "peaks" / "1.0")
+        exchange(chunk, stored / "peaks" / "c.1.0")
     elif damage == "missing":
-        shutil.rmtree(stored / "peaks")
+        chunk.unlink()
     elif damage == "foreign":
-        (stored / "peaks" / "0.0").write_bytes(b"mine")
-    elif damage == "entry":
-        (stored / ".blocks" / "0.0").write_bytes(b"{}")
+        chunk.write_bytes(b"mine")
+    elif damage == "record":
+        (stored / ".friso" / "0.0").write_bytes(b"{}")
     else:
 
         def may_not(*_: object) -> None:
             raise PermissionError(errno.EACCES, "Permission denied")
 
-        monkeypatch.setattr(store_files, "stored", may_not)
-    with pytest.raises(StoreError, match=rf"peaks\[0:{first.stop}, 0:16\] \(controller.crossover, joint.stroke\)"):
+        monkeypatch.setattr("friso.studies.store_files.stored", may_not)
+    with pytest.raises(StoreError, match=r"peaks/c\.0\.0[\s\S]*friso map"):
         runs["peaks"][first].load()
     if damage in ("missing", "foreign"):
         assert runs["steps"][first].notnull().all()
 
 
 def test_blocks_that_are_not_done_are_read_as_empty(stored: Path) -> None:
-    (stored / ".blocks" / "0.0").unlink()
+    (stored / ".friso" / "0.0").unlink()
     peaks = read_store(stored)["peaks"]
     assert peaks[0].isnull().all()
     assert peaks[-1].notnull().all()
@@ -728,7 +651,7 @@ def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path) -> None:
     axes = {"friction.static": "2 N..3 N:5", "friction.stribeck_velocity": "1 mm/s..2 mm/s:5"}
     with Store.opened(tmp_path / "a.zarr", Request(rig, axes).study()):
         pass
-    exchange(*(tmp_path / "a.zarr" / axis / "0" for axis in axes))
+    exchange(*(tmp_path / "a.zarr" / axis / "c.0" for axis in axes))
     with refused(kind=StoreError):
         read_store(tmp_path / "a.zarr")
 
@@ -736,28 +659,9 @@ def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path) -> None:
 def test_blocks_of_another_study_are_run_again(stored: Path, rig: Stage, tmp_path: Path) -> None:
     """The other study has the same shape, but another tolerance."""
     other = sweep(rig, AXES, store=tmp_path / "b.zarr", rtol=1e-4)
-    for name in [*other.data_vars, ".blocks"]:
-        exchange(tmp_path / "b.zarr" / str(name) / "1.0", stored / str(name) / "1.0")
-    assert check_store(stored).damaged == ["1.0"]
-
-
-def metadata_files(path: Path) -> list[str]:
-    return sorted(str(f.relative_to(path)) for f in path.rglob(".z*") if f.is_file() and f.name != ".zmetadata")
-
-
-def test_every_file_of_metadata_is_checked_and_written_anew(stored: Path, finished: Path, rig: Stage) -> None:
-    files = metadata_files(stored)
-    assert {".zattrs", ".zgroup", "peaks/.zarray", "peaks/.zattrs", "joint.stroke/.zarray"} <= {*files}
-    for name in files:
-        flip(stored / name, 0.5)
-    (stored / ".zattrs").unlink()
-    assert sorted(check_store(stored).files) == files
-    with Store.opened(stored, study_on(rig)):
-        pass
-    assert check_store(stored).files == check_store(stored).damaged == []
-    assert [json.loads((stored / name).read_text()) for name in files] == [
-        json.loads((finished / name).read_text()) for name in files
-    ]
+    for name in [*other.data_vars, ".friso"]:
+        exchange(file_of(tmp_path / "b.zarr", name, "1.0"), file_of(stored, name, "1.0"))
+    assert unfinished(stored) == ["1.0"]
 
 
 @posix
@@ -767,12 +671,12 @@ def test_a_store_is_open_to_whom_the_user_lets_read_files(rig: Stage, tmp_path: 
         sweep(rig, {"controller.crossover": "2 Hz, 3 Hz"}, store=tmp_path / "a.zarr")
     finally:
         os.umask(before)
-    modes = {file.stat().st_mode & 0o777 for file in (tmp_path / "a.zarr").rglob("*") if file.name != LOCK}
+    modes = {file.stat().st_mode & 0o777 for file in (tmp_path / "a.zarr").rglob("*") if file.name != "lock"}
     assert modes == {0o640, 0o750}
 
 
 def test_files_that_were_being_written_go_but_no_others(stored: Path, rig: Stage) -> None:
-    left = [stored / "peaks" / f"1.{'a' * 32}.partial", stored / f".zmetadata.{'b' * 32}.partial"]
+    left = [stored / "peaks" / f"c.1.{'a' * 32}.partial", stored / ".friso" / f"0.1.{'b' * 32}.partial"]
     for file in (*left, stored / "notes.partial"):
         file.write_text("half")
     with Store.opened(stored, study_on(rig)):
@@ -790,7 +694,7 @@ def test_a_store_stays_where_the_one_in_its_place_cannot_be_made(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr(xr.Dataset, "to_zarr", full)
+        patch.setattr(zarr, "create_group", full)
         with pytest.raises(StoreError, match="No space left"), Store.opened(stored, other, overwrite=True):
             pass
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())

@@ -53,7 +53,7 @@ BINARY_LOGS = [f"{kind}-logs" for kind in BINARY]
 """Campaigns of binary logs."""
 
 HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "drawn-stages": 8, "computed-stages": 64, "options": 32,
-         "app": 8, "stores": 16, "store-faults": 32, "store-views": 16, "store-exchanges": 32, "store-versions": 8,
+         "app": 8, "stores": 16, "store-faults": 32, "store-exchanges": 32, "store-versions": 8,
          **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
 """Factor by which campaigns with slow cases have fewer cases."""
 

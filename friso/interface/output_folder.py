@@ -149,7 +149,7 @@ def refuse_place(option: str, path: Path) -> None:
     Raises InputError for unusable paths (`paths.unwritable`), and for paths inside a store, which takes only its own
     files.
     """
-    from friso.studies.metadata import is_store
+    from friso.studies.store_files import is_store
 
     example = f"{option} report" if option.startswith("--") else ""
     if why := paths.unwritable(path):
@@ -288,7 +288,7 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
     try:
         document = parsed(text_of(folder / MARKER, "a marker"), "a marker")
     except InputError:
-        from friso.studies.metadata import is_store
+        from friso.studies.store_files import is_store
 
         return (STORE_MAKER if folder.is_dir() and is_store(folder) else ""), ()
     command, files = document.get("command"), document.get("files")

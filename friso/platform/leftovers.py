@@ -85,10 +85,8 @@ def remove_leftover(folder: Path, lock: str) -> None:
     with _unless_locked(folder, lock) as free:
         if free:
             shutil.rmtree(folder, ignore_errors=True)
-    if free and not MOVES_OPEN_FOLDERS:  # an open file, such as the lock, keeps its folder
-        with suppress(OSError):
-            (folder / lock).unlink(missing_ok=True)
-            folder.rmdir()
+    if free and not MOVES_OPEN_FOLDERS:  # an open file, such as the lock, kept its folder
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def remove_leftovers(root: Path, prefix: str, lock: str) -> None:

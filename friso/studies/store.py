@@ -1,44 +1,50 @@
 """Store a study on disk, in a Zarr store that is written block by block and can be resumed.
 
-The store is made complete, without results, elsewhere and then moved into place. A block is done once its digests are
-recorded (`Ledger`), after its chunks were written, each moved into place by Zarr. A block whose chunks differ from the
-record is run again. Other programs get studies as NetCDF and CSV.
+The store is made complete, without results, elsewhere and then moved into place. A block is done once it is recorded
+(`Records`), after its chunks were written, each moved into place by Zarr. A block whose chunks differ from the record
+is run again. Other programs get studies as NetCDF and CSV.
 """
 
 from __future__ import annotations
 
-import asyncio
 import json
 import logging
 import math
 import os
 import re
+import warnings
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import BaseModel, Field
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
 from friso.escapes import one_line, table_cell
-from friso.platform.system import cause_of, once_free, path_of
+from friso.platform.system import cause_of, delete_file, once_free
 from friso.stage.arguments import check_arguments
-from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
 from friso.studies.settings import settings
 from friso.studies.store_files import (
-    Ledger,
+    CHUNK,
+    DESCRIPTION,
+    OWN,
+    Records,
     exchange,
+    is_old_store,
+    is_store,
     lock_store,
     make,
-    refuse_foreign,
+    refuse_links,
     refuse_others_files,
     remove_leftovers,
     remove_partial_files,
+    stored,
     where_links_lead,
 )
 from friso.studies.study import CellBlock, Study, study_of
@@ -94,11 +100,99 @@ def _with_unit(runs: xr.Dataset, name: str) -> str:
 
 logger = logging.getLogger("friso")
 
-ZARR_FORMAT = 2
-"""Version of the Zarr format that every reader supports, and in which fixed-length texts are specified."""
+FORMAT = 3
+"""Version of friso's stores."""
 
-COORDINATES = "coordinates"
-"""Attribute in which xarray stores the coordinates that belong to no variable."""
+ZARR_FORMAT = 3
+
+AXIS_CHUNK = 1 << 20
+"""Most values of an axis in a chunk."""
+
+
+class Own(BaseModel, frozen=True):
+    """What friso notes in its folder of a store: the metric that colours the map, and a checksum (`_sum_at`)."""
+
+    format: int
+    metric: str
+    checksum: int
+
+
+class _Attributes(BaseModel, extra="forbid"):
+    """The attributes of a store: those of its study (`Study.attributes`), and xarray's."""
+
+    name: str
+    stage: str
+    friso: str
+    equations: str
+    machine: str
+    rtol: float
+    axes: str
+    links: str
+    coordinates: str
+
+
+class _Array(BaseModel):
+    shape: tuple[int, ...]
+
+
+class _Arrays(BaseModel):
+    metadata: dict[Annotated[str, Field(pattern=r"^\w[\w.-]*$")], _Array]
+
+
+class _Description(BaseModel):
+    """Zarr's description of a store with all of its arrays."""
+
+    attributes: _Attributes
+    consolidated_metadata: _Arrays
+
+
+def _sum_at(path: Path, metric: str) -> int:
+    """Return the checksum of all that is written only once into a store: descriptions, axes, and the `metric`.
+
+    Raises OSError if a file cannot be read, and ValueError for a description that is not a store's.
+    """
+    parts = [metric.encode(), stored(path / DESCRIPTION)]
+    arrays = _Description.model_validate_json(parts[-1]).consolidated_metadata.metadata
+    for name, array in arrays.items():
+        parts.append(stored(path / name / DESCRIPTION))
+        if name not in every_variable():
+            chunks = math.ceil(math.prod(array.shape) / AXIS_CHUNK)
+            parts += [stored(path / name / f"{CHUNK}{number}") for number in range(chunks)]
+    return zlib.crc32(b"\0".join(parts))
+
+
+_EXPECTED = "a store made by friso map, or a new name"
+_EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
+_ANEW = "the study run again under a new name, or with --overwrite"
+
+
+def own_at(path: Path) -> Own:
+    """Return friso's notes in the store at `path`, after checking all that is written only once.
+
+    Raises StoreError if there is no store, or if it is damaged or of another version.
+    """
+    if not path.exists():
+        raise StoreError("", "nothing there", _EXPECTED, _EXAMPLE, str(path))
+    if not path.is_dir():
+        raise StoreError("", "a file; nothing was overwritten", _EXPECTED, "--out study.zarr", str(path))
+    if is_old_store(path):
+        raise StoreError("", "a store of friso 0.3 or earlier", _ANEW, _EXAMPLE, str(path))
+    if not is_store(path):
+        actual = "a folder with other things in it; nothing was overwritten"
+        raise StoreError("", actual, _EXPECTED, "--out study.zarr", str(path))
+    damage = "are damaged"
+    try:
+        own = Own.model_validate(json.loads(stored(path / OWN / DESCRIPTION))["attributes"])
+        if own.format != FORMAT:
+            damage = f"are of another friso: in form {own.format} instead of {FORMAT}"
+        elif own.checksum == _sum_at(path, own.metric):
+            return own
+    except OSError as error:
+        damage = f"cannot be read ({cause_of(error)})"
+    except (ValueError, LookupError, TypeError, RecursionError):
+        pass
+    actual = f"a store whose attributes or axes {damage}"
+    raise StoreError("", actual, f"a copy of it, or {_ANEW}", _EXAMPLE, str(path))
 
 
 class Store:
@@ -115,8 +209,8 @@ class Store:
 
     @classmethod
     @contextmanager
-    def opened(cls, path: Path, study: Study, overwrite: bool = False) -> Iterator[Store]:
-        """Open the store of a study, created if it is not there.
+    def opened(cls, path: Path, study: Study, overwrite: bool = False, metric: str = "outcome") -> Iterator[Store]:
+        """Open the store of a study; if it is not there, make it, with the `metric` that colours its map.
 
         With `overwrite`, the store of another study, or a damaged one, is replaced. Raises StoreError if the folder
         holds anything else or another study, or is in use by another process.
@@ -124,130 +218,89 @@ class Store:
         remove_leftovers(path)
         path = where_links_lead(path)
         store = cls(path, study)
+        fill = partial(store._fill, metric)
         with _refused(path):
             if not path.exists() or (path.is_dir() and not any(path.iterdir())):
-                make(path, store._fill)
+                make(path, fill)
             elif overwrite and path.is_dir() and is_store(path):
-                store._replace()
-        checked_metadata(path)
+                refuse_others_files(path)
+                with lock_store(path) as lock:
+                    try:
+                        refuse_other(path, study)
+                    except StoreError:
+                        exchange(path, fill, lock)
+                        logger.warning("replaced (--overwrite): %s, which held another study, or a damaged one", path)
+        if is_store(path):
+            refuse_links(path)
+        own_at(path)
         with lock_store(path):
             refuse_other(path, study)
             _warn_of_another_machine(path)
             remove_partial_files(path)
-            checked_metadata(path).mend(path)  # read again: another process may have added a note
             yield store
 
-    def _replace(self) -> None:
-        """Replace the present store by one of this study, unless it already is this study's."""
-        with lock_store(self.path) as lock:
-            try:
-                refuse_other(self.path, self.study)
-            except StoreError:
-                refuse_others_files(self.path)
-                exchange(self.path, self._fill, lock)
-                logger.warning("replaced (--overwrite): %s, which held another study, or a damaged one", self.path)
-
-    def _fill(self, folder: Path) -> None:
+    def _fill(self, metric: str, folder: Path) -> None:
         """Write the store without results into a new folder."""
-        import xarray as xr
         import zarr
-        from numcodecs import CRC32
+        from zarr.codecs import BloscCodec, Crc32cCodec
 
         study, coordinates = self.study, self.study.coordinates()
-        # arrays start with one empty cell, which is not written, and then get their size, so that nothing is computed
-        cells = {
-            name: np.full((1,) * len(study.names), "" if is_text(name) else np.nan, form_of(name))
-            for name in study.metrics
-        }
-        variables = {
-            name: (study.names, cell, attributes_of(name, study.stage.axis_kind)) for name, cell in cells.items()
-        }
-        checked = {"filters": [CRC32()]}  # for readers of single chunks
-        encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks, **checked} for name in study.metrics}
-        for name in encoding:
-            encoding[name] |= {} if is_text(name) else {"_FillValue": np.nan}
-        own: dict[str, dict[str, Any]] = dict.fromkeys(coordinates, checked)
         beside = " ".join(name for name, (dimension, *_) in coordinates.items() if name != dimension)
-        attributes = study.attributes() | ({COORDINATES: beside} if beside else {})
-        parts = [
-            (xr.Dataset(coords=coordinates, attrs=study.attributes()), own, "w"),
-            (xr.Dataset(variables, attrs=attributes), encoding, "a"),
-        ]
-        try:
-            with zarr.config.set({"array.write_empty_chunks": False}):
-                for part, how, mode in parts:
-                    part.to_zarr(folder, mode=mode, encoding=how, zarr_format=ZARR_FORMAT, consolidated=False)  # type: ignore[call-overload]
-            indent = zarr.config.get("json_indent")
-            for name in study.metrics:  # Zarr's own resize would list every possible chunk
-                place = folder / name / ".zarray"
-                array = json.loads(place.read_text(encoding="utf-8"))
-                place.write_text(
-                    json.dumps({**array, "shape": study.shape}, indent=indent), encoding="utf-8", newline=""
+        group = zarr.create_group(
+            folder, zarr_format=ZARR_FORMAT, attributes=study.attributes() | {"coordinates": beside}
+        )
+        create = partial(
+            group.create_array,
+            compressors=(BloscCodec(), Crc32cCodec()),
+            chunk_key_encoding={"name": "default", "separator": "."},
+        )
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            for name, (dimension, values, *about) in coordinates.items():
+                array = create(
+                    name,
+                    shape=values.shape,
+                    chunks=(min(len(values), AXIS_CHUNK),),
+                    dtype=_zarr_type(values.dtype),
+                    dimension_names=(dimension,),
+                    attributes=dict(*about),
                 )
+                array[...] = values
+        for name in study.metrics:
+            create(
+                name,
+                shape=study.shape,
+                chunks=self.blocks,
+                dtype=_zarr_type(np.dtype(form_of(name))),
+                fill_value="" if is_text(name) else np.nan,
+                dimension_names=study.names,
+                attributes=attributes_of(name, study.stage.axis_kind),
+            )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Zarr's specification has no consolidated descriptions yet
             zarr.consolidate_metadata(str(folder), zarr_format=ZARR_FORMAT)
-        except OSError:
-            _let_zarr_finish()
-            raise
-        seal_metadata(folder, coordinates)
+        own = Own(format=FORMAT, metric=metric, checksum=_sum_at(folder, metric))
+        zarr.create_group(folder / OWN, zarr_format=ZARR_FORMAT, attributes=own.model_dump())
 
-    @property
-    def ledger(self) -> Ledger:
+    @cached_property
+    def records(self) -> Records:
         """Return the records of the blocks that were written."""
-        return Ledger(self.path, checked_metadata(self.path).study, self.study.metrics)
+        return Records(self.path, own_at(self.path).checksum)
 
     def missing(self) -> Iterator[CellBlock]:
         """Yield the blocks that must be run: those not done, and damaged ones with a log message."""
-        ledger = self.ledger
+        records = self.records
         for block in self.study.blocks(self.blocks):
             number = self._number(block)
-            if not ledger.has(number):
+            if not records.is_whole(number, self.study.metrics):
+                if records.file(number).exists():
+                    logger.warning("%s: block %s is damaged and is run again", self.path, number)
                 yield block
-            elif not ledger.is_whole(number):
-                logger.warning("%s: block %s is damaged and is run again", self.path, number)
-                yield block
-
-    def done(self) -> list[str]:
-        """Return the names of the completed blocks, as in Zarr.
-
-        The names are read from existing files, because a store may claim any size.
-        """
-        return [number for number in self.ledger.entered() if self._is_of_block(number)]
 
     @property
     def is_done(self) -> bool:
         """Tell whether all blocks are recorded as written."""
-        return len(self.done()) == self._count
-
-    def state(self) -> StoreState:
-        """Return how much of the study is done, and which of its parts are damaged or unreadable."""
-        ledger, done = self.ledger, self.done()
-        damaged: list[str] = []
-        unreadable: list[str] = []
-        for number in done:
-            try:
-                if not ledger.is_whole(number):
-                    damaged.append(number)
-            except PermissionError as error:
-                unreadable.append(path_of(error) or number)
-        files = checked_metadata(self.path).damaged_files(self.path)
-        return StoreState(self._count, len(done), damaged, files, unreadable)
-
-    @property
-    def _counts(self) -> list[int]:
-        """Return the number of blocks along each axis."""
-        return [-(-length // size) for length, size in zip(self.study.shape, self.blocks, strict=True)]
-
-    @property
-    def _count(self) -> int:
-        return math.prod(self._counts)
-
-    def _is_of_block(self, number: str) -> bool:
-        """Tell whether a name, such as "0.3", is one of a block of this study."""
-        parts = number.split(".")
-        return len(parts) == len(self._counts) and all(
-            re.fullmatch("0|[1-9][0-9]{0,17}", part) and int(part) < count
-            for part, count in zip(parts, self._counts, strict=True)
-        )
+        counts = [math.ceil(length / size) for length, size in zip(self.study.shape, self.blocks, strict=True)]
+        return sum(1 for file in (self.path / OWN).iterdir() if _NUMBER.fullmatch(file.name)) >= math.prod(counts)
 
     def _number(self, block: CellBlock) -> str:
         """Return the name of a block's files, such as "0.3"."""
@@ -260,35 +313,36 @@ class Store:
         """
         import zarr
 
+        number, records = self._number(block), self.records
         shape = tuple(part.stop - part.start for part in block)
+        delete_file(records.file(number))  # a damaged block is not done until all of it is written again
         # empty chunks are written too, because the record lists every chunk
         with zarr.config.set({"array.write_empty_chunks": True}):
-            group: Any = zarr.open_group(self.path, mode="r+", zarr_format=ZARR_FORMAT, use_consolidated=True)
+            group: Any = zarr.open_group(self.path, mode="r+", zarr_format=ZARR_FORMAT)
             for name in self.study.metrics:
                 values = columns[name].astype(form_of(name)).reshape(shape)
                 once_free(partial(group[name].__setitem__, block, values))
-        self.ledger.enter(self._number(block))
-
-    @property
-    def notes(self) -> Mapping[str, Any]:
-        """Return friso's own notes on the store, such as the metric that colours its map."""
-        return checked_metadata(self.path).notes
-
-    def note(self, **notes: Any) -> None:
-        """Add friso's own notes to the store, by name, which are no part of the study."""
-        annotate_metadata(self.path, notes)
+        records.enter(number, self.study.metrics)
 
     def read(self) -> xr.Dataset:
         """Return the study in the store as a dataset whose values are read on access."""
         return read_store(self.path)
 
 
+_NUMBER = re.compile(r"[0-9]+(\.[0-9]+)*")
+
+
+def _zarr_type(kind: np.dtype) -> Any:
+    """Return the type of Zarr's arrays for a NumPy type: texts of any length, for which Zarr 3 has a specification."""
+    return str if kind.kind in "UTO" else kind
+
+
 @check_arguments
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """Return the study in the store at `path` as a dataset whose values are read on access.
 
-    The study may be unfinished; cells that were not run yet are empty. Raises StoreError if there is no store, if its
-    metadata or axes are damaged, or if anything but files is in it. It is also raised on access to damaged cells.
+    The study may be unfinished; cells that were not run yet are empty. Raises StoreError if there is no store, or if
+    its attributes or axes are damaged. It is also raised on access to damaged cells.
 
     Examples
     --------
@@ -296,63 +350,41 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     >>> friso.read_store("rig.zarr")["outcome"]  # doctest: +SKIP
     """
     import xarray as xr
+    import zarr
+    from xarray.core.indexing import LazilyIndexedArray
 
-    from friso.studies.sealed_store import SealedStore
+    from friso.studies.checked_store import CheckedStore, Texts
 
-    metadata = checked_metadata(Path(path))
-    refuse_foreign(Path(path), metadata.all_files)
+    path = Path(path)
+    own = own_at(path)
     try:
-        if metadata.damaged_axes(Path(path)):
-            raise ValueError("other axes than were written")
-        runs = xr.open_zarr(SealedStore.at(Path(path), metadata), chunks=None, zarr_format=ZARR_FORMAT)
-        runs.attrs = {name: value for name, value in metadata.attributes.items() if name != COORDINATES}
-        runs = runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
+        source = CheckedStore(path, checksum=own.checksum)
+        read = xr.open_zarr(source, chunks=None, consolidated=True, zarr_format=ZARR_FORMAT)
+        axes = {name: axis.load() for name, axis in read.coords.items()}
+        words = {name: np.array(axis.values.tolist()) for name, axis in axes.items() if axis.dtype.kind == "T"}
+        axes |= {name: axes[name].copy(data=values) for name, values in words.items()}
+        runs = read[[name for name in every_variable() if name in read]].assign_coords(axes)
         runs.encoding["source"] = os.path.abspath(path)
         study = study_of(runs)
-        blocks = Store(Path(path), study).blocks
+        blocks = Store(path, study).blocks
         if any(runs[name].encoding["chunks"] != blocks for name in study.metrics):
             raise ValueError("other chunks than friso writes")
-        return runs
+        group: Any = zarr.open_group(source, mode="r", zarr_format=ZARR_FORMAT)
+        texts = {name: Texts(group[name], form_of(name)) for name in study.metrics if is_text(name)}
+        return runs.assign(
+            {name: (runs[name].dims, LazilyIndexedArray(text), runs[name].attrs) for name, text in texts.items()}
+        )
     except Exception:  # any error of a codec, or of a damaged study
-        expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
         actual = "a store whose axes are damaged, or whose study this friso cannot read"
-        raise StoreError("", actual, expected, "friso map STAGE.toml ... --out study.zarr", str(path)) from None
-
-
-@dataclass(frozen=True)
-class StoreState:
-    """State of a study's store.
-
-    Fields are the number of blocks, how many are done, and the names of damaged blocks. Further fields list damaged
-    files of metadata, which the next run writes anew, and chunks that cannot be read for lack of permission.
-    """
-
-    blocks: int
-    done: int
-    damaged: list[str]
-    files: list[str]
-    unreadable: list[str]
-
-    @property
-    def is_whole(self) -> bool:
-        """Tell whether all blocks are done, undamaged and readable."""
-        return self.done == self.blocks and not (self.damaged or self.unreadable)
-
-
-def check_store(path: Path) -> StoreState:
-    """Read all of the store at `path`, compare it with its digests, and return its state.
-
-    Raises StoreError if its metadata or axes are damaged, or there is none.
-    """
-    return Store(path, study_of(read_store(path))).state()
+        raise StoreError("", actual, f"a copy of it, or {_ANEW}", _EXAMPLE, str(path)) from None
 
 
 def holds_all(path: Path, study: Study) -> bool:
     """Tell whether the store at `path` is complete, undamaged, and of this study."""
     try:
         refuse_other(path, study)
-        return check_store(path).is_whole
-    except StoreError:
+        return next(Store(path, study).missing(), None) is None
+    except (StoreError, PermissionError):
         return False
 
 
@@ -378,17 +410,6 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
         once = np.array([words_once.setdefault(str(word), str(word)) for word in words], dtype=object)
         decoded[first : first + rows] = once[codes].reshape(decoded[first : first + rows].shape)
     return decoded
-
-
-def _let_zarr_finish() -> None:
-    """Wait for Zarr's other writes after one of them has failed."""
-    from zarr.core.sync import sync
-
-    async def others() -> None:
-        tasks = asyncio.all_tasks() - {asyncio.current_task()}
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    sync(others())
 
 
 def refuse_other(path: Path, study: Study) -> None:

@@ -1,11 +1,11 @@
-"""Read and write files of a store safely, with the digests of its chunks and its folder.
+"""Read and write files of a store safely, with a record of each block, and its folder.
 
 A store may come from others, so only regular files of the store itself are read, and none larger than friso writes
 them.
 
-The digests of the chunks of each block stand in a file per block. They include the study, the block and the variable,
-so they detect exchanged chunks, unlike checksums inside the chunks. The file of a block is written last: a block with a
-file is complete.
+The record of a block has a checksum of each of its chunks, which begins with the store's checksum, the variable and the
+block. So it detects exchanged chunks, too, unlike Zarr's own at the end of each chunk. It is written last: a block with
+a record is done.
 
 The folder is made elsewhere, moved into place, exchanged and locked. The next process repairs what a killed process
 left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store being made, in a folder with its lock. With the suffix
@@ -14,23 +14,18 @@ left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store being made, in a
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
 import os
 import re
-import stat
 import uuid
-import zipfile
-from collections.abc import Callable, Collection, Iterator, Mapping
+import zlib
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from glob import escape
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from filelock import FileLock, Timeout
+from pydantic import TypeAdapter
 
 from friso.errors import StoreError
 from friso.platform.bounded_file import content_of
@@ -51,13 +46,6 @@ MOST_BYTES = 64 << 20
 """Largest file of a store [bytes]: six times the largest chunk, which has incompressible texts."""
 
 
-MOST_EXPANDED = 1 << 30
-"""Most bytes of the arrays in an archive of results.
-
-It limits them because a small archive may claim any size.
-"""
-
-
 def stored(file: Path) -> bytes:
     """Read a file of a store.
 
@@ -66,195 +54,108 @@ def stored(file: Path) -> bytes:
     return content_of(file, MOST_BYTES, follow=False)
 
 
-def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
-    """Return the SHA-256 of a file, of a store or beside it, or None.
+OWN = ".friso"
+"""Folder of a store with the records of its blocks and its lock; for Zarr an empty group."""
 
-    The result is None if there is no such file, for anything but a regular file, and for more than `most` bytes. Raises
-    PermissionError if the file cannot be read, which does not mean that it is damaged.
-    """
+LOCK = f"{OWN}/lock"
+"""File that is locked while a store is written to."""
+
+DESCRIPTION, CHUNK = "zarr.json", "c."
+"""Name of Zarr's description of a group or an array, and what the names of chunks begin with."""
+
+_NAMES = re.compile(rf"zarr\.json|(c\.)?[0-9.]+|(\.friso\.)?lock|\.z[a-z]+(\.copy)?|.*{re.escape(PARTIAL)}")
+"""Pattern of names of files of stores, also those of friso 0.3, and of partial files."""
+
+
+def is_store(path: Path) -> bool:
+    """Tell whether a version of friso made the folder as a store, damaged or not."""
+    return (path / OWN).is_dir() or is_old_store(path)
+
+
+def is_old_store(path: Path) -> bool:
+    """Tell whether friso 0.3 or earlier made the folder as a store."""
+    return any(all(_mentions(path / name, words) for words in _OLD_WORDS) for name in (".zmetadata", ".zattrs"))
+
+
+_OLD_WORDS = b'"equations"', b'"friso"'
+"""Texts that occur together only in the descriptions of stores."""
+
+
+def _mentions(file: Path, words: bytes) -> bool:
+    """Tell whether a file can be read and contains these words."""
     try:
-        return hashlib.sha256(content_of(file, most, follow=False)).hexdigest()
-    except PermissionError:
-        raise
+        return words in stored(file)
     except OSError:
-        return None
+        return False
 
 
-def kept_arrays(file: Path) -> dict[str, np.ndarray] | None:
-    """Return the arrays that `keep_arrays` wrote into a file, or None.
-
-    The result is None if the arrays are missing or damaged. It is also None if they take more than MOST_EXPANDED bytes;
-    no array is expanded then.
-    """
-    try:
-        content = stored(file)
-        digest, archive = content[:_DIGEST], io.BytesIO(content[_DIGEST:])
-        if digest != _digest(file, archive.getvalue()):
-            return None
-        with zipfile.ZipFile(archive) as members:
-            if sum(member.file_size for member in members.infolist()) > MOST_EXPANDED:
-                return None
-        archive.seek(0)
-        with np.load(archive, allow_pickle=False) as arrays:
-            return dict(arrays)
-    except Exception:  # any error of NumPy in an archive that others gave a valid digest
-        return None
-
-
-def keep_arrays(file: Path, arrays: Mapping[str, Any]) -> None:
-    """Store arrays in an archive, behind a digest that detects damage and exchanged files.
-
-    The digest covers the arrays and the name of the file. Raises OSError if the file cannot be written.
-    """
-    archive = io.BytesIO()
-    np.savez_compressed(archive, **arrays)
-    content = archive.getvalue()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    put(file, _digest(file, content) + content)
-
-
-_DIGEST = hashlib.sha256().digest_size
-
-
-def _digest(file: Path, content: bytes) -> bytes:
-    return hashlib.sha256(f"{file.name}\n".encode() + content).digest()
-
-
-def put(file: Path, content: bytes) -> None:
-    """Write a file of a store completely or not at all, with the user's usual permissions.
-
-    Raises OSError if the file cannot be written.
-    """
-    with whole_file(file) as stream:
-        stream.write(content)
-
-
-BLOCKS = ".blocks"
-"""Folder of a store besides those of its arrays: records of blocks."""
-
-_OF_ARRAY = re.compile(rf"\.z[a-z]+(\.copy)?|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
-"""Pattern of names that Zarr gives, of copies of metadata, and of partial files."""
-
-
-def is_of_store(name: str) -> bool:
-    """Tell whether a name within a store is one that friso or Zarr writes."""
-    return _OF_ARRAY(name.rpartition("/")[2]) is not None
-
-
-def refuse_foreign(path: Path, files: Collection[str]) -> None:
-    """Refuse a store with entries that Zarr must not read, nor friso write to.
-
-    `files` are its metadata files. Refused are links, devices, pipes, huge files, and files in place of folders or the
-    reverse. Raises StoreError for the first such entry.
-    """
-    folders = {BLOCKS, *(name.partition("/")[0] for name in files if "/" in name)}
-    for entry in _entries(path):
-        status = entry.stat(follow_symlinks=False)
-        name = Path(entry.path).relative_to(path).as_posix()
-        remove = "rm"
-        if stat.S_ISLNK(status.st_mode):
-            actual = "is a link"
-        elif stat.S_ISDIR(status.st_mode):
-            if name not in files and not (name.rpartition("/")[0] in folders and is_of_store(name)):
-                continue
-            actual, remove = "is a folder", "rm -r"
-        elif not stat.S_ISREG(status.st_mode):
-            actual = "is a device or a pipe"
-        elif status.st_size > MOST_BYTES:
-            actual = f"has {status.st_size / 1e6:.3g} MB"
-        elif name in folders:
-            actual = "is no folder"
-        else:
-            continue
-        expected = f"files of the store alone, of at most {MOST_BYTES / 1e6:.3g} MB: remove that one"
-        raise StoreError(
-            "", f"a store whose {name} {actual}", expected, f"{remove} {shell_word(str(path / name))}", str(path)
-        )
-
-
-def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
-    """Yield the entries of a folder and its subfolders, down to `levels` levels.
-
-    Each folder comes before its content. No link is followed.
-    """
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            yield entry
-            if levels > 1 and entry.is_dir(follow_symlinks=False):
-                yield from _entries(entry.path, levels - 1)
+def strangers(path: Path) -> list[Path]:
+    """Return what is in the store at `path` besides friso's files: other names, links, and folders in folders."""
+    return [
+        item
+        for folder in (path, *(part for part in path.iterdir() if part.is_dir() and not part.is_symlink()))
+        for item in sorted(folder.iterdir())
+        if item.is_symlink()
+        or (folder != path if item.is_dir() else not (item.is_file() and _NAMES.fullmatch(item.name)))
+    ]
 
 
 @dataclass(frozen=True)
-class Ledger:
-    """The records of the blocks of a store at `path`: digests of their chunks.
-
-    The records are for a `study`, by its digest, and its metrics.
-    """
+class Records:
+    """The records of the blocks of the store at `path`; `checksum` is the store's."""
 
     path: Path
-    study: str
-    metrics: tuple[str, ...]
+    checksum: int
 
-    def has(self, number: str) -> bool:
-        """Tell whether a block, by its `number` as in Zarr, is recorded as written."""
-        return self._file(number).exists()
+    def file(self, number: str) -> Path:
+        """Return the file of a block's record, by its number as in Zarr."""
+        return self.path / OWN / number
 
-    def entered(self) -> list[str]:
-        """Return the numbers of the recorded blocks, as texts, sorted.
+    def chunk(self, name: str, number: str) -> bytes | None:
+        """Return the chunk of a variable in a block; None if the block is not done.
 
-        Raises OSError if the folder of records cannot be read.
-        """
-        return [] if not self._file("").exists() else sorted(file.name for file in self._file("").iterdir())
-
-    def enter(self, number: str) -> None:
-        """Record a block after its chunks were written.
-
-        Raises OSError if the record cannot be written.
-        """
-        self._file(number).parent.mkdir(exist_ok=True)
-        put(self._file(number), self._entry(number))
-
-    def is_whole(self, number: str) -> bool:
-        """Tell whether a block is recorded, and all of its chunks are unchanged since then.
-
-        Raises PermissionError if the record or a chunk cannot be read.
+        Raises ValueError if it differs from what was recorded or is lost, and another OSError if it cannot be read.
         """
         try:
-            return stored(self._file(number)) == self._entry(number)
-        except PermissionError:
-            raise
-        except OSError:
-            return False
-
-    def digest(self, number: str, name: str) -> str | None:
-        """Return the recorded digest of a metric's chunk in a block.
-
-        The result is None if the block was not recorded, and "" if the record is damaged or of another study. Raises
-        PermissionError if the record cannot be read.
-        """
-        try:
-            entry = json.loads(stored(self._file(number)))
-            return entry["sha256"][name] if (entry["study"], entry["block"]) == (self.study, number) else ""
-        except PermissionError:
-            raise
+            record = _RECORD.validate_json(stored(self.file(number)))
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
-            return ""
+        try:
+            content = stored(self._chunk(name, number))
+        except FileNotFoundError:
+            raise ValueError("lost") from None
+        if record.get(name) != self._sum(name, number, content):
+            raise ValueError("not what was recorded")
+        return content
 
-    def _entry(self, number: str) -> bytes:
-        digests = {name: digest_of(self.path / name / number) for name in self.metrics}
-        return json.dumps({"study": self.study, "block": number, "sha256": digests}, indent=1).encode()
+    def is_whole(self, number: str, names: Iterable[str]) -> bool:
+        """Tell whether a block is done, and all of its chunks are as recorded.
 
-    def _file(self, number: str) -> Path:
-        return self.path / BLOCKS / number
+        Raises PermissionError if one cannot be read.
+        """
+        try:
+            return all(self.chunk(name, number) is not None for name in names)
+        except PermissionError:
+            raise
+        except (OSError, ValueError):
+            return False
+
+    def enter(self, number: str, names: Iterable[str]) -> None:
+        """Record a block after its chunks were written. Raises OSError if that fails."""
+        sums = {name: self._sum(name, number, stored(self._chunk(name, number))) for name in names}
+        with whole_file(self.file(number)) as stream:
+            stream.write(_RECORD.dump_json(sums))
+
+    def _chunk(self, name: str, number: str) -> Path:
+        return self.path / name / f"{CHUNK}{number}"
+
+    def _sum(self, name: str, number: str, content: bytes) -> int:
+        return zlib.crc32(content, zlib.crc32(f"{self.checksum} {name} {number}".encode()))
 
 
-LOCK = ".friso.lock"
-"""Name of the file that is locked while a store is written to."""
+_RECORD = TypeAdapter(dict[str, int])
 
 _OLD = ".old"
-
 _DIGITS = "[0-9a-f]" * 32
 
 
@@ -293,17 +194,20 @@ def refuse_others_files(path: Path) -> None:
 
     Raises StoreError, which names the first file that friso did not write.
     """
-    others = []
-    for item in sorted(path.iterdir()):
-        if item.is_dir() and not item.is_symlink():
-            names = {f"{item.name}/{part.name}": part for part in sorted(item.iterdir())}
-            others += [name for name, part in names.items() if part.is_dir() or not is_of_store(name)]
-        elif item.is_file() and not (is_of_store(item.name) or item.name == LOCK):
-            others.append(item.name)
-    if others:
+    if others := [item.relative_to(path).as_posix() for item in strangers(path)]:
         more = f" and {len(others) - 1} more" if len(others) > 1 else ""
         actual = f"a store with {others[0]}{more} in it, which friso did not write"
         raise StoreError("", actual, "nothing else in it: move that away, or another --out", origin=str(path))
+
+
+def refuse_links(path: Path) -> None:
+    """Refuse to write into a store with links in it, which may lead to files of others. Raises StoreError."""
+    for item in strangers(path):
+        if item.is_symlink():
+            name = item.relative_to(path).as_posix()
+            raise StoreError(
+                "", f"a store whose {name} is a link", "no links in it", f"rm {shell_word(str(item))}", str(path)
+            )
 
 
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
@@ -353,14 +257,14 @@ def remove_partial_files(path: Path) -> None:
 
 
 @contextmanager
-def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
+def lock_store(path: Path) -> Iterator[FileLock]:
     """Lock the store at `path` against other processes; yield the lock.
 
-    Raises StoreError if another one still has it after `patience` [s], ReadOnlyStoreError if nothing can be written.
+    Raises StoreError if another one has it, ReadOnlyStoreError if nothing can be written.
     """
     lock = FileLock(path / LOCK)
     try:
-        lock.acquire(timeout=patience)
+        lock.acquire(timeout=0)
     except Timeout:
         expected = "to wait, or another --out"
         raise StoreError("", "a store that another friso is writing to", expected, origin=str(path)) from None

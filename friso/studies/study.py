@@ -249,7 +249,7 @@ def _stored_axis(coordinate: xr.DataArray) -> SweptAxis:
     values = coordinate.values
     attributes = coordinate.attrs
     return SweptAxis(
-        str(coordinate.name), values, attributes["units"], attributes["scale"], values.dtype.kind not in "bUT"
+        str(coordinate.name), values, attributes["units"], attributes["scale"], values.dtype.kind not in "bU"
     )
 
 

@@ -3,13 +3,14 @@
 import json
 import re
 import sys
+import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast, get_type_hints
+from typing import Any, BinaryIO, cast, get_type_hints
 
 import numpy as np
 import pytest
@@ -29,7 +30,6 @@ from friso.equations.motion import size
 from friso.hunting import find_margin
 from friso.interface.output_folder import UNFINISHED, write
 from friso.shares import share
-from friso.studies.store_files import kept_arrays
 from friso.studies.study import _DECISIVE
 from friso_thesis.questions.reproduce.document import reproduce_document
 from friso_thesis.questions.reproduce.figures import reproduction_figures
@@ -37,6 +37,8 @@ from friso_thesis.questions.reproduce.page import COLOURS, claims_markdown, repr
 from friso_thesis.questions.reproduce.questions import QUESTIONS
 from friso_thesis.questions.reproduce.summary import summary_sheet
 from friso_thesis.questions.reproduce.words import SHORT_FORM, details, in_order, met, reasons, short
+from friso_thesis.studies import kept_work
+from friso_thesis.studies.kept_work import keep_arrays, kept_arrays
 from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS
 from friso_thesis.studies.rig.moves_on_rails import RailRuns, distance
 from friso_thesis.studies.thesis import experiments
@@ -1063,3 +1065,34 @@ def test_what_is_shortened_ends_with_a_statement() -> None:
     assert short("one; two. Three. Assumed: nothing") == "one; two. Three"
     assert short(f"one. Two; {long}") == "one. Two"
     assert len(short("A statement. " * 40)) <= SHORT_FORM
+
+
+def unreadable_archive(stream: BinaryIO) -> None:
+    """An archive with the header of an array that ends within a bracket, of which NumPy raises a TokenError."""
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("peaks.npy", b"\x93NUMPY\x01\x00\x0a\x00{'descr': \n")
+
+
+def test_kept_arrays_are_whole_and_no_larger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays that are damaged, of another file, or with too much in them are not taken."""
+    file, arrays = tmp_path / "0.npz", {"peaks": np.ones(5), "outcome": np.full(5, "rests")}
+    keep_arrays(file, arrays)
+    whole = kept_arrays(file)
+    assert whole is not None
+    assert {name: values.tolist() for name, values in whole.items()} == {
+        name: values.tolist() for name, values in arrays.items()
+    }
+    content = file.read_bytes()
+    for place in range(len(content)):
+        file.write_bytes(content[:place] + bytes([content[place] ^ 8]) + content[place + 1 :])
+        assert kept_arrays(file) is None
+    (tmp_path / "1.npz").write_bytes(content)
+    assert kept_arrays(tmp_path / "1.npz") is None
+    with monkeypatch.context() as patch:  # what others write, with a sound digest
+        patch.setattr(np, "savez_compressed", unreadable_archive)
+        keep_arrays(file, {})
+    assert kept_arrays(file) is None
+    keep_arrays(file, {**arrays, "more": np.zeros(10**6)})
+    monkeypatch.setattr(kept_work, "MOST_EXPANDED", 10**6)
+    monkeypatch.setattr(np, "load", lambda *arguments, **named: pytest.fail("it was expanded"))
+    assert kept_arrays(file) is None

@@ -13,15 +13,12 @@ from friso.progress import Progress
 
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
-    """Run or resume a study, or check with --check whether its store is complete."""
+    """Run or resume a study."""
     from friso.axis import speak_of
     from friso.interface.output_folder import output_folder
     from friso.questions.map.study import write_beside
 
     (source,) = about
-    if options.get("check"):
-        with named_as_options(question.options):
-            return show(question.function(source, check=True), shown, None)
     store, elsewhere = shown.out or Path(f"{source.stem}_map.zarr"), None
     if source.is_dir():
         store, elsewhere = None, output_folder(question.name, shown.out, shown.overwrite)
@@ -38,6 +35,6 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
         """
         if elsewhere is not None:
             return [*elsewhere.write(answer.files(), progress), *answer.exports]
-        return write_beside(answer.files_beside(), place, shown.overwrite, progress)
+        return write_beside(answer.files_beside(), shown.overwrite, progress)
 
     show(answer, shown, write, f"the runs are in {place}, but no figure was written")

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -42,7 +42,7 @@ from friso.stage.rig import AS_BUILT
 from friso.studies.axes import AxisValues, Samples
 from friso.studies.cells import of_runs_alone, runs_as_built
 from friso.studies.execute import Crew, local_crew
-from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
+from friso.studies.store import Store, holds_all, in_memory, read_store
 from friso.studies.store_files import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
@@ -162,35 +162,6 @@ class SweepAnswer(Answer):
         return {**beside, **export_files(self.result, [*self.exports])}
 
 
-class StoreAnswer(Answer):
-    """The state of a store; `result` is a `StoreState` with blocks done and damaged."""
-
-    store: Path
-
-    @property
-    def failure(self) -> str:
-        """Say that the store is damaged or cannot be read; empty if it is whole."""
-        state = self.result
-        return "the store is not whole" if state.damaged or state.files or state.unreadable else ""
-
-    def blocks(self) -> Sequence[AnswerBlock]:
-        """Return how many blocks of cells are done, and which are damaged or unreadable."""
-        from friso.shown.blocks import AnswerBlock
-
-        state, damaged = self.result, ", ".join([*self.result.damaged, *self.result.files])
-        again = f"friso map {shell_word(str(self.store))} recomputes the damaged blocks"
-        unread = f"; may not be read: {', '.join(state.unreadable)}" if state.unreadable else ""
-        damage = f"damaged: {damaged} ({again})" if damaged else "nothing is damaged"
-        says = f"{self.store}: blocks done: {state.done} of {state.blocks}; {damage}{unread}"
-        lost = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
-        numbers = {"store": str(self.store), "blocks": state.blocks, "done": state.done, **lost}
-        return [AnswerBlock(sentences=[says], numbers=lambda: numbers)]
-
-    def files(self) -> Files:
-        """Return nothing: a check of a store writes no file."""
-        return {}
-
-
 @question
 def sweep(
     stage: StageLike,
@@ -212,11 +183,10 @@ def sweep(
     export: Iterable[str | os.PathLike[str]] = (),
     out: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
-    check: bool = False,
     yes: bool = False,
     beside: bool = False,
     progress: Progress = silent,
-) -> SweepAnswer | StoreAnswer:
+) -> SweepAnswer:
     """Where does it hunt: two (or more) keys swept; a Zarr store, a figure, and a page whose cells name their runs.
 
     Parameters
@@ -257,8 +227,6 @@ def sweep(
         Folder of the results, a Zarr store, resumed if it exists; of a store: folder of its figure and page.
     overwrite : bool
         Replace the store of another study, and figures and exports of the same name.
-    check : bool
-        Run nothing; say whether a store is intact.
     yes : bool
         Confirm a study of more than ten million cells.
     beside : bool
@@ -283,10 +251,6 @@ def sweep(
     >>> runs.sizes["joint.stroke"]
     3
     """
-    if check:
-        if any((axes, samples, x, y, axis, link, set, metric, confirm, rtol, export, out)):
-            raise InputError("check", "--check beside other options", "a store alone", "friso map rig_map.zarr --check")
-        return _whole(stage)
     exports = _checked_exports(export)
     if confirm and metric not in (None, "sketch", "verdict"):
         raise InputError("confirm", f"--confirm and --metric {metric}", "one of the two: it searches for verdicts", "")
@@ -316,12 +280,12 @@ def sweep(
             for path in exports:
                 check_file("export", path, overwrite)
             inputs.mention_unstable_loop(study.stage)
-            runs, can_note = run_in_memory([study], crew, progress)[0], False
+            runs = run_in_memory([study], crew, progress)[0]
         else:
             example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
             inputs.mention_unstable_loop(study.stage)
-            runs, can_note = _filled(study, store, crew, overwrite, metric, beside, progress)
+            runs = _filled(study, store, crew, overwrite, metric, progress)
         held = in_memory(runs) if store is not None and study.cells <= CONFIRMED_FROM else runs
         from friso.questions.map.findings import own_values
         from friso.studies.edges import fine_edges
@@ -331,7 +295,7 @@ def sweep(
     if store is None:
         write(export_files(held, exports), exports if overwrite else ())
     elif exports and not beside:
-        write_beside(export_files(held, exports), store, overwrite, progress, can_note)
+        write_beside(export_files(held, exports), overwrite, progress)
     return SweepAnswer(
         held,
         stage=study.stage,
@@ -341,17 +305,6 @@ def sweep(
         exports=tuple(exports),
         edges=edges,
     )
-
-
-def _whole(store: Any) -> StoreAnswer:
-    """Check whether a store is complete and undamaged.
-
-    Raises InputError for anything but a store, and StoreError for an unreadable one.
-    """
-    if not isinstance(store, str | os.PathLike) or Path(store).is_file():
-        stem = Path(store).stem if isinstance(store, str | os.PathLike) else "rig"
-        raise InputError("check", f"{store}, a file", "the store of a study", f"friso map {stem}_map.zarr --check")
-    return StoreAnswer(check_store(Path(store)), store=Path(store))
 
 
 def _another_study(store: Path) -> InputError:
@@ -389,14 +342,11 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
             yield crew
 
 
-def _filled(
-    study: Study, store: Path, crew: Crew, overwrite: bool, metric: str, beside: bool, progress: Progress
-) -> tuple[xr.Dataset, bool]:
-    """Run the cells that a store lacks; return the runs, and whether the store can be written.
+def _filled(study: Study, store: Path, crew: Crew, overwrite: bool, metric: str, progress: Progress) -> xr.Dataset:
+    """Run the cells that a store lacks, and return the runs.
 
     If the work ends early, a message says how much is stored and how to resume. A complete store that cannot be written
-    is only read, unless figures are to be written `beside` it. Raises StoreError for a store that must be written and
-    cannot be.
+    is only read. Raises StoreError for a store that must be written and cannot be.
     """
     stored = 0
 
@@ -407,18 +357,12 @@ def _filled(
         progress(done, total, store.name)
 
     try:
-        with Store.opened(store, study, overwrite) as opened:
-            opened.note(metric=opened.notes.get("metric", metric))
-            return fill(opened, crew, counted), True
-    except ReadOnlyStoreError as error:
+        with Store.opened(store, study, overwrite, metric) as opened:
+            return fill(opened, crew, counted)
+    except ReadOnlyStoreError:
         if not holds_all(store, study):
             raise
-        if beside:
-            elsewhere = f"friso map {shell_word(str(store))} --out figures"
-            raise StoreError(
-                "", error.actual, f"{error.expected}, or figures elsewhere", elsewhere, str(store)
-            ) from None
-        return read_store(store), False
+        return read_store(store)
     except (KeyboardInterrupt, OSError, RuntimeError) as error:
         far, resumed = f"{stored} of {study.cells} cells are stored", f"friso map {shell_word(str(store))}"
         if isinstance(error, OSError):

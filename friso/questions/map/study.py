@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,7 @@ import numpy as np
 
 from friso.errors import InputError, StoreError
 from friso.interface.inputs import Changes, axes_of, pairs_of, wrong
-from friso.interface.output_folder import check_file, check_store_folder, drafts_of, refuse_place, written
+from friso.interface.output_folder import check_file, check_store_folder, refuse_place, write
 from friso.platform.system import shell_word
 from friso.progress import Progress
 from friso.quantities import quoted
@@ -104,15 +103,14 @@ def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Stu
     Without a `metric`, the store's own is used. Raises InputError for a metric that the store does not hold, or if more
     than `most` cells are unfinished.
     """
-    from friso.studies.metadata import checked_metadata
-    from friso.studies.store import Store, read_store
+    from friso.studies.store import Store, own_at, read_store
 
     with read_store(store) as runs:
         study = study_of(runs)
     if most is not None and study.cells > most and not Store(store, study).is_done:
         actual = f"{study.cells:.3g} cells in {store}, not all of which were run"
         raise InputError("yes", actual, "--yes, if so many are meant; nothing was run", "yes=True")
-    metric = metric or str(checked_metadata(store).notes.get("metric", "outcome"))
+    metric = metric or own_at(store).metric
     coloured = [name for name in study.metrics if name in metrics()]
     if metric in metrics() and metric not in coloured:
         actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a new map"
@@ -192,55 +190,31 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 
 
 def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
-    """Refuse to write over anything but earlier results of this study.
+    """Refuse to write over the store of another study, and over files.
 
     If figure and page are written beside the store, `beside` is the example in a refusal. Raises InputError for files
     of others, and StoreError for a store with another study; `overwrite` allows both.
     """
-    from friso.studies.metadata import is_store
     from friso.studies.store import refuse_other
+    from friso.studies.store_files import is_store
 
     if store in exports:
         raise wrong("export", f"{store}, which is the store", "another name", "map.nc")
     check_store_folder(store)
     if not overwrite and is_store(store):
         refuse_other(store, study)
-    own = _own_files(store, exports)
     for view in _views(store) if beside else ():
-        check_file("--out", view, overwrite, [store], is_own=view in own, example=beside)
+        check_file("--out", view, overwrite, [store], example=beside)
     for path in exports:
-        check_file("--export", path, overwrite, [store], is_own=path in own)
+        check_file("--export", path, overwrite, [store])
 
 
-def write_beside(
-    files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress, can_note: bool = True
-) -> list[Path]:
-    """Write figure, page and exports of a store, all of them or none, and return their paths.
+def write_beside(files: Mapping[Path, Content], overwrite: bool, progress: Progress) -> list[Path]:
+    """Write figure, page and exports of a store, and return their paths.
 
-    Files that the store wrote earlier are replaced; other files only with `overwrite`. With `can_note`, the store notes
-    the digests of the new files first.
-
-    Raises StoreError if another process holds the store, or its notes cannot be written. Raises OSError if a file
-    cannot be written.
+    Files that are there are replaced only with `overwrite`. Raises OSError if a file cannot be written.
     """
-    from friso.studies.metadata import annotate_metadata
-    from friso.studies.store_files import lock_store
-
-    with drafts_of(files, progress) as drafts, lock_store(store, NOTE_WAIT) if can_note else nullcontext():
-        own = _own_files(store, files)
-        if can_note:
-            digests = {
-                path.name: sorted({str(_digest(file)) for file in ([draft, path] if path in own else [draft])})
-                for draft, path in drafts.drafts
-                if draft is not None
-            }
-            annotate_metadata(store, {"views": {**_noted_digests(store), **digests}})
-        drafts.put_in_place([*files] if overwrite else own)
-    return written(files)
-
-
-NOTE_WAIT = 10.0
-"""Time [s] to wait for another process that is writing a note into a store."""
+    return write(files, [*files] if overwrite else (), progress)
 
 
 def _views(store: Path) -> list[Path]:
@@ -248,42 +222,6 @@ def _views(store: Path) -> list[Path]:
     from friso.shown.drawing.figure import IMAGE_FORMATS
 
     return [path_beside(store, form) for form in (*IMAGE_FORMATS, "html")]
-
-
-def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
-    """Return the files beside a store that are still as the store wrote them.
-
-    Looked at are figure, page and the `exports`. Files are recognised by the digests that the store notes.
-    """
-    noted = _noted_digests(store)
-    named = {path: noted[path.name] for path in (*_views(store), *exports) if path.name in noted}
-    return [path for path, earlier in named.items() if (digest := _digest(path)) is not None and digest in earlier]
-
-
-def _noted_digests(store: Path) -> dict[str, list[object]]:
-    """Return the digests that a store has noted, by file name; other files may be among them."""
-    from friso.studies.metadata import checked_metadata
-
-    try:
-        noted = checked_metadata(store).notes.get("views")
-    except StoreError:
-        return {}
-    digests = noted if isinstance(noted, dict) else {}
-    return {name: digest for name, digest in digests.items() if isinstance(digest, list)}
-
-
-def _digest(file: Path) -> str | None:
-    """Return the digest of a file, or None if it cannot be read."""
-    from friso.studies.store_files import digest_of
-
-    try:
-        return digest_of(file, _MOST_OF_A_FILE)
-    except PermissionError:
-        return None
-
-
-_MOST_OF_A_FILE = 1 << 30
-"""Largest size in bytes of a figure, page or export that is compared with an earlier one."""
 
 
 def path_beside(store: Path, form: str) -> Path:

@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING, Any, TypeVar, Union, cast, get_args, get_origi
 
 import numpy as np
 
-from friso.studies.metadata import digest
 from friso.studies.metric import form_of
-from friso.studies.store_files import keep_arrays, kept_arrays, put, stored
+from friso.studies.store_files import stored
 from friso.studies.study import Study
 from friso.studies.sweep import dataset
-from friso_thesis.studies.kept_work import KeptWork
+from friso_thesis.studies.kept_work import KeptWork, digest, keep_arrays, kept_arrays, put
 from friso_thesis.studies.thesis.claims import Finding, Part
 from friso_thesis.studies.thesis.studies import thesis_rig
 
