@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -349,52 +348,6 @@ def test_what_is_compiled_when_its_question_is_overtaken_is_there_for_the_next(
     Timer(0.3, go.set).start()
     work.finish(asked)
     assert len(begun) == 1
-
-
-def test_who_fails_leaves_what_another_waits_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A request that nobody waits for any more is not begun."""
-    shared, failing, unwanted = requests(tmp_path, 3)
-    begun, may_end = [], {shared: Event(), failing: Event()}
-
-    class Building(Builder):
-        def build(self, request: Any) -> str:
-            begun.append(request)
-            while not may_end[request].wait(0.01) and not self.killed.is_set():
-                pass
-            return "" if request == failing or self.killed.is_set() else "name"
-
-    monkeypatch.setattr(building, "usable_cores", lambda: 2)
-    monkeypatch.setattr(building, "_taken", lambda surroundings: None)
-    monkeypatch.setattr(building, "_waiting", [])
-    monkeypatch.setattr(building, "_Builder", Building)
-    work, flag = building._Work(), np.zeros(1, np.int64)
-
-    def overtaken() -> None:
-        with ended_by(flag):
-            work.finish([shared, unwanted])
-
-    def waiting(request: Any) -> int:
-        return work._jobs[request].waiting if request in work._jobs else 0
-
-    with ThreadPoolExecutor(3) as pool:
-        try:
-            first = pool.submit(work.finish, [shared, failing])
-            wait_until(lambda: len(begun) == 2)
-            second, third = pool.submit(work.finish, [shared]), pool.submit(overtaken)
-            wait_until(lambda: (waiting(shared), waiting(unwanted)) == (3, 1))
-            flag[0] = 1
-            with pytest.raises(Overtaken):
-                third.result(LIMIT)
-            may_end[failing].set()
-            with pytest.raises(RuntimeError, match="could not be compiled"):
-                first.result(LIMIT)
-            may_end[shared].set()
-            second.result(LIMIT)
-        finally:
-            for event in may_end.values():
-                event.set()
-    assert len(begun) == 2
-    assert unwanted not in begun
 
 
 def test_who_waits_for_another_that_compiles_can_be_interrupted(

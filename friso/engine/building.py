@@ -9,17 +9,14 @@ from __future__ import annotations
 import atexit
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from concurrent.futures import FIRST_EXCEPTION, Future, wait
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock, Semaphore, Thread
 
-from filelock import FileLock, Timeout
-
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, leave_cache, logger
-from friso.engine.overtaken import ASKER, Overtaken, go_on
+from friso.engine.overtaken import ASKER, go_on
 from friso.engine.prune import prune
 from friso.engine.settings import build_settings
 from friso.platform.helper_process import HelperProcess
@@ -52,7 +49,7 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
 class _Work:
     """Compilations in progress in this process, as many at a time as there are cores.
 
-    Each request is compiled once for all threads that wait for it.
+    Each request is compiled once for all threads that wait for it. What has begun goes on, whoever still waits.
     """
 
     def __init__(self) -> None:
@@ -60,58 +57,17 @@ class _Work:
         self._jobs: dict[CodeRequest, _Job] = {}
 
     def finish(self, requests: list[CodeRequest]) -> None:
-        """Fulfil all requests, and wait until they are.
-
-        If an error ends the wait early, jobs for which nobody else waits are ended. If nobody wants the results any
-        more (Overtaken), jobs already being compiled go on.
-        """
+        """Fulfil all requests, and wait until they are. Raises the error of the first that fails."""
         requests = list(dict.fromkeys(requests))
-        jobs: list[_Job] = []
-        overtaken = False
-        try:
-            for number, request in enumerate(requests, 1):
-                jobs.append(self._joined(request, f"{number} of {len(requests)}"))
-            _wait(jobs)
-        except Overtaken:
-            overtaken = True
-            raise
-        finally:
-            wait(job.met for job in self._leave(jobs, overtaken))
+        _wait([self._begun(request, f"{number} of {len(requests)}") for number, request in enumerate(requests, 1)])
 
-    def end(self) -> None:
-        """End all jobs."""
+    def _begun(self, request: CodeRequest, place: str) -> _Job:
+        """Return the job of a request, started if necessary, at a `place` in the queue, in words."""
         with self._turn:
-            jobs = [*self._jobs.values()]
-            for job in jobs:
-                job.give_up()
-        wait([job.met for job in jobs], build_settings.ending_time)
-
-    def _joined(self, request: CodeRequest, place: str) -> _Job:
-        """Return the job of a request, started if necessary, and count one more waiting thread.
-
-        `place` is the rank of a new job in the queue, in words. An abandoned job is started again.
-        """
-        with self._turn:
-            job = self._jobs.get(request)
-            if job is None or job.given_up:
-                job = _Job(request, place, self._cores)
+            if (job := self._jobs.get(request)) is None:
+                job = self._jobs[request] = _Job(request, place, self._cores)
                 Thread(target=self._do, args=[job], daemon=True).start()  # a daemon does not keep the process alive
-                self._jobs[request] = job
-            job.waiting += 1
             return job
-
-    def _leave(self, jobs: list[_Job], overtaken: bool) -> list[_Job]:
-        """Stop waiting for jobs; abandon and return those for which nobody else waits.
-
-        If the wait was `overtaken`, jobs that are being compiled go on.
-        """
-        with self._turn:
-            for job in jobs:
-                job.waiting -= 1
-            left = [job for job in jobs if not job.waiting and not (overtaken and job.builds)]
-            for job in left:  # mark all before ending any: a builder that starts now then ends itself
-                job.give_up()
-        return left
 
     def _do(self, job: _Job) -> None:
         """Build one job in a process, and pass its result to all waiting threads."""
@@ -121,8 +77,7 @@ class _Work:
         except BaseException as raised:
             error = raised
         with self._turn:
-            if self._jobs.get(job.request) is job:
-                del self._jobs[job.request]
+            del self._jobs[job.request]
         if error is None:
             job.met.set_result(None)
         else:
@@ -152,22 +107,13 @@ def _wait(jobs: list[_Job]) -> None:
 class _Job:
     """A request to compile an entry of the cache, in progress.
 
-    `place` is its rank in the queue, `waiting` the number of waiting threads. `builds` is true while it is compiled,
-    and `given_up` if it was abandoned.
+    `place` is its rank in the queue; `builds` is true once it is compiled.
     """
 
     def __init__(self, request: CodeRequest, place: str, cores: Semaphore) -> None:
-        self.request, self.met, self.waiting = request, Future[None](), 0
-        self.builds = self.given_up = False
+        self.request, self.met, self.builds = request, Future[None](), False
         self._announced: set[object] = set()
         self._place, self._cores = place, cores
-        self._builder: _Builder | None = None
-
-    def give_up(self) -> None:
-        """Abandon the job as soon as possible."""
-        self.given_up = True  # set before the builder is ended: a builder that starts now then ends itself
-        if builder := self._builder:
-            builder.kill()
 
     def announce(self) -> None:
         """Tell the asker in whose thread this is called, once, that the job is being built.
@@ -182,54 +128,23 @@ class _Job:
 
     def meet(self) -> None:
         """Fulfil the request, unless another process has done so meanwhile."""
-        with self._held(self.request.lock()):
-            if self.request.entry() is None:  # another process may have built it meanwhile
-                with self._core():
+        with self.request.lock():
+            if self.request.entry() is None:
+                with self._cores:
+                    self.builds = True
                     self.request.answer(self._built())
-
-    @contextmanager
-    def _held(self, lock: FileLock) -> Iterator[None]:
-        """Hold the lock of the request in the `with` block, once no other process holds it."""
-        while not lock.is_locked:
-            self._go_on()
-            with suppress(Timeout):
-                lock.acquire(timeout=build_settings.waiting_interval)
-        try:
-            yield
-        finally:
-            lock.release()
-
-    @contextmanager
-    def _core(self) -> Iterator[None]:
-        """Occupy a core in the `with` block, while building."""
-        while not self._cores.acquire(timeout=build_settings.waiting_interval):
-            self._go_on()
-        try:
-            self.builds = True
-            self._go_on()
-            yield
-        finally:
-            self._cores.release()
-
-    def _go_on(self) -> None:
-        if self.given_up:
-            raise RuntimeError("the kernels were not compiled: interrupted")
 
     def _built(self) -> str:
         """Build the request with an idle builder if there is one; return the name of the entry."""
         surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(sys.path), self.request.plug_ins)
         while True:
             waiting = _taken(surroundings)
-            self._builder = builder = waiting or _Builder(surroundings)
-            if self.given_up:
-                builder.kill()
-            name = builder.build(self.request)
-            self._builder = None
-            if name:
+            builder = waiting or _Builder(surroundings)
+            if name := builder.build(self.request):
                 _waiting.append(builder)
                 return name
+            _builders.discard(builder)
             message = builder.end()
-            self._go_on()
             if waiting is None:  # an idle builder may have ended meanwhile
                 raise RuntimeError(f"the kernel could not be compiled:\n{message}")
 
@@ -253,6 +168,7 @@ class _Builder(HelperProcess):
     def __init__(self, surroundings: _Surroundings) -> None:
         self.surroundings = surroundings
         super().__init__("friso.engine.builder", str(surroundings.folder), paths=surroundings.paths)
+        _builders.add(self)
 
     def build(self, request: CodeRequest) -> str:
         """Build a request; return the name of its entry, or "" if the process ended.
@@ -269,6 +185,7 @@ class _Builder(HelperProcess):
         return answer
 
 
+_builders: set[_Builder] = set()
 _waiting: list[_Builder] = []
 
 
@@ -288,8 +205,7 @@ _taking = Lock()
 @atexit.register
 def _dismiss() -> None:
     """End the builders of this process."""
-    _work().end()
-    for builder in _waiting:
+    for builder in tuple(_builders):
         if builder.surroundings.process == os.getpid():
             builder.kill()
             builder.end()

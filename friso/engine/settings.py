@@ -99,9 +99,6 @@ class BuildSettings(Settings):
     waiting_interval: float = setting(0.1, "s")
     """Time between checks whether a result is still needed: shorter than a person notices."""
 
-    ending_time: float = setting(2.0, "s")
-    """Time for which the process waits at its end until builders have ended."""
-
     priority_time: float = setting(0.5, "s")
     """Longest time for which a question has priority. After that, nobody is still watching, and the compilation of its
     kernel must not keep others waiting."""
