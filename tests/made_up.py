@@ -267,6 +267,8 @@ def mpl_arrays(figure: Figure) -> list[list[np.ndarray]]:
 def plotly_arrays(figure: Figure) -> list[list[np.ndarray]]:
     drawn: dict[str, list[np.ndarray]] = {f"x{i or ''}": [] for i in (0, *range(2, len(figure.panels) + 1))}
     for trace in plotly_renderer.render(_without_bands(figure)).data:
+        if [*trace.x] == [None]:  # of the legend
+            continue
         parts = (trace.z,) if trace.type == "heatmap" else (trace.x, trace.y)
         drawn[trace.xaxis] += [np.asarray(part, float) for part in parts]
     return list(drawn.values())

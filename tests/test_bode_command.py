@@ -423,13 +423,11 @@ def test_a_band_is_prefixed_and_drawn_alike_under_its_label() -> None:
     (axes,) = canvas.axes
     (patch,) = axes.patches
     paper = [*np.asarray(patch.get_xy()).T, *axes.lines[0].get_data()]  # type: ignore[attr-defined]
-    for one, other in zip(paper, (part for trace in page.data for part in (trace.x, trace.y)), strict=True):
+    drawn, named = page.data[:2], page.data[2:]
+    for one, other in zip(paper, (part for trace in drawn for part in (trace.x, trace.y)), strict=True):
         assert one == pytest.approx(other)
-    legend = axes.get_legend()
-    assert legend is not None
-    assert (
-        [text.get_text() for text in legend.get_texts()] == [trace.name for trace in page.data] == ["between", "line"]
-    )
+    (legend,) = canvas.legends
+    assert [text.get_text() for text in legend.get_texts()] == [trace.name for trace in named] == ["between", "line"]
     canvas.draw_without_rendering()
     assert np.diff(axes.get_yticks()) == pytest.approx(2.0)
     assert page.layout.yaxis.dtick == pytest.approx(2.0)

@@ -197,12 +197,30 @@ def test_figures_drawn_in_threads_are_those_drawn_alone():
         assert [*together] == 2 * alone
 
 
+def test_a_figure_has_one_legend_that_names_each_line_once() -> None:
+    """A line that two panels have is named once, and one alone in its panel is not; on paper as on the page."""
+
+    def panel(*labels: str) -> Panel:
+        lines = [Series(np.arange(2.0), np.arange(2.0), label, "#000000" if label == "b" else GREY) for label in labels]
+        return Panel("", Axis("x", ""), Axis("y", ""), tuple(lines))
+
+    figure = Figure("f", "", "", (panel("a", "b"), panel("b", "c", ""), panel("alone")), columns=2)
+    canvas, page = matplotlib_renderer.render(figure), plotly_renderer.render(figure)
+    (legend,) = canvas.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["a", "b", "c"]
+    assert not any(axes.get_legend() for axes in canvas.axes)
+    assert [trace.name for trace in page.data if trace.showlegend is not False] == ["a", "b", "c"]
+    (first, *others) = matplotlib_renderer.draw_on(figure, None)
+    assert [text.get_text() for text in first.get_legend().get_texts()] == ["a", "b", "c"]
+    assert not any(axes.get_legend() for axes in others)
+
+
 def test_dollars_and_markup_in_names_are_text():
     figure = replace(small_figure(), subject=r"$\frac{1}$ <b>&", title="_x$")
     panel = replace(figure.panels[0], title="<script>$", series=(replace(figure.panels[0].series[0], label="_$a"),))
     figure = replace(figure, panels=(panel,))
     assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
-    legend = matplotlib_renderer.render(figure).axes[0].get_legend()
+    (legend,) = matplotlib_renderer.render(figure).legends
     assert [text.get_text() for text in legend.get_texts()] == ["_$a", "band", "peak"]
     assert "<script>$" not in json.dumps(packed_values(plotly_renderer.fragment(figure)))
 
@@ -224,7 +242,7 @@ def test_a_page_carries_what_plotly_draws_in_four_bytes_a_number():
     figure = small_figure()
     carried = packed_values(plotly_renderer.fragment(figure))[0]["data"]
     for trace, part in zip(plotly_renderer.render(figure).data, carried, strict=True):
-        for name in {"x", "y", *(("z",) if trace.type == "heatmap" else ())}:
+        for name in () if [*trace.x] == [None] else {"x", "y", *(("z",) if trace.type == "heatmap" else ())}:
             planes = np.frombuffer(base64.b64decode(part[name]["planes"]), np.uint8)
             numbers = planes.reshape(4, -1).T.copy().view("<f4")
             shape = [int(size) for size in part[name]["shape"].split(",") if size] or -1

@@ -29,8 +29,8 @@ from friso.questions.map.question import SweepAnswer
 from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of, no_number, quantity
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.colours import painted, ramp, scale
-from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, colour_key, drawable, pick
-from friso.shown.drawing.figure import Category, Cloud, Figure, Map
+from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, drawable, legend_entries, pick
+from friso.shown.drawing.figure import Category, Cloud, Figure, Map, Markers
 from friso.studies.study import Request
 
 CROSSOVER, STROKE, LOCKED = "controller.crossover", "joint.stroke", "joint.locked"
@@ -151,7 +151,7 @@ def test_outcomes_have_their_own_colours_in_the_order_of_severity():
     shown = [[category.label for category in row] for row in categories_shown(field)]
     expected = np.where(runs.outcome.values == "", "not run", runs.outcome.values).T
     assert shown == expected.tolist()
-    categories, _ = colour_key(map_figure(runs, "outcome"))
+    categories = legend_entries(map_figure(runs, "outcome"))
     assert [category.label for category in categories] == names
     assert not field.has_numbers
 
@@ -256,7 +256,7 @@ def test_the_evaluation_point_is_marked():
     figure = map_figure(plain(), marker={CROSSOVER: 8.0, STROKE: 3e-4, "masses.cart": 1.2})
     point = drawable(figure).panels[0].markers[0]
     assert (point.x.tolist(), point.y.tolist()) == ([8.0], [pytest.approx(0.3)])
-    assert [marker.label for marker in colour_key(figure)[1]] == ["evaluation point"]
+    assert [item.label for item in legend_entries(figure) if isinstance(item, Markers)] == ["evaluation point"]
     outside = map_figure(plain(), marker={CROSSOVER: 40.0, STROKE: 3e-4}).panels[0]
     assert outside.x.limits == pytest.approx((-1.5, 40.0))
     assert words_map(marker={LOCKED: False, STROKE: 0.0}).markers[0].x.tolist() == [1.0]

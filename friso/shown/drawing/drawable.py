@@ -14,10 +14,25 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.escapes import escaped
-from friso.shown.drawing.figure import Array, Arrow, Axis, Category, Coloured, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.figure import (
+    Array,
+    Arrow,
+    Axis,
+    Band,
+    Category,
+    Coloured,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+)
 from friso.shown.drawing.prefixes import choose, pretty
 
 Field = TypeVar("Field", bound=Coloured)
+
+LegendEntry = Category | Band | Series | Markers
+"""What a legend names."""
 
 
 SIDES = {
@@ -117,28 +132,23 @@ def colour_prefix(field: Coloured) -> tuple[float, str]:
     return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
 
 
-def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
-    """Return the categories and markers of all panels with maps or clouds, for one legend.
+def legend_entries(figure: Figure) -> list[LegendEntry]:
+    """Return what the one legend of a figure names, each entry once: categories that occur, then lines and points.
 
-    Only categories that occur are included, each once.
+    A panel without colours for numbers is named only if it has several labels, and a category only if no word in the
+    panel names it.
     """
-    panels = [panel for panel in figure.panels if panel.coloured]
-    categories = [
-        field.categories[int(code)]
-        for panel in panels
-        for field in panel.coloured
-        for code in np.unique(_finite(np.empty(0) if field.codes is None else field.codes.ravel()))
-    ]
-    markers = {(item.label, item.colour, item.symbol): item for panel in panels for item in panel.markers if item.label}
-    order = [category for panel in panels for field in panel.coloured for category in field.categories]
-    named = dict.fromkeys(category for category in categories if not category.is_written)
-    return sorted(named, key=order.index), list(markers.values())
-
-
-def line_key(figure: Figure) -> list[Series]:
-    """Return the labelled lines of panels with maps or clouds, each once, for the common legend."""
-    lines = [line for panel in figure.panels if panel.coloured for line in panel.series if line.label]
-    return list({(line.label, line.colour, line.dash): line for line in lines}.values())
+    fields = [field for panel in figure.panels for field in panel.coloured]
+    codes = [(field, [] if field.codes is None else np.unique(_finite(field.codes.ravel()))) for field in fields]
+    occurring = {field.categories[int(code)] for field, several in codes for code in several}
+    every = dict.fromkeys(category for field in fields for category in field.categories)
+    entries: dict[tuple[str, ...], LegendEntry] = {}
+    for panel in figure.panels:
+        drawn = [item for item in (*panel.bands, *panel.series, *panel.markers) if item.label]
+        for item in drawn if panel.coloured or len(drawn) > 1 else ():
+            style = item.dash if isinstance(item, Series) else item.symbol if isinstance(item, Markers) else "band"
+            entries.setdefault((item.label, item.colour, style), item)
+    return [*(one for one in every if one in occurring and not one.is_written), *entries.values()]
 
 
 MOST_WORDS = 12

@@ -1,4 +1,4 @@
-"""Draw maps and clouds on paper: cells, colour bars, legend and note."""
+"""Draw maps and clouds on paper, colour bars, and legend and note of every figure."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from friso.shown.drawing.colours import ColourScale, painted, scale
-from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
-from friso.shown.drawing.figure import Array, Coloured, Figure, Map, Panel
+from friso.shown.drawing.drawable import LegendEntry, cell_edges, legend_entries
+from friso.shown.drawing.figure import Array, Coloured, Figure, Map, Markers, Panel, Series
 from friso.shown.drawing.palette import GREY, INK
 
 LINE_HEIGHT = 0.17  # [inch] one line of the legend or the note
@@ -99,34 +99,22 @@ def footer_height(figure: Figure, width: float) -> float:
 def add_footer(
     canvas: Canvas, figure: Figure, symbols: dict[str, dict[str, Any]], dashes: dict[str, Any], width: float
 ) -> None:
-    """Draw the legend of all maps and clouds, and the note below it.
+    """Draw the legend of a figure, and the note below it.
 
     Both stand in the strip that `footer_height` reserved.
     """
     height = float(canvas.get_figheight())
-    categories, markers = colour_key(figure)
     lines = note_lines(figure, width)
-    handles = [
-        Patch(facecolor=category.colour, edgecolor=GREY, linewidth=0.6, label=category.label) for category in categories
-    ]
-    handles += [
-        Line2D([], [], linestyle="none", label=item.label, color=item.colour, **symbols[item.symbol])
-        for item in markers
-    ]
-    handles += [
-        Line2D([], [], linestyle=dashes[line.dash], label=line.label, color=line.colour, linewidth=line.width)
-        for line in line_key(figure)
-    ]
-    if handles:
+    if handles := legend_handles(figure, symbols, dashes):
         place = {"loc": "lower left", "bbox_to_anchor": (0.006, (LINE_HEIGHT * len(lines) + 0.03) / height)}
+        columns = -(-len(handles) // _key_rows(figure, width))
         legend = canvas.legend(
             handles=handles,
-            ncols=-(-len(handles) // _key_rows(figure, width)),
+            ncols=columns,
             columnspacing=1.4,
             labelspacing=0.25,
             borderaxespad=0,
             borderpad=0.1,
-            handlelength=2.2 if line_key(figure) else 1.4,
             **place,
         )
         legend.set_in_layout(False)
@@ -137,13 +125,28 @@ def add_footer(
         canvas.text(0.01, y, line, fontsize=8, color=INK, parse_math=False, in_layout=False)
 
 
+def legend_handles(figure: Figure, symbols: dict[str, dict[str, Any]], dashes: dict[str, Any]) -> list[Patch | Line2D]:
+    """Return what stands beside the labels of a figure's legend."""
+
+    def handle(item: LegendEntry) -> Patch | Line2D:
+        """Return a line, a point or a patch of colour."""
+        if isinstance(item, Series):
+            style = {"linestyle": dashes[item.dash], "linewidth": item.width}
+            return Line2D([], [], label=item.label, color=item.colour, **style)
+        if isinstance(item, Markers):
+            return Line2D([], [], linestyle="none", label=item.label, color=item.colour, **symbols[item.symbol])
+        return Patch(facecolor=item.colour, edgecolor=GREY, linewidth=0.6, label=item.label)
+
+    return [handle(item) for item in legend_entries(figure)]
+
+
 def _key_rows(figure: Figure, width: float) -> int:
     """Return the number of rows of the legend, in columns as wide as the longest entry.
 
     It is 0 without entries. `width` [inch] is that of the figure.
     """
-    labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
+    labels = [item.label for item in legend_entries(figure)]
     if not labels:
         return 0
-    columns = max(1, int(LETTERS_PER_INCH * (width - 0.3) / (max(map(len, labels)) + 6)))
+    columns = max(1, int(LETTERS_PER_INCH * (width - 0.3) / (max(map(len, labels)) + 8)))
     return -(-len(labels) // columns)

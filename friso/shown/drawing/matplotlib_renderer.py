@@ -17,7 +17,6 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib import ticker
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import PathPatch
@@ -28,13 +27,18 @@ from matplotlib.transforms import Bbox
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.shown.drawing.drawable import SIDES, drawable, second_ticks, word_ticks
-from friso.shown.drawing.figure import IMAGE_FORMATS, Area, Axis, Band, Figure, Markers, Panel, Series
-from friso.shown.drawing.matplotlib_maps import add_colour_bars, add_footer, draw_coloured, footer_height
+from friso.shown.drawing.figure import IMAGE_FORMATS, Area, Axis, Figure, Panel
+from friso.shown.drawing.matplotlib_maps import (
+    add_colour_bars,
+    add_footer,
+    draw_coloured,
+    footer_height,
+    legend_handles,
+)
 from friso.shown.drawing.palette import GREY, INK
 
 FIGURE_WIDTH = 9.0  # [inch]
-ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
-LEGEND_ROWS, LEGEND_ROW = 3, 13  # rows of a legend that this has room for, and [point] what each takes
+ROW_HEIGHT = 2.7  # [inch] axes, labels and title of one row of panels
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
@@ -131,6 +135,9 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
     with _style():
         for place, panel in zip(places, prepared.panels, strict=True):
             _draw(place, panel, FIGURE_WIDTH / prepared.columns)
+        if handles := legend_handles(prepared, _SYMBOLS, _DASHES):
+            for text in places[0].legend(handles=handles).get_texts():
+                text.set_parse_math(False)
     return places
 
 
@@ -206,13 +213,11 @@ def _style() -> Iterator[None]:
 
 
 def _row_height(figure: Figure) -> float:
-    """Return the height of a row of panels [inch], with room for their legends."""
+    """Return the height of a row of panels [inch]."""
     if any(panel.equal for panel in figure.panels):
         return EQUAL_HEIGHTS.get(figure.columns, ROW_HEIGHT)
     mapped = any(panel.coloured for panel in figure.panels)
-    height = MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
-    rows = max(_legend_rows(_labels(panel), FIGURE_WIDTH / figure.columns) for panel in figure.panels)
-    return height + LEGEND_ROW / 72 * max(0, rows - LEGEND_ROWS)
+    return MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
 
 
 def _draw(axes: Axes, panel: Panel, width: float) -> None:
@@ -221,15 +226,14 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
     draw_coloured(axes, panel)
     for area in panel.areas:
         axes.add_patch(_filled(area))
-    handles: list[Artist] = []
     for band in panel.bands:
-        handles += axes.fill(*band.outline, color=band.colour, linewidth=0)
+        axes.fill(*band.outline, color=band.colour, linewidth=0)
     for line in panel.series:
         style = {"color": line.colour, "linestyle": _DASHES[line.dash], "linewidth": line.width}
-        handles += axes.plot(line.x, line.y, **style)
+        axes.plot(line.x, line.y, **style)
     for marker in panel.markers:
         style = {"color": marker.colour, "linestyle": "none", "zorder": 3, **_SYMBOLS[marker.symbol]}
-        handles += axes.plot(marker.x, marker.y, **style)
+        axes.plot(marker.x, marker.y, **style)
     if panel.x.limits:
         axes.set_xlim(panel.x.limits)
     if panel.y.limits:
@@ -246,7 +250,7 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
     if panel.equal:
         axes.set_aspect("equal")
     _ticks(axes, panel, width)
-    _annotate(axes, panel, handles, width)
+    _annotate(axes, panel)
 
 
 def _filled(area: Area) -> PathPatch:
@@ -305,8 +309,8 @@ def _power_of_ten(value: float, _: int | None = None) -> str:
     return "10" + str(round(math.log10(value))).translate(_RAISED)
 
 
-def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> None:
-    """Write the labels, and the title over the legend above the axes, where they cover no data."""
+def _annotate(axes: Axes, panel: Panel) -> None:
+    """Write the labels, and the title above the axes."""
     axes.set_xlabel(panel.x.label, parse_math=False)
     axes.set_ylabel(panel.y.label, parse_math=False)
     if panel.x.second is not None:
@@ -317,17 +321,7 @@ def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> 
         beside = axes.secondary_yaxis("right")
         beside.set_ylabel(panel.y.second.label, parse_math=False)
         _second_ticks(beside.yaxis, panel.y)
-    labels = [item.label for item in _items(panel)]
-    handles = [handle for handle, label in zip(handles, labels, strict=True) if label]
-    labels = [label for label in labels if label]
-    rows = _legend_rows(_labels(panel), width)
-    if rows:
-        columns = -(-len(labels) // rows)  # matplotlib fills columns one after the other
-        place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}
-        legend = axes.legend(handles, labels, ncols=columns, columnspacing=1.4, labelspacing=0.25, **place)
-        for text in legend.get_texts():
-            text.set_parse_math(False)
-    axes.set_title(panel.title, pad=5 + LEGEND_ROW * rows, parse_math=False)
+    axes.set_title(panel.title, pad=5, parse_math=False)
 
 
 def _second_ticks(axis: Any, declared: Axis) -> None:
@@ -336,32 +330,3 @@ def _second_ticks(axis: Any, declared: Axis) -> None:
     axis.set_major_locator(ticker.FixedLocator(places))
     axis.set_major_formatter(ticker.FixedFormatter(texts))
     axis.set_minor_locator(ticker.NullLocator())
-
-
-def _items(panel: Panel) -> list[Band | Series | Markers]:
-    """Return what the legend of a panel names, in order."""
-    return [*panel.bands, *panel.series, *panel.markers]
-
-
-def _labels(panel: Panel) -> list[str]:
-    """Return the labels in the legend of a panel; none if there is no legend."""
-    labels = [item.label for item in _items(panel) if item.label]
-    return labels if len(labels) > 1 and not panel.coloured else []
-
-
-def _legend_rows(labels: list[str], width: float) -> int:
-    """Return how many rows the legend with these labels has in `width` [inch]."""
-    return -(-len(labels) // _legend_columns(labels, width)) if labels else 0
-
-
-def _legend_columns(labels: list[str], width: float) -> int:
-    """Return how many columns of a legend fit into `width` [inch].
-
-    An inch holds 12 letters; line and gap take 7 of them.
-    """
-    room = 12 * (width - 0.9)
-    for columns in range(len(labels), 1, -1):
-        rows = -(-len(labels) // columns)
-        if sum(max(map(len, labels[i : i + rows])) + 7 for i in range(0, len(labels), rows)) <= room:
-            return columns
-    return 1

@@ -1,4 +1,4 @@
-"""Draw maps and clouds on a page: traces, colour bars, and legend and note beneath a figure."""
+"""Draw maps and clouds on a page, colour bars, and legend and note beneath every figure."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from friso.shown.drawing.colours import ColourScale, painted, scale
-from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
-from friso.shown.drawing.figure import Array, Axis, Coloured, Figure, Map, Panel, Told
+from friso.shown.drawing.drawable import LegendEntry, cell_edges, legend_entries
+from friso.shown.drawing.figure import Array, Axis, Coloured, Figure, Map, Markers, Panel, Series, Told
 from friso.shown.drawing.palette import GREY, INK
 
 BAR_WIDTH_SHARE = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
@@ -127,18 +127,19 @@ def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str
     return colouring | {"colorbar": {"title": title, "thickness": 14, "outlinewidth": 0, **ticks, **bar}}
 
 
-def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
-    """Return traces without points, which fill the common legend of all maps and clouds."""
-    categories, markers = colour_key(figure)
-    square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
-    entries = [(category.label, square | {"color": category.colour}) for category in categories]
-    entries += [(item.label, SYMBOLS[item.symbol] | {"color": item.colour}) for item in markers]
-    styles = [(label, {"mode": "markers", "marker": marker}) for label, marker in entries]
-    for line in line_key(figure):
-        style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash]}
-        styles.append((line.label, {"mode": "lines", "line": style}))
-    unseen = {"type": "scatter", "x": [None], "y": [None], "legend": legend}
-    return [{**unseen, "name": html.escape(label), **style} for label, style in styles]
+def key_traces(figure: Figure) -> list[dict[str, Any]]:
+    """Return traces without points, which fill the legend of a figure."""
+
+    def style(item: LegendEntry) -> dict[str, Any]:
+        """Return a line, a point or a square."""
+        if isinstance(item, Series):
+            return {"mode": "lines", "line": {"color": item.colour, "width": item.width, "dash": DASHES[item.dash]}}
+        square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
+        sign = SYMBOLS[item.symbol] if isinstance(item, Markers) else square
+        return {"mode": "markers", "marker": sign | {"color": item.colour}}
+
+    unseen = {"type": "scatter", "x": [None], "y": [None]}
+    return [{**unseen, "name": html.escape(item.label), **style(item)} for item in legend_entries(figure)]
 
 
 def key_rows(labels: Sequence[str], width: int) -> int:
@@ -147,8 +148,8 @@ def key_rows(labels: Sequence[str], width: int) -> int:
     return math.ceil(len(labels) / max(1, int(width / entry)))
 
 
-def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
-    """Return the area below the panels: its height [px], its legend by name, and its note.
+def footer(figure: Figure, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
+    """Return the area below the panels: its height [px], its legend, and its note.
 
     The note is broken at a width [px] and given as annotations.
     """
@@ -158,11 +159,11 @@ def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any]
     text = "<br>".join(html.escape(line) for line in lines)
     font = {"size": 11, "color": INK}
     annotations = [{"text": text, "align": "left", "showarrow": False, "font": font, **below}] if lines else []
-    labels = [item.label for items in (*colour_key(figure), line_key(figure)) for item in items]
+    labels = [item.label for item in legend_entries(figure)]
     if not labels:
         return note, {}, annotations
     key = KEY_SPACE + KEY_ROW * key_rows(labels, width)
     for annotation in annotations:
         annotation["yshift"] = -key
     style = {"orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "itemclick": False}
-    return note + key, {legend: style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, annotations
+    return note + key, {"legend": style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, annotations

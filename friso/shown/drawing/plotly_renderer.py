@@ -11,7 +11,8 @@ import base64
 import html
 import math
 import textwrap
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -29,8 +30,8 @@ WIDE_PAGE_WIDTH, NARROW_PAGE_WIDTH = (
     540,
     290,
 )  # [px] for all columns of axes: the least of a wide page, and of a telephone
-TITLE_HEIGHT, ROW_SPACE = 17, 18  # [px] a line of the title, and what lies about it and the legend
-TITLE_LETTER = 7.6  # [px] one letter of it
+TITLE_HEIGHT, ROW_SPACE = 17, 18  # [px] a line of the title, and what lies about it
+TITLE_LETTER, TICK_LETTER = 7.6, 5.9  # [px] one letter of it, and of a word at an axis
 PLOT_HEIGHT = 230  # [px] height of the axes
 MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: both axes matter equally
 EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
@@ -129,14 +130,15 @@ def parts(figure: Figure, width: int = WIDE_PAGE_WIDTH) -> dict[str, Any]:
 
 
 def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
-    """Lay out the panels of a figure, with legends, colour bars and note."""
+    """Lay out the panels of a figure, with legend, colour bars and note."""
     plot = _plot_height(prepared, width)
-    heads = [_Head.of(panel, width, prepared.columns) for panel in prepared.panels]
+    letters = int(width // prepared.columns / TITLE_LETTER)
+    heads = [textwrap.wrap(panel.title, letters) for panel in prepared.panels]
     rows = [heads[k : k + prepared.columns] for k in range(0, len(heads), prepared.columns)]
-    headers = [max(head.height for head in row) for row in rows]
-    height = sum(headers) + (plot + FOOTER_HEIGHT) * len(rows)
-    key = f"legend{len(prepared.panels) + 1}"  # the panels have the earlier numbers
-    below, legend, note = plotly_maps.footer(prepared, key, width)
+    headers = [TITLE_HEIGHT * max(map(len, row)) + ROW_SPACE for row in rows]
+    footer = FOOTER_HEIGHT + max(_upright(panel.x, width // prepared.columns) for panel in prepared.panels)
+    height = sum(headers) + (plot + footer) * len(rows)
+    below, legend, note = plotly_maps.footer(prepared, width)
     top_margin = TOP_MARGIN + FOOTER_HEIGHT * any(panel.x.second is not None for panel in prepared.panels)
     right_margin = FOOTER_HEIGHT if any(panel.y.second is not None for panel in prepared.panels) else RIGHT_MARGIN
     layout: dict[str, Any] = {
@@ -153,88 +155,45 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     with_bar, shared_bar = plotly_maps.bar_panels(prepared.panels)
     for number, panel in enumerate(prepared.panels):
         above = number // prepared.columns
-        top = height - sum(headers[: above + 1]) - (plot + FOOTER_HEIGHT) * above
+        top = height - sum(headers[: above + 1]) - (plot + footer) * above
         y_domain = ((top - plot) / height, top / height)
         x_domain = _columns(number % prepared.columns, prepared.columns)
         bar = None
         if shared_bar and number in with_bar:
             bar = {
                 "x": 1.0,
-                "y": (FOOTER_HEIGHT + height - headers[0]) / 2 / height,
-                "len": 1 - (FOOTER_HEIGHT + headers[0]) / height,
+                "y": (footer + height - headers[0]) / 2 / height,
+                "len": 1 - (footer + headers[0]) / height,
             }
         elif number in with_bar:
             x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR_WIDTH_SHARE)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, links)
-        if heads[number].rows:
-            layout[f"legend{_suffix(number)}"] = heads[number].over(x_domain[0], y_domain[1])
-        elif heads[number].lines:
-            layout["annotations"].append(heads[number].alone(x_domain[0], y_domain[1]))
+        if heads[number]:
+            layout["annotations"].append(_title(heads[number], x_domain[0], y_domain[1]))
         traces += _traces(panel, number, bar)
-    return {"data": traces + plotly_maps.key_traces(prepared, key), "layout": layout}
+    return {"data": traces + plotly_maps.key_traces(prepared), "layout": layout}
 
 
-@dataclass(frozen=True)
-class _Head:
-    """The part above the axes of a panel: the lines of its title, and the rows of its legend.
+def _upright(axis: Axis, width: int) -> int:
+    """Return how much higher words at an axis of some width [px] stand if they do not fit side by side, and are turned.
 
-    Entries of the legend stand one below the other if they are `stacked`.
+    Plotly turns them.
     """
-
-    lines: tuple[str, ...]
-    rows: int
-    stacked: bool
-
-    @classmethod
-    def of(cls, panel: Panel, width: int, panels: int) -> _Head:
-        """Break a panel's title and legend into lines and rows.
-
-        `panels` panels share a width [px]. Entries stand in columns as wide as the longest. Plotly breaks a row at the
-        width of the whole figure. Beside other panels, entries that need several rows are therefore stacked.
-        """
-        labels, own = _labels(panel), width // panels
-        rows = plotly_maps.key_rows(labels, own)
-        stacked = panels > 1 and rows > 1
-        lines = textwrap.wrap(panel.title, int(own / TITLE_LETTER))
-        return cls(tuple(lines), len(labels) if stacked else rows, stacked)
-
-    @property
-    def height(self) -> int:
-        """Return the height of title and legend [px]."""
-        return TITLE_HEIGHT * len(self.lines) + plotly_maps.KEY_ROW * self.rows + ROW_SPACE
-
-    def over(self, left: float, top: float) -> dict[str, Any]:
-        """Return the legend as plotly takes it, with the title above the legend's entries.
-
-        The legend stands above axes whose upper left corner is at `left` and `top`, as fractions of the figure. The
-        entries take fewer rows if there is more room.
-        """
-        place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
-        kind = {"orientation": "v", "maxheight": 1} if self.stacked else {"orientation": "h"}
-        return {**kind, **place, **({"title": {**self._text, "side": "top"}} if self.lines else {})}
-
-    def alone(self, left: float, top: float) -> dict[str, Any]:
-        """Return the title as plotly takes it without a legend.
-
-        The title stands above axes whose upper left corner is at `left` and `top`, as fractions of the figure.
-        """
-        place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
-        return {**self._text, "showarrow": False, **place, "yshift": ROW_SPACE - 4, "align": "left"}
-
-    @property
-    def _text(self) -> dict[str, Any]:
-        """Return the title in bold as plotly takes it."""
-        return {"text": f"<b>{'<br>'.join(map(html.escape, self.lines))}</b>", "font": {"size": 13}}
+    words = word_ticks(axis)[1] if axis.words else []
+    longest = max((len(line) for word in words for line in word.splitlines()), default=0)
+    fits = longest * TICK_LETTER * len(words) <= width
+    return 0 if fits else max(0, round(longest * TICK_LETTER) - FOOTER_HEIGHT // 2)
 
 
-def _labels(panel: Panel) -> list[str]:
-    """Return the entries of a panel's legend.
+def _title(lines: Sequence[str], left: float, top: float) -> dict[str, Any]:
+    """Return the title of a panel in bold, above axes whose upper left corner is at `left` and `top`.
 
-    There are none for a single line, or if colours stand for numbers.
+    These are fractions of the figure.
     """
-    labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers) if item.label]
-    return labels if len(labels) > 1 and not panel.coloured else []
+    text = {"text": f"<b>{'<br>'.join(map(html.escape, lines))}</b>", "font": {"size": 13}, "align": "left"}
+    place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
+    return {**text, "showarrow": False, **place, "yshift": ROW_SPACE - 12}
 
 
 def _plot_height(figure: Figure, width: int) -> int:
@@ -364,8 +323,7 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     """Return what is drawn in a panel in the order of `drawable`, maps first."""
     suffix = _suffix(number)
     place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
-    key = bool(_labels(panel))
-    named = place | {"legend": f"legend{suffix}"}
+    unnamed = place | {"showlegend": False}
     seconds = [
         {
             "type": "scatter",
@@ -382,9 +340,9 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
         *seconds,
         *plotly_maps.coloured_traces(panel, place, bar),
         *(_filled(area, place) for area in panel.areas),
-        *(_area(band, named | {"showlegend": key and bool(band.label)}) for band in panel.bands),
-        *(_line(line, panel, named | {"showlegend": key and bool(line.label)}) for line in panel.series),
-        *(_points(marker, panel, named | {"showlegend": key and bool(marker.label)}) for marker in panel.markers),
+        *(_area(band, unnamed) for band in panel.bands),
+        *(_line(line, panel, unnamed) for line in panel.series),
+        *(_points(marker, panel, unnamed) for marker in panel.markers),
     ]
 
 
