@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 import re
+import textwrap
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -39,7 +40,8 @@ ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
 LEGEND_ROWS, LEGEND_ROW = 3, 13  # rows of a legend that this has room for, and [point] what each takes
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
-HEADER_HEIGHT = 0.35  # [inch] the figure's own title
+HEADER_HEIGHT, HEADER_LINE = 0.35, 0.19  # [inch] the figure's own title, and each further line of it
+HEADER_LETTERS = 82  # letters of a line of this title
 DOTS_PER_INCH, FINER_FACTOR = 150, 2  # and how many times as many dots where a file of lines holds a picture
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
@@ -96,8 +98,10 @@ def render(figure: Figure) -> Canvas:
     with _style():
         prepared = drawable(figure)
         heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
+        unbroken = re.sub(r"(?<=\d) ", "\N{NO-BREAK SPACE}", heading)  # numbers keep their units
+        heading = "\n".join(textwrap.wrap(unbroken, HEADER_LETTERS))
         footer = footer_height(prepared, FIGURE_WIDTH)
-        height = _row_height(prepared) * prepared.rows + (HEADER_HEIGHT if heading else 0) + footer
+        height = _row_height(prepared) * prepared.rows + _header_height(heading) + footer
         canvas = Canvas(figsize=(FIGURE_WIDTH, height), layout="constrained", facecolor="white")
         area = (0, footer / height, 1, 1 - footer / height)
         canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08, rect=area)  # type: ignore[union-attr]
@@ -109,6 +113,11 @@ def render(figure: Figure) -> Canvas:
         add_colour_bars(canvas, list(canvas.axes), prepared.panels)
         add_footer(canvas, prepared, _SYMBOLS, _DASHES, FIGURE_WIDTH)
         return canvas
+
+
+def _header_height(heading: str) -> float:
+    """Return the height [inch] of a figure's own title, whose lines are broken; 0 without a title."""
+    return HEADER_HEIGHT + HEADER_LINE * heading.count("\n") if heading else 0.0
 
 
 def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
@@ -168,7 +177,7 @@ class _LaidOut:
         """
         height = self.canvas.get_figheight()
         low = 0.0 if noted else LINE_HEIGHT * len(self.notes)
-        high = height - (HEADER_HEIGHT if self.heading and not headed else 0.0)
+        high = height - (_header_height(self.heading.get_text()) if self.heading and not headed else 0.0)
         if form == "svg":
             return _cut(self.lines, height, low, high)
         for text in self.canvas.texts:
