@@ -44,7 +44,7 @@ COMMANDS: dict[str, float | None] = {
     f"map {{rig}} {THESIS_MAP.format(n=21)} --metric verdict --out map": None,
     "design {rig} {specification} --anyway --out design": 20.0,
     f'tune {{rig}} {LOCKED} --bandwidth-limit "25 Hz" --out tuned': None,
-    "compare {drive} --machines 200 --out compare": 60.0,
+    "compare {rig} --out compare": 60.0,
     "flexure {leaves} --out leaves": None,
     "rig hunting {drive} --out hunting": 20.0,
     "logs {log}": None,

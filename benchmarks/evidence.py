@@ -138,18 +138,18 @@ def rig_constant_speed() -> Values:
 
 
 def compare_thesis_rig() -> Values:
-    slow = ("--set", "drive.sample_time=200 us", "--set", "drive.delay=200 us")
-    options = friso("compare", DRIVE, *slow)["options"]
-    values = {"machines": 2000.0}
-    for letter, option in options.items():
+    document = friso("compare", "examples/thesis_rig.toml", "--machines", "2000")
+    values = {"machines": float(document["machines"])}
+    for name, stage in document["stages"].items():
+        word = name.split()[-1]
         values |= {
-            f"{letter}_swings": option["swings"]["probability"],
-            f"{letter}_in_position": option["in_position"]["probability"],
-            f"{letter}_force_rms_n": option["force_rms_n"]["value"],
-            f"{letter}_unstable": option["unstable"],
+            f"{word}_swings": stage["swings"]["probability"],
+            f"{word}_in_position": stage["in_position"]["probability"],
+            f"{word}_settled": stage["settled"],
+            f"{word}_force_n": stage["largest_force_n"]["value"],
         }
-        if option["settling_time_s"]["value"] is not None:
-            values[f"{letter}_settling_s"] = option["settling_time_s"]["value"]
+        if stage["settling_time_s"]["value"] is not None:
+            values[f"{word}_settling_s"] = stage["settling_time_s"]["value"]
     return values
 
 

@@ -61,3 +61,16 @@ def share_interval(hits: int, count: int, doubt: float = DOUBT_PROBABILITY) -> t
     low = betaincinv(hits, count - hits + 1, doubt / 2) if hits else 0.0
     high = betaincinv(hits + 1, count - hits, 1 - doubt / 2) if hits < count else 1.0
     return float(low), float(high)
+
+
+def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
+    """Return the 95 % interval of a quantile of a population, from values (n,) drawn from it.
+
+    A fraction `share` of the population lies below the quantile. The interval by order statistics (David, Nagaraja
+    2003, Order Statistics, Sec. 7.1) holds for any distribution. It is infinite for too few values.
+    """
+    from scipy.stats import binom
+
+    ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
+    low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))
+    return float(ranked[low]), float(ranked[high + 1])

@@ -104,4 +104,4 @@ def test_findings_say_what_their_values_say() -> None:
     assert f"{value('rig.in-position', 'rms_ratio'):.2g}" == "3.1"
     assert value("rig.hunting", "locked_at_8_hz") == 12
     assert value("rig.hunting", "locked_none_from_hz") == 12.5
-    assert value("compare.thesis-rig", "g_unstable") == 17
+    assert value("compare.thesis-rig", "isolator_settled") == 1908

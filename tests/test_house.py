@@ -36,7 +36,6 @@ ABOUT_TUNING = (
         "design_method/",
         "questions/design/",
         "friso_thesis/",
-        "studies/compare/options.py",
     ),
     *("frequency/margins.py", "identification/stage_file.py", "identification/output_error/problem.py"),
 )

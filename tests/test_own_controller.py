@@ -18,14 +18,12 @@ from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
 from friso.frequency import crossover
-from friso.frequency.settings import FrequencySettings
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.remedies import method
 from friso.remedies.catalogue import remedies
 from friso.remedies.search import Budget
 from friso.stage import Stage, save
-from friso.studies.compare import study
 from friso.virtual_rig.run import as_built_keys
 from friso_thesis.studies.rig.experiments import hunting
 from friso_thesis.studies.rig.moves_on_rails import rails
@@ -143,19 +141,10 @@ def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
     assert AsBuilt.of(as_built_keys(whole)).structure.controller is not None
 
 
-COARSE_LIMITS = FrequencySettings(crossover_steps=21, search_biases=3)
-"""Limits of the bandwidth found in seconds."""
-
-
-@pytest.mark.thorough
 def test_compare(whole: Stage, tmp_path: Path) -> None:
-    with COARSE_LIMITS.in_use(), patched({study: {"FOLLOWED_MACHINES": 6, "LONGER_FACTOR": 3}}):
-        document = answer(tmp_path, whole, "compare", "--machines", 20, "--seed", 1)
-    options = document["options"]
-    assert {"a", "c", "d", "e", "f"} <= {*options}
-    assert document["conclusion"]
-    if "b" in options:
-        assert options["b"]["crossover_hz"] == pytest.approx(6.0 * options["b"]["bandwidth_factor"])
+    document = answer(tmp_path, whole, "compare", "--names", "own", "--machines", 20, "--seed", 1)
+    assert [*document["stages"]] == ["own"]
+    assert not document["stages"]["own"]["failed"]
 
 
 def test_tune(locked: Stage, tmp_path: Path) -> None:

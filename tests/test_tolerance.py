@@ -66,8 +66,8 @@ def test_compare_and_tune_judge_within_the_tolerance_of_the_machine(
 ) -> None:
     """Its controller exerts no force within 400 um, so a finer wish does not count."""
     asked: list[float] = []
-    monkeypatch.setattr("friso.studies.compare.study.compare", lambda *options: asked.append(options[3]))
-    friso.compare(resting, within=within)
+    monkeypatch.setattr("friso.remedies.comparison.compare", lambda *options: asked.append(options[3]))
+    friso.compare([resting, resting], within=within)
     goal = _goal(resting, within, *7 * [None])
     assert [*asked, goal.within] == pytest.approx([4e-4, 4e-4])
 

@@ -22,6 +22,9 @@ from friso.stage.tables_of_files import load_changed, load_tables
 StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
 """A stage, the path of a stage file, or its tables as a dictionary."""
 
+StageLikes: TypeAlias = StageLike | Sequence[StageLike]
+"""A stage, or several."""
+
 Changes: TypeAlias = Mapping[str, Any] | Iterable[str] | None
 """Keys to be overridden: a dictionary, or texts KEY=VALUE."""
 
@@ -47,7 +50,6 @@ LengthRange: TypeAlias = str
 
 KindName: TypeAlias = str
 MetricName: TypeAlias = str
-SettingName: TypeAlias = str
 FormatName: TypeAlias = str
 ExperimentName: TypeAlias = str
 StudyName: TypeAlias = str

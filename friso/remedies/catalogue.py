@@ -23,11 +23,11 @@ from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at, limits,
 from friso.hunting import find_attractors
 from friso.quantities import exactly
 from friso.remedies.caps import SpeedCap, speed_cap
+from friso.remedies.loops import linear_flat
 from friso.remedies.machines import Goal
 from friso.remedies.settings import settings
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import FILTERS_KEY, controller_of, settings_of
-from friso.studies.compare.options import linear_flat
 
 KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
 """Function that takes the keys so far, in SI, and values of a variable, and returns the keys that change."""

@@ -5,9 +5,10 @@ The goal says which parts may change; changes apply to all machines.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from scipy.constants import golden
@@ -17,12 +18,13 @@ from friso.errors import InputError, StageError
 from friso.frequency.crossover import COMFORTABLE_MARGIN
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import exactly
+from friso.remedies.drawn import FEWEST_MACHINES, HELD, SPREADS, draw_machines
 from friso.remedies.settings import settings
 from friso.stage import Stage
+from friso.stage.arguments import MOST_SEED
 from friso.stage.controllers import as_tuned
-from friso.stage.correlations import Correlations
+from friso.stage.correlations import Correlations, allowed_draws
 from friso.stage.motion import motion_of
-from friso.studies.compare.machines import FEWEST_MACHINES, SPREADS, draw_machines
 
 ACCELERATION = "motion.acceleration"
 
@@ -126,9 +128,15 @@ class Fleet:
             flat[key] = np.repeat(np.broadcast_to(value, (points,)), self.count)
         for key, ratio in self._of(flat).items():
             flat[key] = flat[key] * np.tile(ratio, points)
-        for key, shift in self.shifts.items():
-            flat[key] = flat.get(key, 0.0) + np.tile(shift, points)
+        for key in self.shifts.keys() & flat.keys():
+            flat[key] = flat[key] + np.tile(self.shifts[key], points)
         return {**flat, **self._motion(flat, points)}
+
+    def drawn(self, stage: Stage) -> dict[str, np.ndarray]:
+        """Return the keys of a stage that differ between the machines, with SI values, (count,), and its own motion."""
+        flat = stage.flat()
+        shifted = {key: flat[key] + shift for key, shift in self.shifts.items() if key in flat}
+        return {**{key: flat[key] * ratio for key, ratio in self._of(flat).items()}, **shifted}
 
     def _motion(self, flat: Mapping[str, Any], points: int) -> dict[str, Any]:
         """Return the keys `flat` with the motion changed so that machines make their own moves.
@@ -166,13 +174,15 @@ def draw_fleet(
     own = float(size(stage.flat()))
     moves = moves or MoveRange(own, own)
     sample, flat = draw_machines(stage, correlations, max(count, FEWEST_MACHINES), seed), stage.flat()
-    keys = {key: values[:count] for key, values in sample.keys.items() if key in flat and not key.startswith("rail.")}
+    keys = {key: values[:count] for key, values in sample.keys.items() if key in flat}
     ratios = {key: values / flat[key] for key, values in keys.items() if flat[key]}
     shifts = {key: values.copy() for key, values in keys.items() if not flat[key]}
     random = np.random.Generator(np.random.Philox(key=[seed, ADDED]))
     for key in ADDED_KEYS:
         spread = SPREADS[key] / 100 / HALF_WIDTHS * random.standard_normal(count)
         ratios.setdefault(key, np.maximum(1 + spread, 1 - SPREADS[key] / 100))
+    if "rail.seed" in flat:
+        shifts["rail.seed"] = np.arange(count, dtype=float)  # every machine has its own rail
     even = (random.random((2, 1)) + np.outer(SPREAD_EVENLY, np.arange(count))) % 1
     sizes = moves.smallest * (moves.largest / moves.smallest) ** even[0]
     sizes[0] = min(max(own, moves.smallest), moves.largest)
@@ -186,6 +196,65 @@ def draw_fleet(
         values[0] = 0.0
     left_out = sample.sample.left_out
     return Fleet(ratios, shifts, sizes, moves, sample.from_file, dict(sample.spreads), left_out, accelerations)
+
+
+MOST_REDRAWN = 16
+"""Most machines drawn, over the number wanted, to find those that every stage allows."""
+
+
+def draw_common(
+    stages: Sequence[Stage], correlations: Sequence[Correlations], count: int, seed: int
+) -> tuple[Fleet, tuple[str, ...]]:
+    """Draw `count` machines that are laid over each of several stages; none is a stage file's own.
+
+    A key varies as the first stage that has it says, by the same factor in all: what files state differently stays
+    different. Machines that one of the stages does not allow are replaced. Returns the machines, and the uncertain keys
+    that an engineer sets, which do not vary.
+
+    Raises InputError for an unusable seed, and if hardly any machine is allowed in all stages.
+    """
+    held = dict.fromkeys(key for stage in stages for key in stage.uncertain() if key.startswith(HELD))
+    several, allowed = 1, np.zeros(0, bool)
+    while several <= MOST_REDRAWN:
+        fleets = [draw_fleet(stages[0], correlations[0], several * count + 1, seed)]
+        for stage, own in zip(stages[1:], correlations[1:], strict=True):
+            fleets.append(draw_fleet(stage, own, several * count + 1, _own_seed(stage, seed)))
+        fleet = _joined(fleets, stages).take(np.arange(1, several * count + 1))
+        allowed = np.all([allowed_draws(stage, fleet.drawn(stage), fleet.count)[0] for stage in stages], axis=0)
+        if np.count_nonzero(allowed) >= count:
+            return fleet.take(np.flatnonzero(allowed)[:count]), tuple(held)
+        several *= 2
+    text = f"draws of which {np.count_nonzero(allowed)} of {allowed.size} are allowed in all files"
+    raise InputError("", text, "files that differ by less, or keys that are less uncertain")
+
+
+def _own_seed(stage: Stage, seed: int) -> int:
+    """Return the seed of the keys that only a further stage has.
+
+    It follows from the names of its keys, so that the machines are the same whichever other stages are compared.
+    """
+    return (seed + crc32(" ".join(sorted(stage.flat())).encode())) % MOST_SEED
+
+
+def _joined(fleets: Sequence[Fleet], stages: Sequence[Stage]) -> Fleet:
+    """Return the first fleet, with keys that only further stages have as drawn for the first of these.
+
+    The parts of a mass that a further stage splits follow the whole.
+    """
+    ratios, shifts = dict[str, np.ndarray](), dict[str, np.ndarray]()
+    spreads, from_file = dict[str, float](), dict[str, None]()
+    for fleet, stage in zip(fleets, stages, strict=True):
+        known, flat = {*ratios, *shifts}, stage.flat()
+        masses = any(key.startswith("masses.") for key in known)
+
+        def new(key: str, known: set[str] = known, flat: dict[str, Any] = flat, masses: bool = masses) -> bool:
+            return key in flat and key not in known and not (masses and key.startswith("masses."))
+
+        ratios |= {key: values for key, values in fleet.ratios.items() if new(key)}
+        shifts |= {key: values for key, values in fleet.shifts.items() if new(key)}
+        spreads |= {key: spread for key, spread in fleet.spreads.items() if new(key)}
+        from_file |= dict.fromkeys(key for key in fleet.from_file if new(key))
+    return replace(fleets[0], ratios=ratios, shifts=shifts, spreads=spreads, from_file=(*from_file,))
 
 
 MEETING_SHARE = 0.95

@@ -24,6 +24,7 @@ from friso.progress import Progress, silent
 from friso.remedies.caps import SpeedCap, speed_cap
 from friso.remedies.catalogue import BANDWIDTH, Remedy, remedies, with_bandwidth
 from friso.remedies.least import ChangeSize, change_size, least_factors
+from friso.remedies.loops import linear_flat
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.search import Budget, Search
 from friso.remedies.settings import settings
@@ -41,7 +42,6 @@ from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.stage.motion import motion_of
 from friso.stage.rig import AS_BUILT
-from friso.studies.compare.options import linear_flat
 
 Unmade = Literal["rotary", "mode", "extra", "none"]
 """Reason why no leaf springs make a joint: the axis turns; the machine already has a parasitic mode, so there is no

@@ -15,12 +15,11 @@ from friso.equations.structure import shared_structure
 from friso.hunting import find_attractors
 from friso.hunting.criteria import settling_of_runs
 from friso.remedies.catalogue import Remedy
+from friso.remedies.loops import linear_flat, linear_loops
 from friso.remedies.machines import Fleet, Goal
 from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-from friso.studies.compare.measures import linear_loops
-from friso.studies.compare.options import linear_flat
 
 RANKING_RTOL = 1e-5
 """Relative tolerance of the moves by which settings are compared. It halves the number of steps; settling times are off

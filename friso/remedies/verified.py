@@ -31,14 +31,13 @@ from friso.hunting import (
     unstable,
 )
 from friso.remedies.catalogue import BANDWIDTH, Remedy
+from friso.remedies.loops import linear_flat
 from friso.remedies.machines import Fleet, Goal, MoveRange
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
-from friso.shares import DOUBT_PROBABILITY, Share, share
+from friso.shares import DOUBT_PROBABILITY, Share, quantile_interval, share
 from friso.stage import Stage
-from friso.studies.compare.measures import quantile_interval
-from friso.studies.compare.options import linear_flat
 
 
 @dataclass(frozen=True)

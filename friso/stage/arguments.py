@@ -34,7 +34,6 @@ TEXT_KINDS = {
     "Changeable": "PART",
     "KindName": "KIND",
     "MetricName": "NAME",
-    "SettingName": "SETTING",
     "FormatName": "FORMAT",
     "ExperimentName": "EXPERIMENT",
     "StudyName": "STUDY",
@@ -161,6 +160,12 @@ KINDS: dict[str, ArgumentKind] = {
     "os.PathLike[str]": _PATH,
     "Path": replace(_PATH, holds=lambda value: isinstance(value, Path), example='Path("report")'),
     **dict.fromkeys(("Stage", "StageLike"), _STAGE),
+    "StageLikes": replace(
+        _STAGE,
+        holds=lambda value: _STAGE.holds(value) or _is_list(value, _STAGE.holds),
+        words=f"{_STAGE.words}, or a list of these",
+        several=True,
+    ),
     "Changes": _CHANGES,
     **{name: replace(_CHANGES, metavar=metavar) for name, metavar in PAIR_KINDS.items()},
     "Spec": ArgumentKind(lambda value: type(value).__name__ == "Spec", "a specification", "", "SPEC.toml", Path),
@@ -204,7 +209,15 @@ KINDS: dict[str, ArgumentKind] = {
 }
 """What arguments may be, by the annotations of public functions."""
 
-_PATH_KINDS = {"os.PathLike[str]", "Path", "Stage", "StageLike", "LogFiles", "Iterable[str | os.PathLike[str]]"}
+_PATH_KINDS = {
+    "os.PathLike[str]",
+    "Path",
+    "Stage",
+    "StageLike",
+    "StageLikes",
+    "LogFiles",
+    "Iterable[str | os.PathLike[str]]",
+}
 
 
 def alternatives(annotation: str) -> list[str]:

@@ -184,7 +184,7 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
     parts, accepted, beyond, broken = [], 0, 0, Counter[str]()
     for _ in range(MOST_SAMPLES):
         keys = _values(stage, matrix, sampler.random(size))
-        within, why = _allowed(stage, keys, size)
+        within, why = allowed_draws(stage, keys, size)
         enough = np.flatnonzero(np.cumsum(within) == count - accepted)[:1]
         leading = slice(0, int(enough[0]) + 1 if enough.size else size)
         reasons = why[leading][~within[leading]]
@@ -229,7 +229,7 @@ BOUNDED_GUESSES = ("friction.bristle_damping",)
 """Keys drawn by a ratio whose own range is kept, as a log may have shown it."""
 
 
-def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
+def allowed_draws(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return which samples are valid stages, and which rule between keys the others break.
 
     Both have the shape (count,). The rule is "" for a valid stage, and where a key exceeds its bound. `keys` has the

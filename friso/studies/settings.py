@@ -191,22 +191,5 @@ class StudySettings(Settings):
     loop_error: float = setting(0.05, "")
     """Relative difference of loop areas or stiffnesses that a log hardly shows."""
 
-    needed_bandwidths: int = setting(48, "")
-    """Bandwidths at which a controller alone is tried: 5 % apart over a factor of ten."""
-
-    needed_machines: int = setting(200, "")
-    """Machines on which a controller alone is tried. Fewer cannot show a fraction of 99 %."""
-
-    needed_rtol: float = setting(1e-5, "")
-    """Relative tolerance of moves with a controller alone. Their times are off by a thousandth, which brings no machine
-    into position."""
-
-    limit_factors: int = setting(400, "")
-    """Factors on the bandwidth tried below its limit. With 400 the fastest lies within a percent of the limit."""
-
-    followed_share: float = setting(0.5, "")
-    """Fraction of machines in position from which longer runs are made. With fewer, an option fails anyway, and its
-    longer runs would take as long as all others together."""
-
 
 settings = StudySettings.live()

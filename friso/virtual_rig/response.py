@@ -17,7 +17,7 @@ from friso.engine.simulate import checked_interval, time_axis, usual_interval
 from friso.engine.tolerance import checked_rtol
 from friso.equations.as_built import AsBuilt
 from friso.errors import InputError
-from friso.hunting.measures import Measures, SampledSolver, bands_of, measure_traces
+from friso.hunting.measures import BANDS, Measures, SampledSolver, bands_of, measure_traces
 from friso.stage import Stage
 from friso.version import VERSION
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run_flat
@@ -52,8 +52,8 @@ def response(stage: Stage, rtol: float | None = None, sample_time: float | None 
     return _dataset(stage, flat, recorded, settings.rig_rtol if rtol is None else rtol)
 
 
-def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
-    """Measure recorded runs of stages, given as flat keys: swing, settling, outcome and more.
+def measured_recording(flat: Any, recorded: RecordedRuns, bands: tuple[float, float] = BANDS) -> Measures:
+    """Measure recorded runs of stages, given as flat keys: swing, settling into the `bands` [m], outcome and more.
 
     Where a measure needs the force, it is the one that the drive commanded.
     """
@@ -62,7 +62,7 @@ def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
     )
     deviation = recorded.true["position"] - recorded.logged["reference"]
     solver = SampledSolver(recorded.statuses, attempted, rejected)
-    return measure_traces(flat, recorded.time, deviation, recorded.logged["force"], solver)
+    return measure_traces(flat, recorded.time, deviation, recorded.logged["force"], solver, bands)
 
 
 def measured_response(stage: Stage, response: xr.Dataset) -> Measures:

@@ -6,7 +6,7 @@ QUESTION = Question(
     __name__,
     120,
     STOPS,
-    "compare examples/thesis_drive.toml --machines 200 --out compare",
+    "compare examples/thesis_rig.toml --out compare\ncompare stage.toml tuned/*.toml --out compare",
     details=True,
     answers_interrupted=True,
 )

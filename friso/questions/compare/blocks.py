@@ -1,129 +1,166 @@
-"""Give the blocks of `friso compare`: the options, what the numbers are, and the machines."""
+"""Say which stage brings the machines to rest, and how soon; and give the table, the picture and the machines."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from friso.axis import axis_shown
-from friso.equations.bandwidth import bandwidth
-from friso.hunting.criteria import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
-from friso.quantities import percent
-from friso.questions.compare import words
+from friso.hunting.criteria import RESTS, SWINGS
 from friso.questions.compare.figures import compare_figures
+from friso.questions.tune.words import changes
+from friso.remedies.comparison import AS_IT_IS, FASTER, ISOLATOR, LOCKED, Compared, Comparison, Quantile
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
-from friso.studies.compare.options import DEADBAND_SHARE, MODEL_ERROR
-from friso.studies.compare.study import LONGER_FACTOR, Comparison, OptionResult
+from friso.shown.drawing.prefixes import length_at_rest, listed, share_with_interval, with_unit
+from friso.shown.machine_words import spread_sentences
 
-UNSHAKEN = (
-    "The stage file has no [floor]: the in-position RMS shows whether the machines are at rest, not how still they "
-    "would stand in a real room. "
+MEANINGS = (
+    "Fractions and times have 95 % intervals (Clopper, Pearson; order statistics). Settling times count from the last "
+    "corner of the reference; there and back, the longer one of both ends counts, and none where a machine is not in "
+    "position when it returns. The error is the largest deviation in the last quarter of the run."
 )
 
 
 def basis(comparison: Comparison) -> str:
-    """Say on which machines the options were compared, and with which deadband and model error."""
-    return (
-        f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND_SHARE:g} tolerances, model error "
-        f"{percent(MODEL_ERROR)}"
-    )
+    """Say how the machines were run, and with which seed."""
+    drive = "on drives as built" if comparison.as_built else "with controllers in continuous time"
+    return f" {drive}, seed {comparison.seed}"
 
 
 def blocks(comparison: Comparison) -> list[AnswerBlock]:
-    """Return the blocks of the answer, the recommendation first."""
-    meanings = (
-        "Probabilities have 95 % intervals (Clopper, Pearson). Times, root mean squares and margins are medians over "
-        "the machines, with intervals from order statistics. Settling times count from the last corner of the "
-        "reference; there and back, it is the longer one of both ends, and none where a machine is not in position "
-        "when it returns; the in-position RMS is that of the last quarter of the run, the force RMS that of the whole "
-        f'run. {"" if comparison.shaken else UNSHAKEN}Margins are those of linear loops without the cable. "Later" '
-        f"is the last half of a run {LONGER_FACTOR} times as long, on the first machines."
-    )
+    """Return the blocks of the answer: what to choose, what the stages are, and the machines."""
+    first = comparison.results[0]
+    differences = [(result, changes(first.stage, result.stage)) for result in comparison.results[1:]]
+    spreads = spread_sentences(comparison.machines.from_file, comparison.machines.spreads)
+    drawn = f"{comparison.machines.count} machines were drawn with seed {comparison.seed}, the same for all stages."
     return [
         AnswerBlock(
             title=comparison.stage.name,
-            sentences=words.answer(comparison),
-            columns=axis_shown().named(words.COLUMNS),
-            rows=words.table_rows(comparison),
-            draw=partial(compare_figures, comparison),
+            sentences=sentences(comparison),
+            columns=[result.name for result in comparison.results],
+            rows=rows(comparison),
+            draw=partial(compare_figures, comparison, answer(comparison)),
             numbers=partial(compare_document, comparison),
         ),
         AnswerBlock(
-            title="The options", details=[f"{label}: {text}" for label, text in words.options_rows(comparison)]
+            title=f"What differs from {first.name}",
+            caption=MEANINGS,
+            details=[
+                f"{result.name}: {listed(texts, 'and') or 'nothing of the machine'}" for result, texts in differences
+            ],
         ),
-        AnswerBlock(title="What the numbers are", caption=meanings, details=words.details(comparison)),
-        AnswerBlock(
-            title="Compared with a, machine by machine",
-            columns=axis_shown().named((*words.PAIRED, *([words.STANDSTILL] if comparison.shaken else []))),
-            rows=words.paired_rows(comparison),
-        ),
-        AnswerBlock(
-            title="The machines",
-            details=[*words.population(comparison), *(f"note: {note}" for note in comparison.notes)],
-        ),
+        AnswerBlock(title="The machines", details=[drawn, *spreads, *(f"note: {note}" for note in comparison.notes)]),
     ]
+
+
+def answer(comparison: Comparison) -> str:
+    """Say which stage settles the machines soonest, and how the best with the other kind of joint does, or the next."""
+    best, *others = comparison.ranked
+    count, within = comparison.machines.count, with_unit(comparison.within, "m")
+    if math.isinf(best.settling.value):
+        few = f"{best.settled} of {count} machines settle within {within} with {named(best)}"
+        rest = np.count_nonzero(best.measures.outcome == RESTS)
+        few += f", and {rest} are in position in the end" if rest > best.settled else ""
+        return few if not others else f"None of these settles 95 % of the machines: {few}"
+    text = f"{named(best)} settles {_number(best, count)} machines, 95 % of them in {_soon(best)}"
+    other = next((one for one in others if one.isolated != best.isolated), others[0] if others else None)
+    if other is not None:
+        late = math.isinf(other.settling.value)
+        text += f"; {named(other)} {f'settles {other.settled}' if late else f'needs {_soon(other)}'}"
+    return f"{text[:1].upper()}{text[1:]}" if best.name in PROSE else text
+
+
+def sentences(comparison: Comparison) -> list[str]:
+    """Return the answer, and how many machines swing on with the stages."""
+    swings = [(np.count_nonzero(result.measures.outcome == SWINGS), result) for result in comparison.results]
+    swing = [f"{number} with {named(result)}" for number, result in swings if number]
+    count, left = comparison.machines.count, listed(comparison.not_run, "and")
+    return [
+        *([f"Interrupted: this is the answer without {left}."] if left else []),
+        f"{answer(comparison)}.",
+        f"Of {count} machines, {listed(swing, 'and')} swing at the end." if swing else "No machine swings at the end.",
+    ]
+
+
+PROSE = {
+    AS_IT_IS: "the stage as it is",
+    LOCKED: "the locked joint",
+    FASTER: "a faster controller",
+    ISOLATOR: "the isolator",
+}
+"""Names within a sentence of a stage and its remedies. Names of files stand as they are."""
+
+
+def named(result: Compared) -> str:
+    """Return the name of a stage as it stands within a sentence."""
+    return PROSE.get(result.name, result.name)
+
+
+def _soon(result: Compared) -> str:
+    return with_unit(result.settling.value, "s")
+
+
+def _number(result: Compared, count: int) -> str:
+    return f"all {count}" if result.settled == count else f"{result.settled} of {count}"
+
+
+def rows(comparison: Comparison) -> list[tuple[str, list[str]]]:
+    """Return the rows of the table, with a cell for each stage."""
+    results = comparison.results
+    return [
+        ("swings at the end", [share_with_interval(result.swinging) for result in results]),
+        ("in position at the end", [share_with_interval(result.resting) for result in results]),
+        ("95 % settle in", [_quantile(result.settling, "s") for result in results]),
+        (axis_shown().named(["largest {effort} of 95 %"])[0], [_quantile(result.force, "N") for result in results]),
+        ("error at the end, 95 %", [length_at_rest(result.error.value) for result in results]),
+    ]
+
+
+def _quantile(of: Quantile, unit: str) -> str:
+    """Write a quantile with its interval; "never" stands for a time that too few machines reach."""
+    if math.isinf(of.value):
+        return "never" if unit == "s" else "unknown"
+    high = "more" if math.isinf(of.high) else with_unit(of.high, unit)
+    return f"{with_unit(of.value, unit)} ({with_unit(of.low, unit)} to {high})"
 
 
 def compare_document(comparison: Comparison) -> dict[str, Any]:
     """Return the JSON document in SI, with the unit as suffix of each key.
 
-    A time that is infinite, because a machine never settles, becomes null.
+    A number that is infinite, because too few machines settle, becomes null.
     """
-    machines = comparison.machines
-    conclusion, *details = words.sentences(comparison)
+    conclusion, *details = sentences(comparison)
     return plain_json(
         {
             "conclusion": conclusion,
             "details": details,
             "stage": comparison.stage.name,
             "interrupted": bool(comparison.not_run),
-            **entries(comparison, "seed", "within_m", "bandwidth_limit_hz"),
-            "machines": machines.count,
-            "criteria": {
-                "swings": f"{OUTCOME}; band: {axis_shown().suffix('within_m')}",
-                "distinct_peaks": axis_shown().text(PEAKS),
-            },
-            "needed_bandwidth_hz": comparison.turning,
-            "deadband_m": comparison.options.deadband,
-            "sample_time_s": comparison.stage.flat()["drive.sample_time"],
-            "from_file": [*machines.from_file],
-            "spreads_percent": dict(machines.spreads),
-            "left_out_draws": machines.sample.left_out,
-            "options": {result.letter: _option(comparison, result) for result in comparison.results},
-            "left_out": dict(comparison.options.left_out),
-            "standstill_compared": comparison.shaken,
+            **entries(comparison, "seed", "within_m", "as_built"),
+            "machines": comparison.machines.count,
+            "criteria": {"swings": f"{OUTCOME}; band: {axis_shown().suffix('within_m')}"},
+            "from_file": [*comparison.machines.from_file],
+            "spreads_percent": dict(comparison.machines.spreads),
+            "stages": {result.name: _stage(result) for result in comparison.results},
             "notes": [*comparison.notes],
         }
     )
 
 
-def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
-    """Return the results of one option, alone and compared with option a, the first."""
-    pair = comparison.paired(result)
-    crossover = bandwidth(result.option.stage.flat())
+def _stage(result: Compared) -> dict[str, Any]:
+    """Return the results of one stage."""
     return {
-        "name": result.option.kind.title,
-        "crossover_hz": crossover,
-        "bandwidth_factor": result.option.factor,
-        **entries(result, "unstable", "failed", "rests"),
         "swings": asdict(result.swinging),
-        "distinct_peaks": asdict(result.counted),
-        "in_position": asdict(result.settled),
-        "stays": asdict(result.stays) if result.later.done.size else None,
+        "in_position": asdict(result.resting),
+        "settled": result.settled,
         "settling_time_s": asdict(result.settling),
-        "in_position_rms_m": asdict(result.in_position),
-        "force_rms_n": asdict(result.force),
-        "modulus_margin": asdict(result.margin) | {"least": float(result.loops.margin.min())},
-        "machines_in_position": result.in_position_count,
-        "against_a": {
-            "swings": asdict(pair.swinging),
-            "sooner": asdict(pair.sooner),
-            "later": asdict(pair.later),
-            "alike": asdict(pair.alike),
-            "in_position_rms": asdict(pair.in_position) if comparison.shaken else None,
-            "force_rms": asdict(pair.force),
-        },
+        "largest_force_n": asdict(result.force),
+        "error_m": asdict(result.error),
+        "failed": result.failed,
     }

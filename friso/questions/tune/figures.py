@@ -12,13 +12,13 @@ from friso.equations.motion import last_corner
 from friso.frequency.loops import response
 from friso.frequency.members import limit_cases
 from friso.frequency.system import DriveTiming
+from friso.remedies.loops import linear_flat
 from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome
 from friso.shown.drawing.figure import Axis, Dash, Figure, Panel, Series
 from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage
-from friso.studies.compare.options import linear_flat
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
 """Colours of remedies with settings, in order; further remedies repeat them, dashed."""

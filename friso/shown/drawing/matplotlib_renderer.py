@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import io
 import math
+import re
+import textwrap
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -41,7 +43,8 @@ FIGURE_WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels and title of one row of panels
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
-HEADER_HEIGHT = 0.35  # [inch] the figure's own title
+HEADER_HEIGHT, HEADER_LINE = 0.35, 0.19  # [inch] the figure's own title, and each further line of it
+HEADER_LETTERS = 82  # letters of a line of this title
 DOTS_PER_INCH, FINER_FACTOR = 150, 2  # and how many times as many dots where a file of lines holds a picture
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
@@ -98,8 +101,10 @@ def render(figure: Figure) -> Canvas:
     with _style():
         prepared = drawable(figure)
         heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
+        unbroken = re.sub(r"(?<=\d) ", "\N{NO-BREAK SPACE}", heading)  # numbers keep their units
+        heading = "\n".join(textwrap.wrap(unbroken, HEADER_LETTERS))
         footer = footer_height(prepared, FIGURE_WIDTH)
-        height = _row_height(prepared) * prepared.rows + (HEADER_HEIGHT if heading else 0) + footer
+        height = _row_height(prepared) * prepared.rows + _header_height(heading) + footer
         canvas = Canvas(figsize=(FIGURE_WIDTH, height), layout="constrained", facecolor="white")
         area = (0, footer / height, 1, 1 - footer / height)
         canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08, rect=area)  # type: ignore[union-attr]
@@ -111,6 +116,11 @@ def render(figure: Figure) -> Canvas:
         add_colour_bars(canvas, list(canvas.axes), prepared.panels)
         add_footer(canvas, prepared, _SYMBOLS, _DASHES, FIGURE_WIDTH)
         return canvas
+
+
+def _header_height(heading: str) -> float:
+    """Return the height [inch] of a figure's own title, whose lines are broken; 0 without a title."""
+    return HEADER_HEIGHT + HEADER_LINE * heading.count("\n") if heading else 0.0
 
 
 def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
@@ -150,7 +160,7 @@ def image(figure: Figure, form: str, headed: bool = True) -> bytes:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(IMAGE_FORMATS)}, e.g. 'png'")
     with _style(), _letters_alone() if form == "pdf" else nullcontext():
         canvas, stream = _laid_out(figure), io.BytesIO()
-        cut = 0.0 if headed or canvas.get_suptitle() == "" else HEADER_HEIGHT
+        cut = 0.0 if headed else _header_height(canvas.get_suptitle())
         area = Bbox([[0, 0], [FIGURE_WIDTH, canvas.get_figheight() - cut]])
         dots = DOTS_PER_INCH if form == "png" else FINER_FACTOR * DOTS_PER_INCH  # resolution of pictures inside
         canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area if cut else None, dpi=dots)

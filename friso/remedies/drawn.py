@@ -1,4 +1,4 @@
-"""Draw random machines around a stage file, equal for every option in rails and noise."""
+"""Draw random machines around a stage file."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ from scipy.linalg import block_diag
 from friso.errors import InputError
 from friso.stage import Stage, numeric_keys
 from friso.stage.arguments import MOST_SEED
-from friso.stage.controllers import CONTROLLER, as_tuned
+from friso.stage.controllers import CONTROLLER
 from friso.stage.correlations import Correlations, Sample, draw
 from friso.stage.lists import element_keys
 from friso.stage.tables import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, RATIO, TRANSMISSION, motor_mass
-from friso.virtual_rig.task import SAMPLE_TIME
 
 FEWEST_MACHINES, MOST_MACHINES = 20, 100_000
 """Fewest machines, because fewer give no useful interval, and most, because more take hours."""
@@ -91,95 +90,38 @@ HELD = (
 These keys are equal on all machines, even if the file calls them uncertain.
 """
 
-SIGNS = int.from_bytes(b"signs")
-"""Second half of Philox's key for the signs of model errors."""
-
 FROM_LEAVES = ("joint.stiffness", "parasitic.")
 """Prefixes of keys that follow from leaf springs, if the stage has any."""
 
 
 @dataclass(frozen=True)
 class Machines:
-    """Random machines drawn around a stage whose drive states a sample time.
+    """Random machines drawn around a stage.
 
-    `keys` that differ between machines are SI arrays of shape (count,). `seeds` are those of the noise, and `signs`, 1
-    or -1, those of the error of each machine's model, both (count,). The machines come from a `sample` of the keys
-    `from_file`, which the file calls uncertain, and of keys with default `spreads` [%]. `notes` are for the reader.
+    `keys` that differ between machines are SI arrays of shape (count,). They come from a `sample` of the keys
+    `from_file`, which the file calls uncertain, and of keys with default `spreads` [%].
     """
 
-    stage: Stage
     keys: Mapping[str, np.ndarray]
-    seeds: np.ndarray
-    signs: np.ndarray
     sample: Sample
     from_file: tuple[str, ...]
     spreads: Mapping[str, float]
-    notes: tuple[str, ...]
-
-    @property
-    def count(self) -> int:
-        """Return the number of machines."""
-        return len(self.seeds)
-
-    def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys of all machines under an option, with SI numbers or arrays (count,).
-
-        An option has a stage, and changes of keys. The controller is tuned for the stage, not for the drawn masses.
-        """
-        return stage.flat(self.changes(stage, changes))
-
-    def changes(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys that differ between machines or that an option changes, with SI values.
-
-        The controller stays tuned for the stage of the option.
-        """
-        return {**as_tuned(stage.flat()), **self.keys, **changes}
 
 
 def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:
     """Draw `count` machines from a stage's uncertain keys, and from default spreads of others.
 
-    Raises InputError for an invalid number of machines or seed, and for ranges of which hardly any machine is valid.
+    Raises InputError for an invalid seed, and for ranges of which hardly any machine is valid.
     """
-    for option, value, least, most in (
-        ("--machines", count, FEWEST_MACHINES, MOST_MACHINES),
-        ("--seed", seed, 0, MOST_SEED),
-    ):
-        if not least <= value <= most:
-            example = f"{option} {2000 if option == '--machines' else 1}"
-            raise InputError(option, str(value), f"a whole number from {least} to {most}", example)
-    clocked, notes = _with_clock(stage)
-    spreads = _spreads(clocked)
-    sample = draw(_spread(clocked, spreads), _with_default_correlations(correlations, spreads), count, seed)
-    held = [key for key in stage.uncertain() if key.startswith(HELD)]
-    if held:
-        notes += [f"not drawn, being the same on all machines: {', '.join(held)}"]
-    if sample.left_out:
-        notes += [f"{sample.left_out} draws that no stage may have were replaced by others"]
-    numbers = np.arange(count)
+    if not 0 <= seed <= MOST_SEED:
+        raise InputError("--seed", str(seed), f"a whole number from 0 to {MOST_SEED}", "--seed 1")
+    flat, spreads = stage.flat(), _spreads(stage)
+    sample = draw(_spread(stage, spreads), _with_default_correlations(correlations, spreads), count, seed)
     keys = {key: values for key, values in sample.keys.items() if not key.startswith(HELD)}
     if keys.keys() & {INERTIA, LEAD, RATIO}:
-        keys[MOTOR_MASS] = np.asarray(motor_mass({**clocked.flat(), **keys}))
-    keys |= {slip: _slipping(clocked.flat(), keys, slip) for slip in SLIPS if slip in spreads}
-    if clocked.rail:
-        keys["rail.seed"] = clocked.rail.seed + numbers
-    else:
-        notes += ["friction is the same all along the rail: the stage file has no [rail]"]
-    uniform = np.random.Generator(np.random.Philox(key=[seed, SIGNS])).random(count)
-    signs = np.where(uniform < 0.5, -1.0, 1.0)
-    uncertain = tuple(key for key in stage.uncertain() if key in keys)
-    return Machines(clocked, keys, seed + numbers, signs, sample, uncertain, spreads, tuple(notes))
-
-
-def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
-    """Return the stage with a sample time, and a note if friso had to choose it.
-
-    Raises InputError if the sample time is too long.
-    """
-    if "drive.sample_time" in stage.flat():
-        return stage, []
-    chosen = stage.with_numbers({"drive.sample_time": SAMPLE_TIME})
-    return chosen, [f"the stage file gives no drive.sample_time: {1e6 * SAMPLE_TIME:g} us are taken"]
+        keys[MOTOR_MASS] = np.asarray(motor_mass({**flat, **keys}))
+    keys |= {slip: _slipping(flat, keys, slip) for slip in SLIPS if slip in spreads}
+    return Machines(keys, sample, tuple(key for key in stage.uncertain() if key in keys), spreads)
 
 
 def _spreads(stage: Stage) -> dict[str, float]:

@@ -1,1 +1,0 @@
-"""Compare a joint and settings of the controller on the same random machines."""
