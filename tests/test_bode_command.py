@@ -219,7 +219,13 @@ def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode, sna
 def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> None:
     document = bode_document(rigid)
     assert document["cases"].keys() == {"given"}
-    assert document["worst"]["at"] == {"bias_n": 0.0, "speed_m_per_s": 0.0, "limiter": None, "forward": True}
+    assert document["worst"]["at"] == {
+        "bias_n": 0.0,
+        "speed_m_per_s": 0.0,
+        "limiter": None,
+        "forward": True,
+        "gains": None,
+    }
     assert document["limits"].keys() == {"given"}
     assert [item.label for item in shown_states(rigid)] == ["As given"]
     assert "0.73" in sentences(rigid)[0]

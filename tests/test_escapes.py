@@ -100,11 +100,13 @@ def test_a_stage_file_steers_neither_terminal_nor_page(tmp_path: Path, undrawn: 
     assert not steers(text)
 
 
-def test_a_drawing_a_notebook_and_a_saved_stage_steer_nothing() -> None:
+def test_a_drawing_a_notebook_and_a_saved_stage_steer_nothing(tmp_path: Path) -> None:
     stage = friso.load(EXAMPLES / "thesis_leaves.toml").replace({"name": HOSTILE})
     answer = friso.flexure(stage)
-    drawing = answer.files()["flexure_drawing.svg"]
-    assert isinstance(drawing, str)
+    draw = answer.files()["flexure_drawing.svg"]
+    assert callable(draw)
+    draw(tmp_path / "drawing.svg")
+    drawing = (tmp_path / "drawing.svg").read_text(encoding="utf-8")
     ET.fromstring(drawing)  # what a control character would break
     assert not steers(drawing + answer._repr_html_() + stage.to_toml())
     assert friso.loads(stage.to_toml()) == stage
