@@ -484,7 +484,10 @@ def found(comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> Comparison
     return by_hand
 
 
-def test_command_writes_page_and_figures(tmp_path: Path, found: Comparison, snapshots: Snapshots) -> None:
+def test_command_writes_page_and_figures(
+    tmp_path: Path, found: Comparison, monkeypatch: pytest.MonkeyPatch, snapshots: Snapshots
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     done = friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out", "--json")
     assert done.returncode == 0
     document = json.loads(done.stdout)
