@@ -211,6 +211,15 @@ def test_the_same_machines_are_laid_over_all_stages(built: Stage) -> None:
         np.testing.assert_allclose(stiff[1][part] / free.flat()[part], whole)
 
 
+def test_a_joint_of_leaf_springs_is_laid_over_as_they_make_it() -> None:
+    """Its stiffness and mode follow from the springs; that of a plain joint beside it varies."""
+    leaves = load(EXAMPLE.with_name("thesis_leaves.toml"))
+    for stages in ((leaves,), (load(RIG), leaves)):
+        drawn = common(*stages)[-1]
+        assert leaves.flat(drawn)["joint.stiffness"] == pytest.approx(leaves.flat()["joint.stiffness"])
+        assert np.ptp(drawn["friction.static"]) > 0
+
+
 def test_spreads_are_those_of_the_first_file_that_states_them(built: Stage) -> None:
     exact = built.replace({"friction.coulomb": "1 N +/- 0.001 %"})
     for stages in ((exact, built), (built, exact)):
@@ -484,7 +493,10 @@ def found(comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> Comparison
     return by_hand
 
 
-def test_command_writes_page_and_figures(tmp_path: Path, found: Comparison, snapshots: Snapshots) -> None:
+def test_command_writes_page_and_figures(
+    tmp_path: Path, found: Comparison, monkeypatch: pytest.MonkeyPatch, snapshots: Snapshots
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     done = friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out", "--json")
     assert done.returncode == 0
     document = json.loads(done.stdout)

@@ -133,8 +133,11 @@ class Fleet:
         return {**flat, **self._motion(flat, points)}
 
     def drawn(self, stage: Stage) -> dict[str, np.ndarray]:
-        """Return the keys of a stage that differ between the machines, with SI values, (count,), and its own motion."""
-        flat = stage.flat()
+        """Return the keys of a stage that differ between the machines, with SI values, (count,).
+
+        Keys that follow from leaf springs are not among them.
+        """
+        flat = {key: value for key, value in stage.flat().items() if key in stage.numeric_keys()}
         shifted = {key: flat[key] + shift for key, shift in self.shifts.items() if key in flat}
         return {**{key: flat[key] * ratio for key, ratio in self._of(flat).items()}, **shifted}
 
