@@ -18,7 +18,7 @@ from friso.errors import InputError, StageError
 from friso.frequency.crossover import COMFORTABLE_MARGIN
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import exactly
-from friso.remedies.drawn import FEWEST_MACHINES, HELD, SPREADS, draw_machines
+from friso.remedies.drawn import FEWEST_MACHINES, FROM_LEAVES, HELD, SPREADS, draw_machines
 from friso.remedies.settings import settings
 from friso.stage import Stage
 from friso.stage.arguments import MOST_SEED
@@ -137,7 +137,8 @@ class Fleet:
 
         Keys that follow from leaf springs are not among them.
         """
-        flat = {key: value for key, value in stage.flat().items() if key in stage.numeric_keys()}
+        follow = FROM_LEAVES if stage.flexure else ()
+        flat = {key: value for key, value in stage.flat().items() if not key.startswith(follow)}
         shifted = {key: flat[key] + shift for key, shift in self.shifts.items() if key in flat}
         return {**{key: flat[key] * ratio for key, ratio in self._of(flat).items()}, **shifted}
 
