@@ -29,7 +29,7 @@ from friso.design_method.population import Corners
 from friso.design_method.requirements import Relaxation
 from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Position, Spec, load_spec
-from friso.interface.output_folder import MARKER, OutputFolder
+from friso.interface.output_folder import OutputFolder
 from friso.progress import Progress
 from friso.quantities import outwards
 from friso.questions.design.blocks import design_document, refused_document
@@ -155,7 +155,8 @@ def some(count: int, otherwise: float) -> np.ndarray:
 @pytest.fixture
 def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are not drawn again, and nothing is written."""
-    monkeypatch.setattr("friso.interface.output_folder.write", lambda *_: [])
+    kept = "friso.interface.output_folder.write"
+    monkeypatch.setattr(kept, lambda files, *_: [path for path, content in files.items() if content is not None])
     monkeypatch.setattr("friso.questions.design.blocks.design_figures", lambda design: ())
 
 
@@ -190,18 +191,18 @@ def test_all_files_are_written_and_the_stages_load(
 ) -> None:
     pictures = {f"{name}.svg" for name in FIGURES}
     own = {"design.toml", "worst.toml", "design.html"}
-    assert {path.name for path in folder.iterdir()} == pictures | own | {MARKER}
+    assert {path.name for path in folder.iterdir()} == pictures | own
     stage, worst = friso.load(folder / "design.toml"), friso.load(folder / "worst.toml")
     assert stage.flat()["joint.stiffness"] == pytest.approx(designed.fitted.choice.beams.drive[0], rel=0.02)
     assert worst.flat()["friction.static"] == designed.verification.worst.flat()["friction.static"]
-    command(RIG, spec, out=folder)  # once more
+    command(RIG, spec, out=folder, overwrite=True)  # once more
     assert "next: friso check" in capsys.readouterr().out
 
 
 def test_the_document_has_the_agreed_keys(
     spec: Path, folder: Path, quick: None, designed: Design, capsys: pytest.CaptureFixture
 ) -> None:
-    command(RIG, spec, out=folder, as_json=True)
+    command(RIG, spec, out=folder, as_json=True, overwrite=True)
     shown = capsys.readouterr()
     document = _strict(shown.out)
     assert shown.err == ""
@@ -475,11 +476,11 @@ def test_files_of_no_design_are_not_overwritten(finished: list[str], folder: Pat
 
 
 def test_overrides_are_of_the_stage(finished: list[str], folder: Path, quick: None, spec: Path, caplog: Any) -> None:
-    command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder)
+    command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder, overwrite=True)
     assert finished[-1] == "Another"
     assert "[drive]" in caplog.text
     with refused("controller.crosover"):
-        command(RIG, spec, set=['controller.crosover="8 Hz"'], out=folder)
+        command(RIG, spec, set=['controller.crosover="8 Hz"'], out=folder, overwrite=True)
 
 
 @pytest.mark.parametrize(
@@ -513,7 +514,7 @@ def test_a_specification_that_is_not_met_is_told(
     less = replace(designed, spec=designed.spec.model_copy(update={"position": hurried}))
     monkeypatch.setattr(method, "design", lambda stage, spec, progress, anyway: less)
     with pytest.raises(typer.Exit) as left:
-        command(RIG, spec, out=folder, as_json=True)
+        command(RIG, spec, out=folder, as_json=True, overwrite=True)
     assert left.value.exit_code == 2
     shown = capsys.readouterr()
     document = _strict(shown.out)
@@ -556,17 +557,12 @@ def test_ctrl_c_keeps_the_leaves_and_the_crossover(
 def test_a_design_ends_where_no_isolator_is_needed(
     rig: Stage, spec: Path, small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
-    """Its leaf springs are not tried, and files of an earlier design beside its own are named."""
+    """Its leaf springs are not tried."""
     monkeypatch.setattr(method, "design", DESIGN)
     monkeypatch.setattr(method, "hunting_map", lambda *_, **__: pytest.fail("the design went on"))
     answer = friso.design(rig, spec)
     assert not answer.result.need.isolator
     assert (answer.interrupted, answer.failure) == (False, "")
     assert not answer.document()["interrupted"]
-    folder = OutputFolder("design", tmp_path / "design", False)
-    folder.write({"design.toml": "earlier"})
-    caplog.clear()
-    folder.write(answer.files())
-    assert "design.toml" in caplog.text
-    assert (tmp_path / "design" / "design.toml").read_text() == "earlier"
+    OutputFolder("design", tmp_path / "design", False).write(answer.files())
     assert friso.load(tmp_path / "design" / "design-not-verified.toml") == answer.stage

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from pages import Page
 
-from friso.interface.drafts import DRAFTS
+from friso.interface.output_folder import DRAFTS
 
 PRELOAD = Path(__file__).parent / "foreign_host"
 

@@ -20,8 +20,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC, STICK_SLIP, folder_until_the_end
-from friso.interface.drafts import DRAFTS
-from friso.interface.output_folder import MARKER, UNFINISHED, marked, write
+from friso.interface.output_folder import DRAFTS, write
 
 FRISO = [sys.executable, "-m", "friso"]
 SMALL = ["--x", "controller.crossover=2 Hz..16 Hz:24", "--y", "joint.stroke=0.1 mm..1 mm:24", "--rtol", "1e-8"]
@@ -85,12 +84,12 @@ def killed(rng: random.Random, folder: Path) -> None:
             _moment(rng, folder, process)
             process.kill()
     if name in QUICK:
-        done = _finished(folder, WRITING[name])
-        assert done.returncode in (0, 2 if name in ONE_FILE else 0), f"{name}: {done.stderr[-300:]}"
+        done = _finished(folder, [*WRITING[name], "--overwrite"])
+        assert done.returncode == 0, f"{name}: {done.stderr[-300:]}"
         _assert_as(_undisturbed(name), folder, name)
     else:
         files = {folder / "out" / "next.txt": "", folder / "next.txt": ""}
-        write(files, files)
+        write(files, overwrite=True)
         _whole_or_nothing(name, folder, False)
 
 
@@ -201,7 +200,7 @@ def two_at_once(rng: random.Random, folder: Path) -> None:
     with first, _started(folder, MAP, environ) as second:
         said = [process.communicate(timeout=300)[1] for process in (first, second)]
     codes = sorted(process.returncode for process in (first, second))
-    assert codes in ([0, 0], [0, 2]), f"{codes}: {said}"
+    assert codes in ([0, 0], [0, 1], [0, 2]), f"{codes}: {said}"  # 1: figures that the other had written
     assert "Traceback" not in "".join(said), said
     shutil.rmtree(folder / "cache")
     _assert_as(_undisturbed("map"), folder, "map")
@@ -210,7 +209,7 @@ def two_at_once(rng: random.Random, folder: Path) -> None:
 def without_workers(rng: random.Random, folder: Path) -> None:
     """Kill a worker: the map must end at once in one sentence, and continue where it was."""
     with _started(folder, [*MAP, "--workers", str(min(2, os.cpu_count() or 1))]) as process:
-        while process.poll() is None and not any(folder.glob("a.zarr/.blocks/*")):  # none of the study is done
+        while process.poll() is None and not any(folder.glob("a.zarr/.friso/[0-9]*")):  # none of the study is done
             time.sleep(0.01)
         time.sleep(rng.uniform(0.0, 0.5))
         if process.poll() is not None:
@@ -325,7 +324,7 @@ def _assert_as(expected: Path, folder: Path, name: str) -> None:
 
 
 def _assert_goes_on(folder: Path) -> None:
-    done = _finished(folder, MAP)
+    done = _finished(folder, [*MAP, "--overwrite"])
     assert done.returncode == 0, done.stderr[-300:]
     _assert_as(_undisturbed("map"), folder, "map")
 
@@ -350,26 +349,20 @@ def _tree(folder: Path) -> dict[str, bytes]:
 
 
 def _whole_or_nothing(name: str, folder: Path, done: bool) -> None:
-    """Check that files of a command are complete.
+    """Check that each file of a command is complete or not there, and that all are there if it is `done`.
 
     Raises AssertionError for partial files. A map keeps its store, and finished parts of long work are kept in a folder
     of their own.
     """
     left = [path.name for path in folder.rglob("*") if path.name.startswith(DRAFTS)]
     assert not left, f"{name} left {left}"
-    if WRITING[name][0] == "map":
-        every = 6 if name == "exports" else 4
-        views = sorted(path.name for path in folder.iterdir() if path.is_file() and path.name != "next.txt")
-        assert len(views) in (0, every), f"{name} wrote {views} alone"
-    elif name in ONE_FILE:
-        file, whole = folder / "stage.toml", _undisturbed(name) / "stage.toml"
-        assert not (done and not file.exists()), f"{name} is done without its file"
-        assert not file.exists() or file.read_bytes() == whole.read_bytes(), f"{name} wrote a part"
-    else:
-        out = folder / "out"
-        written = [path for path in out.rglob("*") if path.is_file() and path.name != "next.txt"]
-        written = [path for path in written if UNFINISHED not in path.parts]
-        assert (out / MARKER).exists() or not written, f"{name} wrote {written} alone"
-        assert (out / MARKER).exists() or not done, f"{name} is done without its files"
-        named = [] if not (out / MARKER).exists() else [out / file for file in marked(out)[1]]
-        assert not done or all(file.is_file() for file in named), f"{name} lacks some of {named}"
+    if name not in QUICK:
+        return
+    there, here = _tree(_undisturbed(name)), _tree(folder)
+    files = {
+        key for key in there if not key.startswith("a.zarr/") and not (name == "simulate" and key.endswith(".csv"))
+    }
+    lost = {key for key in files if key not in here}
+    assert not (done and lost), f"{name} is done without {sorted(lost)}"
+    partial = [key for key in files - lost if here[key] != there[key]]
+    assert not partial, f"{name} wrote parts of {partial}"

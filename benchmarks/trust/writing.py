@@ -20,7 +20,7 @@ from benchmarks.trust.damage import damaged
 from benchmarks.trust.faults import struck
 from benchmarks.trust.inputs import folder_until_the_end
 from friso.errors import InputError
-from friso.interface.output_folder import MARKER, OutputFolder
+from friso.interface.output_folder import DRAFTS, OutputFolder
 from friso.studies.store import Store, _sum_at, read_store
 from friso.studies.study import Request, Study
 from friso.studies.sweep import sweep
@@ -30,32 +30,26 @@ AXES = {"controller.crossover": "2 Hz..16 Hz:8", "joint.stroke": "0.1 mm..1 mm:8
 
 
 def files(rng: random.Random, folder: Path) -> None:
-    """Write the files of a command over earlier ones: all of them or none, each complete.
+    """Write the files of a command over earlier ones: each as before or as after, whatever happens.
 
     The next run removes what a kill leaves.
     """
     out, names = folder / "out", [rng.choice(("a.txt", "b.txt", "c/d.txt", "c/e/f.txt")) for _ in range(4)]
-    if rng.random() < 0.6:
+    if is_over := rng.random() < 0.6:
         OutputFolder("check", out, False).write({name: f"old {name}" for name in rng.sample(names, 2)})
     before = _contents(folder)
     new = {name: None if rng.random() < 0.2 else f"new {name}" * rng.randrange(1, 3000) for name in names}
-    fault = struck(lambda: OutputFolder("check", out, False).write(new), folder, rng, 20)
+    fault = struck(lambda: OutputFolder("check", out, is_over).write(new), folder, rng, 20)
     after = _contents(folder)
     changed = {f"out/{name}": content for name, content in new.items()}
     whole = {name: content for name, content in ({**before, **changed}).items() if content is not None}
-    if not fault.startswith("kill"):
-        marker = f"out/{MARKER}"
-        same = {k: v for k, v in after.items() if k != marker} == {k: v for k, v in whole.items() if k != marker}
-        assert after == before or (same and marker in after), f"{fault}: neither all nor none: {sorted(after)}"
-        return
-    strange = {name for name, content in after.items() if ".friso-draft" not in name and MARKER not in name
-               and content not in (before.get(name), whole.get(name))}  # fmt: skip
+    strange = {name for name, content in after.items()
+               if DRAFTS not in name and content not in (before.get(name), whole.get(name))}  # fmt: skip
     assert not strange, f"{fault}: neither as before nor as after: {strange}"
     lost = {name for name in before if name in whole} - {*after}
     assert not lost, f"{fault}: lost {lost}"
-    OutputFolder("check", out, False).write(new)
-    left = [name for name in _contents(folder) if ".friso-draft" in name]
-    assert not left, f"{fault}: left {left}"
+    OutputFolder("check", out, True).write(new)
+    assert _contents(folder) == whole, f"{fault}: left {sorted({*_contents(folder)} - {*whole})}"
 
 
 def stores(rng: random.Random, folder: Path) -> None:

@@ -447,7 +447,7 @@ def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path, 
     from friso_thesis.questions.guideline.document import guideline_document
     from friso_thesis.questions.guideline.page import guideline_files
 
-    paths = write({tmp_path / name: content for name, content in guideline_files(quick).items()}, ())
+    paths = write({tmp_path / name: content for name, content in guideline_files(quick).items()})
     files = {path.name: path for path in paths}
     page = files["guideline.md"].read_text()
     snapshots.check("guideline", "page", page)

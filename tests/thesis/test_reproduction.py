@@ -918,7 +918,7 @@ def test_document_and_page_have_every_claim(thorough_study: Reproduction, tmp_pa
     pictures = [name for name in contents if name.startswith("figures/")]
     assert len(pictures) == 2 * len(reproduction_figures(thorough_study))
     few = [name for name in contents if name not in pictures or name == "figures/figure-26.png"]  # drawing takes long
-    paths = write({tmp_path / "new" / name: contents[name] for name in few}, ())
+    paths = write({tmp_path / "new" / name: contents[name] for name in few})
     assert all(path.stat().st_size > 1000 for path in paths)
 
 

@@ -28,13 +28,15 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
 
     Raises InputError with the command to type if a question about a log is open.
     """
+    from friso.identification.logs.mapping import sidecar
     from friso.identification.sources import OpenQuestions
     from friso.interface.output_folder import OutputFolder
     from friso.questions.identify.blocks import STAGE
 
     assert shown.out is not None  # the option has a default
     read = [*about[0], *options.get("predict", ()), *([options["stage"]] if "stage" in options else [])]
-    target = OutputFolder(question.name, shown.out, shown.overwrite, read)
+    kept_before = [sidecar(log, shown.out).name for log in about[0]]
+    target = OutputFolder(question.name, shown.out, shown.overwrite, read, kept_before)
     target.check([STAGE])
     kept: list[Path] = []
     with ProgressBar() as progress, named_as_options(question.options):
@@ -69,10 +71,7 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
         for path, mapping in new.items()
         if (place := kept_at(path, mapping, folder)) is not None
     }
-    if any(place.parent == folder for place in texts):
-        target.write({}, beside=texts)  # marks the folder as the command's own for the next run
-    else:
-        write(texts, [*filter(Path.is_file, texts)])  # mappings may be replaced too, since they could be read
+    write(texts, overwrite=True)  # mappings may be replaced, since they could be read
     if texts:
         first, *more = texts
         others = f" and {len(more)} more" if more else ""

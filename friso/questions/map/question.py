@@ -293,7 +293,7 @@ def sweep(
         shown = coloured_by(study, metric)
         edges = fine_edges(study, held, shown, own_values(held), crew, progress)
     if store is None:
-        write(export_files(held, exports), exports if overwrite else ())
+        write(export_files(held, exports), overwrite)
     elif exports and not beside:
         write_beside(export_files(held, exports), overwrite, progress)
     return SweepAnswer(

@@ -214,7 +214,7 @@ def write_beside(files: Mapping[Path, Content], overwrite: bool, progress: Progr
 
     Files that are there are replaced only with `overwrite`. Raises OSError if a file cannot be written.
     """
-    return write(files, [*files] if overwrite else (), progress)
+    return write(files, overwrite, progress)
 
 
 def _views(store: Path) -> list[Path]:
