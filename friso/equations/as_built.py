@@ -159,7 +159,7 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
         reading, command, sampled = _command(form, loop)
         commanded, waiting = state(COMMANDED), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
         controller = form.structure.controller
-        begun = clipped(STEADY.force, force_limit()) if controller and controller.anti_windup else STEADY.force
+        begun: Any = clipped(STEADY.force, force_limit()) if controller and controller.anti_windup else STEADY.force
         held = [Held(state(READING), reading, STEADY.position), *sampled, Held(commanded, command, begun)]
         held += [Held(new, old, begun) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
         acting = waiting[-1] if waiting else commanded

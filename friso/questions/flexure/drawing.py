@@ -83,7 +83,7 @@ def _view(
     hatched = [_area((-thick, -clamp), (0.0, clamp), GREY), _area((length, -clamp), (length + thick, clamp), GREY)]
     xs = [-thick, length + thick, left, right, *(x for x, _ in marks.values())]
     ys = [-clamp, clamp, -reach, reach, low, high, *(y for _, y in marks.values())]
-    margin = MARGIN_SHARE * length
+    spots, margin = np.array([*marks.values()]), MARGIN_SHARE * length
     words = [
         Lettering(-thick / 2, clamp, "cart", INK, "above"),
         Lettering(length + thick / 2, clamp, "stage", INK, "above"),
@@ -94,7 +94,7 @@ def _view(
         Axis("x", "m", (min(xs) - margin, max(xs) + margin)),
         Axis(up, "m", (min(ys) - margin, max(ys) + margin)),
         (_ring((left, low), (right, high), LIGHT), *lines),
-        (Markers(*np.array([*marks.values()]).T, "", VERMILLION, "target"),),
+        (Markers(spots[:, 0], spots[:, 1], "", VERMILLION, "target"),),
         equal=True,
         areas=tuple(hatched),
         words=tuple(words),
