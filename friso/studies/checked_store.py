@@ -36,6 +36,7 @@ class CheckedStore(LocalStore):
         self.records = Records(self.root, checksum)
 
     def with_read_only(self, read_only: bool = False) -> CheckedStore:
+        """Return the same store as a read-only or writable one."""
         return type(self)(self.root, read_only=read_only, checksum=self.records.checksum)
 
     async def get(
