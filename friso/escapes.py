@@ -18,12 +18,6 @@ _STEERING = re.compile(
 They are control characters except line feed and tab, marks and overrides of the writing direction, characters without
 width, surrogates, and tags."""
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
-"""First characters of a cell that a spreadsheet reads as a formula.
-
-The last four are wide forms of the first four, which Excel accepts in East Asian languages."""
-
-
 _MARKUP = re.compile(r"[\\`*\[\]<>&|~$#]|(?<![^\W_])_|_(?![^\W_])")
 """Pattern of characters with a meaning in Markdown, where they have one."""
 
@@ -36,11 +30,6 @@ def escaped(text: str) -> str:
 def one_line(text: str) -> str:
     """Return a text escaped on one line; line feeds and tabs are written out as well."""
     return escaped(text).replace("\n", "\\n").replace("\t", "\\t")
-
-
-def table_cell(text: str) -> str:
-    """Return a text escaped as a cell of a CSV file; a formula gets a leading apostrophe."""
-    return f"'{escaped(text)}" if text.startswith(_FORMULA) else escaped(text)
 
 
 def markdown(text: str) -> str:

@@ -169,10 +169,9 @@ def test_the_curve_of_two_keys_separates_what_attracts(
         ("--x", "controller.crossover=8 Hz, 9 Hz"),
         ("--x", "controller.crossover=12 Hz..8 Hz"),
         ("--x", "joint.locked=false..true"),
-        ("--x", "masses.stage=0 kg..1 kg", "--log"),
+        ("--x", "masses.stage=0 kg..1 kg:log"),
         (*CROSSOVER, "--y", "controller.crossover=1 Hz..2 Hz"),
         (*CROSSOVER, "--rtol", "1e-15"),
-        (*CROSSOVER, "--link", "masses.cart=0.7 * mas"),
         (*CROSSOVER, "--out", str(RIG)),
     ],
 )

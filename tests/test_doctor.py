@@ -42,13 +42,13 @@ def test_a_name_as_wide_as_the_terminal_leaves_room_for_the_others(
     assert {"um", "position"} <= {*"".join(lines).split()}
 
 
-def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_folder_of_the_user_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     from friso.engine.cache import cache_folder
 
     monkeypatch.setenv("HOME", str(cache_folder().parent))
-    texts = {full: " ".join(finding.text for finding in doctor.checks(full)) for full in (False, True)}
-    assert str(cache_folder()) in texts[True]
-    assert str(cache_folder().parent) not in texts[False]
+    text = " ".join(finding.text for finding in doctor.checks())
+    assert str(cache_folder().parent) not in text
+    assert cache_folder().name in text
 
 
 @pytest.mark.parametrize(
@@ -68,8 +68,7 @@ def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.Mon
 def test_no_user_is_named(text: str, shown: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Path, "home", lambda: Path(r"D:\Profiles\Ann"))
     monkeypatch.setattr(doctor.getpass, "getuser", lambda: "ann")
-    assert doctor._without_names(text, False) == shown
-    assert doctor._without_names(text, True) == text
+    assert doctor._without_names(text) == shown
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="modes tell nothing there")
@@ -77,9 +76,9 @@ def test_of_kept_code_it_is_said_what_is_so(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr("friso.engine.cache.cache_folder", lambda: tmp_path)
     for mode, words in ((0o700, "closed to other users"), (0o755, "open to other users")):
         tmp_path.chmod(mode)
-        assert doctor._kept_code(False).endswith(f", {words}")
+        assert doctor._kept_code().endswith(f", {words}")
     monkeypatch.setattr("friso.engine.cache.is_passing", lambda folder: True)
-    assert ", which is deleted at the end, " in doctor._kept_code(False)
+    assert ", which is deleted at the end, " in doctor._kept_code()
 
 
 def test_a_user_without_a_home_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:

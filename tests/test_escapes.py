@@ -12,7 +12,6 @@ from pathlib import Path
 import log_files
 import numpy as np
 import pytest
-import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from inside import friso_inside
@@ -20,11 +19,10 @@ from pages import packed_values
 
 import friso
 from friso.cli.terminal import Escaping, console, spelled
-from friso.escapes import escaped, one_line, table_cell
+from friso.escapes import escaped, one_line
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.studies.store import export
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 HOSTILE = "\x1b[2J\x1b]0;owned\x07 \u202egnp.exe \x9b31m \u2066x\r"
@@ -41,7 +39,6 @@ def test_no_text_steers(text: str) -> None:
         assert unicodedata.category(character) == "Cf"  # a sign of a script, which joins numbers or letters
         assert unicodedata.bidirectional(character) in ("AN", "ON", "L", "BN", "NSM")
     assert "\n" not in one_line(text)
-    assert table_cell(text)[:1] not in ("=", "+", "-", "@", "\t", "\uff1d")
 
 
 def test_the_text_of_an_error_or_of_a_log_record_steers_nothing(caplog: pytest.LogCaptureFixture) -> None:
@@ -150,16 +147,6 @@ def test_a_picture_shows_what_a_text_is() -> None:
 def test_a_text_that_is_too_long_to_be_drawn_is_shortened() -> None:
     figure = drawable(Figure("name", "x" * 10**6, "", ()))
     assert len(figure.title) < 2000
-
-
-def test_a_table_for_a_spreadsheet_has_no_formulas(tmp_path: Path) -> None:
-    words = np.array(["=cmd()", "@x", HOSTILE], dtype=object)
-    runs = xr.Dataset({"outcome": ("=key", words), "peaks": ("=key", [-1.0, 2.0, 3.0])}, {"=key": words})
-    export(runs, tmp_path / "map.csv")
-    text = (tmp_path / "map.csv").read_text(encoding="utf-8")
-    assert not steers(text)
-    assert [line.split(",")[0][:2] for line in text.splitlines()] == ["'=", "'=", "'@", r"\x"]
-    assert ",-1.0" in text
 
 
 def test_friso_draws_on_the_terminal_itself() -> None:

@@ -161,7 +161,7 @@ def test_a_kind_of_its_own_is_identified_and_shown(
     assert "Hold: held" in (out / "identify.html").read_text(encoding="utf-8")
     assert (out / "identify_hold_1.png").stat().st_size > 0
     monkeypatch.setitem(KINDS.added, "hold", (HeldForce(), ""))
-    assert run(log, "--stage", stage, "--json", "--out", out) == 0  # as kept beside the log
+    assert run(log, "--stage", stage, "--json", "--out", out, "--overwrite") == 0  # as kept beside the log
     (experiment,) = json.loads(capsys.readouterr().out)["experiments"]
     assert experiment["held_n"] == pytest.approx(2, rel=1e-3)
     assert "Held force: held" in (out / "identify.html").read_text(encoding="utf-8")

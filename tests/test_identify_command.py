@@ -248,8 +248,6 @@ def refused(folder: Path, words: str, *arguments: object, out: str = "out") -> N
         ([*WITH_STAGE, "--unit", "ActPos=parrots"], "parrots"),
         ([*WITH_STAGE, "--scale", "force=heavy"], "heavy"),
         ([*WITH_STAGE, "--bandwidth", "20 kg"], "--bandwidth"),
-        ([*WITH_STAGE, "--band", "20 Hz .. 3 Hz"], "--band"),
-        ([*WITH_STAGE, "--period", "0 s"], "--period"),
         ([*WITH_STAGE, "--dt", "-1 ms"], "--dt"),
         ([*WITH_STAGE, "--predict", "nowhere.csv"], "nowhere.csv"),
         (["log.csv", "--set", "friction.static=2 N"], "a stage whose keys to override"),

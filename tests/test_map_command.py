@@ -40,18 +40,14 @@ def friso(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
 def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """Return a folder with a map, and the document that its command printed."""
     folder = tmp_path_factory.mktemp("map")
-    done = friso_inside(
-        folder, "map", RIG, *SMALL, "--out", "a.zarr", "--export", "a.csv", "--export", "a.nc", "--json"
-    )
+    done = friso_inside(folder, "map", RIG, *SMALL, "--out", "a.zarr", "--json")
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout)
 
 
 def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     folder, document = mapped
-    assert {Path(file).name for file in document["files"]} == {
-        f"a.{form}" for form in ("png", "svg", "pdf", "html", "csv", "nc")
-    }
+    assert {Path(file).name for file in document["files"]} == {f"a.{form}" for form in ("png", "svg", "pdf", "html")}
     assert all((folder / file).stat().st_size > 1000 for file in document["files"])
     runs = xr.open_zarr(folder / "a.zarr")
     assert runs.peaks.dims == ("controller.crossover", "joint.stroke")
@@ -77,16 +73,15 @@ def test_a_cell_is_run_again_alone(mapped: tuple[Path, dict]) -> None:
 
 
 def test_files_of_the_user_are_not_overwritten(tmp_path: Path) -> None:
-    for name, options in (("a.png", ()), ("b.csv", ("--export", "b.csv"))):
-        (tmp_path / name).write_text("precious")
-        done = friso_inside(tmp_path, "map", RIG, *SMALL, "--out", f"{name[0]}.zarr", *options)
-        assert done.returncode == 2
-        assert "nothing was overwritten" in done.stderr
-        assert (tmp_path / name).read_text() == "precious"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.csv"]
+    (tmp_path / "a.png").write_text("precious")
+    done = friso_inside(tmp_path, "map", RIG, *SMALL, "--out", "a.zarr")
+    assert done.returncode == 2
+    assert "nothing was overwritten" in done.stderr
+    assert (tmp_path / "a.png").read_text() == "precious"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
-OF_ANOTHER_STUDY = (("--metric", "loudness"), ("--rtol", "1e-4"), ("--log",), ("--samples", "8"))
+OF_ANOTHER_STUDY = (("--metric", "loudness"), ("--rtol", "1e-4"), ("--samples", "8"))
 
 
 @pytest.mark.parametrize("options", [*OF_ANOTHER_STUDY, ("--set", "controller.alpha=0.2")])
@@ -134,18 +129,14 @@ def _interruptible() -> None:
     [
         ("--x", "controller.crosover=1 Hz..2 Hz:3"),
         ("--x", "controller.crossover=2 Hz..1 Hz:3"),
-        ("--x", "joint.stroke=0 m..1 mm:3", "--log"),
+        ("--x", "joint.stroke=0 m..1 mm:3:log"),
         ("--x", "joint.stroke=0 m..1 mm:3", "--y", "joint.stroke=0 m..1 mm:3"),
         ("--x", "controller.crossover=1 Hz..2 Hz:100000", "--y", "joint.stroke=0 m..1 mm:10000"),
         ("--x", "controller.crossover=1 Hz..2 Hz:1000000000"),
         (*SMALL, "--out", RIG),
         (*SMALL, "--out", RIG / "below.zarr"),
         (*SMALL, "--rtol", "loose"),
-        (*SMALL, "--export", "a.xls"),
-        (*SMALL, "--export", "absent/a.csv"),
-        (*SMALL, "--link", "masses.cart=0.7 * mas"),
         (*SMALL, "--samples", "8"),
-        (*SMALL, "--latin"),
         (*SMALL, "--workers", "0"),
         ("--x", "controller.crossover=4 Hz..8 Hz", "--samples", "9"),
         (*SMALL, "--workers", "1", "--scheduler", "tcp://127.0.0.1:9"),
@@ -178,15 +169,14 @@ def test_an_invalid_cell_gives_its_reason(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:
-    options = ("--x", "mass=1 kg..3 kg", "--y", "controller.crossover=4 Hz..12 Hz", "--samples", "16", "--latin")
-    links = ("--link", "masses.cart=0.7 * mass", "--link", "masses.stage=0.3 * mass", "--set", "parasitic.mass=0.1 kg")
-    done = friso(tmp_path, "map", RIG, *options, *links, "--workers", "2", "--out", "a.zarr", "--json")
+def test_samples_and_a_local_cluster(tmp_path: Path) -> None:
+    options = ("--x", "masses.cart=0.7 kg..2.1 kg", "--y", "controller.crossover=4 Hz..12 Hz", "--samples", "16")
+    done = friso(tmp_path, "map", RIG, *options, "--workers", "2", "--out", "a.zarr", "--json")
     assert done.returncode == 0, done.stderr
     with xr.open_zarr(tmp_path / "a.zarr") as stored:
-        assert stored["mass"].dims == ("sample",)
+        assert stored["masses.cart"].dims == ("sample",)
         assert stored.outcome.shape == (16,)
-    again = friso_inside(tmp_path, "map", RIG, *options, *links, "--out", "b.zarr", "--json")
+    again = friso_inside(tmp_path, "map", RIG, *options, "--out", "b.zarr", "--json")
     assert json.loads(again.stdout)["outcomes"] == json.loads(done.stdout)["outcomes"]
 
 
@@ -224,7 +214,7 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(
     assert (tmp_path / "b.html").read_text() == "mine, under a name that was friso's"
     study, _ = stored_study(tmp_path / "b.zarr", None, None)
     with pytest.raises(StoreError, match="another study"):  # before the figure, which is not all that would be lost
-        refuse_overwriting(replace(study, rtol=1e-7), tmp_path / "b.zarr", [], overwrite=False)
+        refuse_overwriting(replace(study, rtol=1e-7), tmp_path / "b.zarr", overwrite=False)
 
 
 def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
@@ -260,8 +250,7 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
             raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("friso.studies.store_files.FileLock", Denied)
-    elsewhere = ("--out", "figures", "--export", "c.csv")
-    done = friso_inside(tmp_path, "map", "a.zarr", *elsewhere)
+    done = friso_inside(tmp_path, "map", "a.zarr", "--out", "figures")
     assert done.returncode == 0, done.stderr
     assert {file.name for file in (tmp_path / "figures").iterdir()} > {"map.png", "map.html"}
     assert "wrote figures/map.html" in done.stdout
@@ -272,7 +261,7 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
         tmp_path, "map", RIG, "--x", "controller.crossover=7 Hz, 8 Hz", "--out", "a.zarr", "--overwrite"
     )
     assert (done.returncode, "cannot be written to" in done.stderr) == (2, True)  # not the runs of the other study
-    assert {file.name for file in tmp_path.iterdir()} == {"a.zarr", "a.png", "figures", "c.csv"}
+    assert {file.name for file in tmp_path.iterdir()} == {"a.zarr", "a.png", "figures"}
 
 
 def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from friso.questions.map.findings import caveats, message, own_place
 from friso.questions.map.question import SweepAnswer
 from friso.shown.drawing import plotly_renderer
 from friso.stage import Stage
+from friso.studies.study import Request
 
 SPEEDS = np.array([0.6, 0.9, 1.0, 1.3, 1.7])
 
@@ -176,5 +177,5 @@ def test_cells_without_a_verdict_are_on_no_side_of_an_edge(locked: Stage) -> Non
 
 
 def test_a_name_that_links_use_is_free(locked: Stage) -> None:
-    linked = friso.sweep(locked, {"speed": [0.5, 1.0]}, link={"controller.crossover": "8*speed"}, metric="outcome")
-    assert linked.cell(0).controller.crossover == pytest.approx(4.0)
+    study = Request(locked, {"speed": [0.5, 1.0]}, None, {"controller.crossover": "8*speed"}).study()
+    assert study.cell_stage([0]).controller.crossover == pytest.approx(4.0)

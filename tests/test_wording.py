@@ -37,7 +37,7 @@ MISTAKES = {
     "tune": (RIG, "--within", "1 s"),
     "reproduce": ("masses", "--out", "out"),
     "guideline": ("--samples", "63"),
-    "doctor": ("--full-path",),
+    "doctor": ("--jsom",),
     "example": ("thesis",),
     "schema": ("--of", "design"),
     "app": ("missing.toml", "--no-browser"),

@@ -39,7 +39,6 @@ QUICK: dict[str, list[str]] = {
     "parameters": ["init", "stage.toml", "--from", AXIS, *(f"--set={answer}" for answer in ANSWERS)],
     "example": ["example", "thesis_rig", "stage.toml"],
     "map": MAP,
-    "exports": [*MAP, "--export", "a.csv", "--export", "a.nc"],
 }  # fmt: skip
 """Commands that write and end within seconds, by the name of the case."""
 
@@ -77,7 +76,7 @@ def killed(rng: random.Random, folder: Path) -> None:
     No file may be partial, and the next command that writes there removes leftovers. A command that ends quickly, run
     again, must leave what it leaves undisturbed: the same bytes, and nothing else.
     """
-    name = rng.choice([*WRITING, "map", "exports"])
+    name = rng.choice([*WRITING, "map"])
     _prepare(name, folder)
     for _ in range(rng.randrange(1, 4)):
         with _started(folder, WRITING[name]) as process:

@@ -26,29 +26,29 @@ from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory
 
 
-def _studies(stage: Stage, all_axes: Sequence[Mapping[str, Any]], metric: str, log: bool) -> list[Study]:
+def _studies(stage: Stage, all_axes: Sequence[Mapping[str, Any]], metric: str) -> list[Study]:
     """Return a study of each of several sets of axes, which are ranges by key.
 
     Raises InputError for an unusable range.
     """
     chosen = read_stage(stage, None, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
     with local_crew() as crew:
-        return [study_for(chosen, Varied({**axes}, log=log), metric, None, crew) for axes in all_axes]
+        return [study_for(chosen, Varied({**axes}), metric, None, crew) for axes in all_axes]
 
 
-def sketched(stage: Stage, *, metric: str, log: bool, progress: Progress = silent, **axes: str) -> SweepAnswer:
+def sketched(stage: Stage, *, metric: str, progress: Progress = silent, **axes: str) -> SweepAnswer:
     """Return a map over two keys whose edges lie half-way between cells, which is soon there.
 
     Its parameters are those of `friso.sweep`. Raises InputError for an unusable range.
     """
-    varied = Varied.of_texts({}, axes["x"], axes["y"], (), None, None, False, log)
-    (study,) = _studies(stage, [varied.axes], metric, log)
+    varied = Varied.of_texts({}, axes["x"], axes["y"], ())
+    (study,) = _studies(stage, [varied.axes], metric)
     if runs_as_built(study.stage, [metric]):
         mention_sampling(study.stage)
     mention_unstable_loop(study.stage)
     with local_crew() as crew:
         (runs,) = run_in_memory([study], crew, progress)
-    return SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, exports=(), edges=None)
+    return SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, edges=None)
 
 
 def located(sketch: SweepAnswer, progress: Progress) -> SweepAnswer:
@@ -56,12 +56,12 @@ def located(sketch: SweepAnswer, progress: Progress) -> SweepAnswer:
     study, runs, metric = sketch.study, sketch.result, sketch.metric
     with local_crew() as crew:
         edges = fine_edges(study, runs, metric, own_values(runs), crew, progress)
-    return SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, exports=(), edges=edges)
+    return SweepAnswer(runs, stage=study.stage, study=study, metric=metric, store=None, edges=edges)
 
 
 def tracks_of(stage: Stage, values: Mapping[str, Sequence[Any]], progress: Progress) -> dict[str, list[str]]:
     """Return the verdict at each of several values of each key, "" for a value that the stage cannot have."""
-    studies = _studies(stage, [{key: [*column]} for key, column in values.items()], "sketch", False)
+    studies = _studies(stage, [{key: [*column]} for key, column in values.items()], "sketch")
     with local_crew() as crew:
         runs = run_in_memory(studies, crew, progress)
     return {key: held["sketch"].values.tolist() for key, held in zip(values, runs, strict=True)}

@@ -299,17 +299,17 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     `coarse` the first picture is all, unless the map is there: a page asks for more once its verdict is known.
     """
     options = asked.chosen(*OPTIONS["map"])
-    axes = {name: str(options.get(name, "")) for name in ("x", "y")}
+    axes, spacing = {name: str(options.get(name, "")) for name in ("x", "y")}, _spacing(options)
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
     metric, stage = str(options.get("metric", "outcome")), asked.machine.stage
     home = home_of(asked.machine, [*keys.values()])
     if metric == "sketch" and not rests(stage.flat()):  # there is a verdict only where the reference comes to stand
         metric = "stick_slip" if is_moved_evenly(stage) else "outcome"
-    shown = {"metric": metric, "log": options.get("log", False)}
+    shown = {"metric": metric}
 
     def ranges(count: int) -> dict[str, Any]:
         """Return the ranges of both axes with `count` points."""
-        return {name: f"{text}:{count}" for name, text in axes.items()}
+        return {name: f"{text}:{count}{spacing}" for name, text in axes.items()}
 
     def cells(count: int) -> SweepAnswer:
         """Return the map with `count` points along each axis, without located edges."""
@@ -345,12 +345,19 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     if options.get("edge"):
         yield {**whole, "kind": "partly"}
         try:
-            edge = KEPT.answer(friso.boundary, asked.machine, work, {**axes, "log": shown["log"]})
+            edge = KEPT.answer(
+                friso.boundary, asked.machine, work, {name: f"{text}{spacing}" for name, text in axes.items()}
+            )
             whole = part(answer, finest, edge)
             whole["sentences"] += edge.sentences()
         except InputError as error:  # such as a stage that cannot hunt: its map is shown all the same
             whole["sentences"] += [str(error)]
     yield whole
+
+
+def _spacing(options: Mapping[str, Any]) -> str:
+    """Return what stands behind a range that the page spaces as its option says."""
+    return ":log" if options.get("log") else ""
 
 
 def tracks(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -387,12 +394,14 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     Following the edge may take minutes, so in a plane a coarse map of verdicts comes first. If the stage cannot hunt,
     the map stays, with the reason.
     """
-    options = asked.chosen(*OPTIONS["boundary"])
+    chosen = asked.chosen(*OPTIONS["boundary"])
+    spacing = _spacing(chosen)
+    options = {name: f"{chosen[name]}{spacing}" for name in ("x", "y") if name in chosen}
     keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
     lines, rough = _lines("boundary", asked, options), None
     if len(keys) == 2 and not KEPT.holds(friso.boundary, asked.machine, options):
-        ranges = {name: f"{options[name]}:{COARSE_TO_FINE[0]}" for name in ("x", "y")}
-        coarse = {**ranges, "log": options.get("log", False), "metric": "sketch"}
+        ranges = {name: text.removesuffix(spacing) for name, text in options.items()}
+        coarse = {name: f"{text}:{COARSE_TO_FINE[0]}{spacing}" for name, text in ranges.items()} | {"metric": "sketch"}
         with suppress(InputError):  # there may be no verdicts, but the boundary says why
             verdicts = KEPT.answer(friso.sweep, asked.machine, work, coarse)
             rough = {**parts_of(verdicts, lambda figure: _on_map(figure, asked, keys)), **lines}

@@ -42,14 +42,11 @@ FirstEstimates = Callable[[str, Sequence[Estimate]], object]
 class AnalysisSettings:
     """The user's choices for an analysis; None if friso is to choose.
 
-    `bandwidth` [Hz] is the moves' bandwidth for the inverse model; `band` [Hz] and `period` [s] apply to frequency
-    responses. `progress` receives the progress of an analysis, and `tell` the first estimates of a log, by name, which
-    a longer analysis then improves.
+    `bandwidth` [Hz] is the moves' bandwidth for the inverse model. `progress` receives the progress of an analysis, and
+    `tell` the first estimates of a log, by name, which a longer analysis then improves.
     """
 
     bandwidth: float | None = None
-    band: tuple[float, float] | None = None
-    period: float | None = None
     progress: Progress = silent
     tell: FirstEstimates = lambda name, estimates: None
 

@@ -57,11 +57,11 @@ ClaimName: TypeAlias = str
 Address: TypeAlias = str
 """Names chosen from a list (a wrong name is answered with the list); and the address of a scheduler."""
 
-Links: TypeAlias = Changes
+
 Roles: TypeAlias = Changes
 ChannelUnits: TypeAlias = Changes
 RoleScales: TypeAlias = Changes
-"""Dictionaries, or texts NAME=VALUE: expressions by key, channels by role, units by channel, scales by role."""
+"""Dictionaries, or texts NAME=VALUE: channels by role, units by channel, scales by role."""
 
 MOST_NAMED = 3
 """Largest number of uncertain keys that a message names."""

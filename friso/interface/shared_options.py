@@ -40,12 +40,6 @@ SHARED: Mapping[str, SharedOption] = {
         'Deviation that counts as in position, "5 um" or a number [m]; default: that of [tolerance], or 1 um. It is '
         "never finer than a step of the encoder, or than an error at which the controller exerts no force.",
     ),
-    "link": SharedOption(
-        "dict, optional",
-        'Keys tied to others: ``{"masses.cart": "0.7 * mass"}``.',
-        'A key tied to others: masses.cart="0.7 * mass + 20 g".',
-    ),
-    "log": SharedOption("bool", "Make all ranges logarithmic; for a single one, append :log."),
     "logs": SharedOption("path or list of paths", "Log files; friso logs --help lists their formats."),
     "map": SharedOption(
         "dict, optional", 'Roles and their channels: ``{"position": "Axis1.ActPos"}``.', 'position="Axis1.ActPos"'

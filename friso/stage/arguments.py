@@ -43,7 +43,6 @@ TEXT_KINDS = {
 """Annotations of texts, and the placeholder of each on the command line."""
 
 PAIR_KINDS = {
-    "Links": "KEY=EXPRESSION",
     "Roles": "ROLE=CHANNEL",
     "ChannelUnits": "CHANNEL=UNIT",
     "RoleScales": "ROLE=SCALE",

@@ -248,11 +248,11 @@ class SweptRange:
         return SweptAxis(self.name, space(self.first, self.last, cast(int, self.count)), self.unit, self.scale)
 
 
-def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool = False) -> SweptAxis | SweptRange:
+def read_axis(stage: Stage, name: str, values: AxisValues, free: bool) -> SweptAxis | SweptRange:
     """Return an axis from a text, a list or an array with a unit; a range stays a `SweptRange`.
 
-    `name` is a key or a scaling of the stage, or with `free` a name that links use. With `log`, a range that does not
-    state its spacing is logarithmic. Raises InputError for a name or values that the stage cannot have.
+    `name` is a key or a scaling of the stage, or with `free` a name that links use. Raises InputError
+    for a name or values that the stage cannot have.
     """
     field, scales = stage.numeric_keys().get(name), name in SCALINGS and not free
     if field is None and not free and not scales:
@@ -261,7 +261,7 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
     try:
         axis: SweptAxis | SweptRange
         if isinstance(values, str) and ".." in values:
-            axis = _range(name, values, reader, log)
+            axis = _range(name, values, reader)
         else:
             axis = _axis_of_values(name, values, reader)
         if scales and (axis.first if isinstance(axis, SweptRange) else axis.values.min()) <= 0:
@@ -325,10 +325,10 @@ def _number(value: Any) -> float | None:
         return None
 
 
-def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
+def _range(name: str, text: str, reader: _Reader) -> SweptRange:
     """Read a range of an axis, such as "1 Hz..40 Hz:41", into its ends, count and spacing.
 
-    With `log` the spacing is logarithmic unless the text states it. Raises InputError for a text that is no range.
+    Raises InputError for a text that is no range.
     """
     match = _RANGE.fullmatch(text)
     if match is None:
@@ -343,7 +343,7 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
     if not first < last:
         order = "empty" if first == last else "reversed"
         raise InputError("", quoted(text, f"{order} range"), "an increasing range", RANGE_EXAMPLE)
-    scale: Scale = cast(Scale, match["scale"] or ("log" if log else "linear"))
+    scale: Scale = cast(Scale, match["scale"] or "linear")
     if scale == "log" and first <= 0:
         range_text = quoted(text, "a logarithmic axis never reaches 0")
         raise InputError("", range_text, "a logarithmic range that begins above 0", '"10 um..1 cm:41:log"')
@@ -424,10 +424,10 @@ def read_axes(
 ) -> tuple[SweptAxis | SweptRange, ...]:
     """Return all axes of a study; `axes` are texts, lists or arrays with a unit, by name.
 
-    Ranges without a number of points stay a `SweptRange`. Names in `free` are used by links only. With `log`, ranges
-    are logarithmic unless they state their spacing. Raises InputError for a name or values that the stage cannot have.
+    Ranges without a number of points stay a `SweptRange`. Names in `free` are used by links only. Raises InputError
+    for a name or values that the stage cannot have.
     """
-    return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())
+    return tuple(read_axis(stage, name, values, name in free) for name, values in axes.items())
 
 
 SAMPLE = "sample"
@@ -475,13 +475,13 @@ class Samples:
             raise InputError("method", quoted(self.method), f"one of {', '.join(METHODS)}", 'method="sobol"')
 
 
-def sample_axes(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
+def sample_axes(stage: Stage, samples: Samples, free: frozenset[str]) -> tuple[SweptAxis, ...]:
     """Return the axes of samples, all of one length, from ranges or from lists.
 
-    `free` are names that links use, and `log` makes ranges logarithmic. Raises InputError for ranges with a number of
+    `free` are names that links use. Raises InputError for ranges with a number of
     points, for lists of unequal length, and for ranges together with lists.
     """
-    read = read_axes(stage, samples.ranges, free, log)
+    read = read_axes(stage, samples.ranges, free)
     ranges = [axis for axis in read if isinstance(axis, SweptRange)]
     if not ranges:
         return _values(read)

@@ -37,7 +37,7 @@ from friso.hunting import (
 )
 from friso.progress import Progress, silent
 from friso.stage import Stage, violations
-from friso.studies.axes import SweptAxis, check_links, linked_names, read_axis
+from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
 from friso.studies.settings import settings
 
@@ -45,28 +45,25 @@ from friso.studies.settings import settings
 def boundary(
     stage: Stage,
     axes: Mapping[str, str],
-    links: Mapping[str, str] | None = None,
     rtol: float = CYCLE_RTOL,
-    log: bool = False,
     begins: Callable[[], None] = lambda: None,
     progress: Progress = silent,
 ) -> Diagram | Plane:
     """Return where the hunting cycle of a stage loses stability, over one key or two.
 
     `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``. A range is logarithmic with ":log" behind
-    it, or with `log`. `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is
-    a `Diagram`: all branches of cycles over the range, with their flips, folds and tori. With two it is a `Plane`: the
-    curves on which flips, folds and tori lie. The motion of the stage file plays no part.
+    it. With one axis the result is a `Diagram`: all branches of cycles over the range, with their flips, folds and
+    tori. With two it is a `Plane`: the curves on which flips, folds and tori lie. The motion of the stage file plays no
+    part.
 
     `begins` is called once the input has been checked, and `progress` while cycles are followed. Raises InputError for
-    a wrong range, link, tolerance or stage (one that cannot hunt).
+    a wrong range, tolerance or stage (one that cannot hunt).
     """
     checked_rtol(rtol)
-    followers, example = dict(links or {}), range_example(stage.flat())
-    ranges = tuple(_range(stage, name, text, linked_names(followers), log) for name, text in axes.items())
+    example = range_example(stage.flat())
+    ranges = tuple(_range(stage, name, text) for name, text in axes.items())
     if len(ranges) not in (1, 2):
         raise InputError("axes", f"{len(ranges)} keys", "one key or two", example)
-    check_links(stage, followers, frozenset(swept.key for swept in ranges))
     if reason := cannot_hunt(stage):
         if reason == DITHERS:
             raise InputError("controller", reason, "a controller without dither", example)
@@ -77,7 +74,7 @@ def boundary(
         if is_moved_evenly(stage):
             expected += "; friso check and friso map tell at which speeds a ramp sticks and slips"
         raise InputError("motion", actual, expected, """--set 'motion={kind="hold", duration="20 s"}'""")
-    for key in (*(swept.key for swept in ranges), *followers):
+    for key in (swept.key for swept in ranges):
         if key.startswith("motion."):
             problem = "a key of the motion, which plays no part"
             raise InputError(key, problem, "a key of the stage or its controller", example)
@@ -85,7 +82,7 @@ def boundary(
         raise InputError(
             "rtol", f"{rtol:g}", f"at most {settings.loosest_rtol:g}, since multipliers are derivatives", "1e-9"
         )
-    space = Space(ranges, lambda values: flat_cells(stage, followers, values))
+    space = Space(ranges, lambda values: flat_cells(stage, {}, values))
     _refuse_impossible(space, example)
     kernels([KernelRequest(space.form, variational) for variational in (False, True)])
     begins()
@@ -100,13 +97,13 @@ def _refuse_impossible(space: Space, example: str) -> None:
         raise InputError(key, "ranges that no stage may have", why, example)
 
 
-def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> KeyRange:
+def _range(stage: Stage, name: str, text: str) -> KeyRange:
     """Read the text of a range, such as "0.1 mm..2 mm", for the boundary of hunting.
 
-    `name` is a key of the stage, or with `free` a variable that links use. Raises InputError for a range with a number
-    of points, or with ends that the key may not have.
+    `name` is a key of the stage. Raises InputError for a range with a number of points, or with ends that the key may
+    not have.
     """
-    read, example = read_axis(stage, name, text, name in free, log), range_example(stage.flat())
+    read, example = read_axis(stage, name, text, False), range_example(stage.flat())
     if isinstance(read, SweptAxis) or read.count is not None:
         raise InputError(name, repr(text), "a range FIRST..LAST, without a number of points", example)
     field = stage.numeric_keys().get(name)

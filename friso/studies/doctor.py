@@ -41,10 +41,10 @@ class DoctorCheck:
     remedy: str = ""
 
 
-def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
+def checks() -> Iterator[DoctorCheck]:
     """Yield all checks of the installation, one by one, as they are made.
 
-    Paths below the user's home folder begin with ~ unless `full_paths`.
+    Paths below the user's home folder begin with ~.
     """
     yield DoctorCheck("friso", VERSION)
     yield DoctorCheck(
@@ -55,7 +55,7 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
     steps: tuple[tuple[str, Callable[[], str], str], ...] = (
         ("processor", _processor, LIBRARIES),
         ("cores", lambda: f"{usable_cores()} of {os.cpu_count()} may be used", ""),
-        ("kept code", lambda: _kept_code(full_paths), "name another folder in FRISO_CACHE_DIR"),
+        ("kept code", _kept_code, "name another folder in FRISO_CACHE_DIR"),
         ("compiling", _compiling, LIBRARIES),
         ("running", _running, "empty the folder of kept code, then try again; if it stays, report it with this text"),
     )
@@ -63,7 +63,7 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
         try:
             yield DoctorCheck(subject, look())
         except Exception as error:  # any failure is a result of the check
-            yield DoctorCheck(subject, _without_names(f"{type(error).__name__}: {error}", full_paths), False, remedy)
+            yield DoctorCheck(subject, _without_names(f"{type(error).__name__}: {error}"), False, remedy)
 
 
 def _packages() -> Iterator[DoctorCheck]:
@@ -106,16 +106,13 @@ def _processor() -> str:
     return f"{chosen.name}, {chosen.triple}: registers of {chosen.lanes} numbers ({64 * chosen.lanes} bits)"
 
 
-def _kept_code(full_paths: bool) -> str:
-    """Check the folder of compiled code: its size, whether it is permanent, and who can read it.
-
-    Without `full_paths`, the user's name is left out.
-    """
+def _kept_code() -> str:
+    """Check the folder of compiled code: its size, whether it is permanent, and who can read it."""
     from friso.engine.cache import ENTRY, cache_folder, is_passing
 
     folder = cache_folder()
     sizes = [file.stat().st_size for file in folder.glob(f"*{ENTRY}")]
-    text = f"{len(sizes)} kernels, {sum(sizes) / 1e6:.1f} MB, in {_without_names(str(folder), full_paths)}"
+    text = f"{len(sizes)} kernels, {sum(sizes) / 1e6:.1f} MB, in {_without_names(str(folder))}"
     if is_passing(folder):
         text += ", which is deleted at the end"
     if MODES_TELL:
@@ -165,13 +162,8 @@ def _stage() -> Stage:
     return loads(template, "the template").replace({"joint.locked": True})
 
 
-def _without_names(text: str, full_paths: bool) -> str:
-    """Return a text with home folders as ~, and the user's name elsewhere in paths as USER.
-
-    With `full_paths`, the text is returned unchanged.
-    """
-    if full_paths:
-        return text
+def _without_names(text: str) -> str:
+    """Return a text with home folders as ~, and the user's name elsewhere in paths as USER."""
     home = user = ""
     with suppress(RuntimeError):  # raised for a user without a home
         home = str(Path.home())

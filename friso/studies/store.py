@@ -2,7 +2,7 @@
 
 The store is made complete, without results, elsewhere and then moved into place. A block is done once it is recorded
 (`Records`), after its chunks were written, each moved into place by Zarr. A block whose chunks differ from the record
-is run again. Other programs get studies as NetCDF and CSV.
+is run again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pydantic import BaseModel, Field
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
-from friso.escapes import one_line, table_cell
+from friso.escapes import one_line
 from friso.platform.system import cause_of, delete_file, once_free
 from friso.stage.arguments import check_arguments
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
@@ -51,51 +51,6 @@ from friso.studies.study import CellBlock, Study, study_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-def export(runs: xr.Dataset, path: Path) -> None:
-    """Write a study as NetCDF (".nc") or as CSV with one row per cell (".csv").
-
-    Columns of a CSV file are named with their units. Raises ValueError for another suffix.
-    """
-    if path.suffix == ".nc":
-        texts = [name for name in every_variable() if name in runs and is_text(name)]
-        converted = {name: runs[name].copy(data=_bytes(runs[name].values)) for name in texts}
-        runs.assign(converted).to_netcdf(path, engine="scipy")
-    elif path.suffix == ".csv":
-        _write_csv(runs, path)
-    else:
-        raise ValueError(f"export: given {path.suffix}, expected .nc or .csv")
-
-
-def _bytes(texts: np.ndarray) -> np.ndarray:
-    """Return texts as UTF-8 bytes, in an array wide enough for the longest of them."""
-    import pandas as pd
-
-    codes, words = pd.factorize(texts.ravel())
-    return np.array([str(word).encode() for word in words])[codes].reshape(texts.shape)
-
-
-def _write_csv(runs: xr.Dataset, path: Path) -> None:
-    """Write a study as a table of comma-separated values, one row per cell."""
-    import pandas as pd
-
-    dims = [str(dim) for dim in runs["outcome"].dims]
-    shape = runs["outcome"].shape
-    rows = max(1, settings.rows_together // max(1, int(np.prod(shape[1:]))))
-    with path.open("w", encoding="utf-8", newline="") as file:
-        for first in range(0, shape[0], rows):
-            part = runs.isel({dims[0]: slice(first, first + rows)})
-            frame: pd.DataFrame = part.to_dataframe(dim_order=dims).reset_index()
-            named = {name: table_cell(_with_unit(runs, str(name))) for name in frame.columns}
-            for name in frame.columns[[kind.kind not in "biuf" for kind in frame.dtypes]]:
-                frame[name] = frame[name].astype(str).map(table_cell)
-            frame.rename(columns=named).to_csv(file, index=False, header=first == 0)
-
-
-def _with_unit(runs: xr.Dataset, name: str) -> str:
-    unit = runs[name].attrs.get("units", "")
-    return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
 logger = logging.getLogger("friso")

@@ -278,19 +278,15 @@ TRIAL_CELLS = 512
 
 @dataclass(frozen=True)
 class Request:
-    """A stage, its varied keys, and links, as the user's texts and arrays (see `friso.sweep`).
-
-    With `log`, ranges that do not state their spacing are logarithmic.
-    """
+    """A stage, its varied keys, and links, as the user's texts and arrays (see `friso.sweep`)."""
 
     stage: Stage
     axes: Mapping[str, AxisValues]
     samples: Samples | None = None
     links: Mapping[str, str] = field(default_factory=dict)
-    log: bool = False
 
     def _read(self, axes: Mapping[str, AxisValues]) -> tuple[SweptAxis | SweptRange, ...]:
-        return read_axes(self.stage, axes, linked_names(self.links), self.log)
+        return read_axes(self.stage, axes, linked_names(self.links))
 
     def size(self) -> int:
         """Return the number of cells of the study, without making any array.
@@ -327,7 +323,7 @@ class Request:
         dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
         if self.samples is not None:
             free = linked_names(self.links)
-            dimensions.append(Dimension(SAMPLE, sample_axes(self.stage, self.samples, free, self.log)))
+            dimensions.append(Dimension(SAMPLE, sample_axes(self.stage, self.samples, free)))
         names = [axis.name for dimension in dimensions for axis in dimension.axes]
         for name in names:
             if names.count(name) > 1 or name in (*every_variable(), SAMPLE):

@@ -29,12 +29,12 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     place = answer.store or source
 
     def write(progress: Progress) -> list[Path]:
-        """Write figure, page and exports, and return their paths.
+        """Write figure and page, and return their paths.
 
         The files go beside the store, or into a folder given by --out.
         """
         if elsewhere is not None:
-            return [*elsewhere.write(answer.files(), progress), *answer.exports]
+            return elsewhere.write(answer.files(), progress)
         return write_beside(answer.files_beside(), shown.overwrite, progress)
 
     show(answer, shown, write, f"the runs are in {place}, but no figure was written")

@@ -236,8 +236,8 @@ class FrequencyKind(ExperimentKind[Bench]):
         """Analyse logs of one machine together, or a frequency response from another instrument."""
         (first, *_) = logs
         if not isinstance(first, Log):
-            return analyse((), settings.band, measured=first)
-        return analyse([log for log in logs if isinstance(log, Log)], settings.band, settings.period)
+            return analyse((), measured=first)
+        return analyse([log for log in logs if isinstance(log, Log)])
 
     def estimates(self, result: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
         """Return estimates of masses and joint from responses in newtons and metres.
@@ -251,7 +251,7 @@ class FrequencyKind(ExperimentKind[Bench]):
             return ()
         model = result.two_masses
         if model is not None and stage is not None and (mode := _parasitic(model, stage)):
-            why = f"the resonance at {mode:.3g} Hz is nearer the parasitic mode than the joint's: try --band below it"
+            why = f"the resonance at {mode:.3g} Hz is nearer the parasitic mode than the joint's: excite below it"
             return (Estimate.unknown("joint.stiffness", "N/m", model["joint stiffness"].method, why, 0.0),)
         if (
             model is not None
@@ -296,7 +296,7 @@ class FrequencyKind(ExperimentKind[Bench]):
 
     def predict(self, result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
         """Return the relative prediction errors of another log's outputs, the driven mass first."""
-        return predicted(result, log, settings.period)
+        return predicted(result, log)
 
     def facts(self, result: Bench) -> Facts:
         """List mass lines, modes, masses and joint, friction, and how one log predicts the other."""

@@ -60,13 +60,9 @@ class Bench:
 
 @dataclass(frozen=True)
 class Realisations:
-    """Logs of one experiment, each a realisation of its excitation.
-
-    `period` [s] is the approximate period of the excitation; None means that it is searched.
-    """
+    """Logs of one experiment, each a realisation of its excitation."""
 
     logs: Sequence[Log]
-    period: float | None
 
     @cached_property
     def records(self) -> dict[str, list[ResponseRecord]]:
@@ -80,7 +76,7 @@ class Realisations:
     def responses(self, which: slice = slice(None)) -> list[FrequencyResponse]:
         """Estimate the response of each output from the logs `which`."""
         first = self.logs[which][0]
-        return [_response(records[which], first, output, self.period) for output, records in self.records.items()]
+        return [_response(records[which], first, output) for output, records in self.records.items()]
 
     def single(self, number: int, band: FrequencyRange) -> TwoMass:
         """Fit the two-mass model to one log, by its number, within a band [Hz]."""
@@ -91,16 +87,14 @@ class Realisations:
 def analyse(
     logs: Sequence[Log],
     band: FrequencyRange | None = None,
-    period: float | None = None,
     measured: MeasuredResponse | None = None,
 ) -> Bench:
     """Analyse a frequency response, measured or estimated from logs of one experiment.
 
     `measured` is a response from another instrument. `band` [Hz] is the band of the models (default: above the effect
-    of friction); `period` [s] is the approximate period of the excitation (default: searched). Raises InputError if no
-    response can be estimated.
+    of friction). Raises InputError if no response can be estimated.
     """
-    runs = Realisations(logs, period)
+    runs = Realisations(logs)
     positions = runs.records.get("position", [])
     if measured is not None:
         driven, other = as_measured(measured), None
@@ -157,15 +151,14 @@ def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
     )
 
 
-def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
+def predicted(bench: Bench, log: Log) -> tuple[float, ...]:
     """Return the relative errors of the two-mass model in predicting another log's outputs.
 
-    The errors are taken over the band of the model. `period` [s] is the approximate period of the log's excitation
-    (default: searched). Raises InputError if there is no model.
+    The errors are taken over the band of the model. Raises InputError if there is no model.
     """
     if bench.two_masses is None:
         raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
-    return _errors(bench.two_masses, log, bench.band, period, bench.other is not None)
+    return _errors(bench.two_masses, log, bench.band, bench.other is not None)
 
 
 def _attempt(warnings: list[str], label: str, function, *arguments):
@@ -185,19 +178,19 @@ def _record(log: Log, output: str) -> ResponseRecord:
     return from_log(log, "force", output, external(log))[0]
 
 
-def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
+def _response(records: Sequence[ResponseRecord], log: Log, output: str) -> FrequencyResponse:
     """Estimate a response by averages over periods, or by local polynomials if nothing repeats.
 
     `records` are the realisations; input and output are named as the log's channels.
     """
     channels = from_log(log, "force", output)[1]
     try:
-        find_periods(records[0].driving, None if period is None else period / records[0].sample_time)
+        find_periods(records[0].driving)
     except InputError:
         if len(records) > 1:
             raise
         return local_polynomial(records[0], channels)
-    return multisine(records, period, channels)
+    return multisine(records, channels)
 
 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
@@ -254,14 +247,14 @@ def _left_out(
     for i, log in enumerate(runs.logs if len(runs.logs) > 1 else ()):
         model = _attempt(warnings, "two masses", runs.single, (i + 1) % len(runs.logs), band)
         if model is not None:
-            rows.append((log.name, _errors(model, log, band, runs.period, len(runs.records) > 1)))
+            rows.append((log.name, _errors(model, log, band, len(runs.records) > 1)))
     return tuple(rows)
 
 
-def _errors(model: TwoMass, log: Log, band: FrequencyRange, period: float | None, both: bool) -> tuple[float, ...]:
+def _errors(model: TwoMass, log: Log, band: FrequencyRange, both: bool) -> tuple[float, ...]:
     """Return the relative prediction errors of the driven mass and, with `both`, of the other."""
     return tuple(
-        relative_error(lambda f, c=output == "position": model.predict(f, c), _record(log, output), band, period)
+        relative_error(lambda f, c=output == "position": model.predict(f, c), _record(log, output), band)
         for output in ("position", "cart_position")[: 1 + both]
     )
 

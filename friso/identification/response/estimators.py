@@ -18,17 +18,15 @@ from friso.identification.response.response import Channels, FrequencyResponse
 from friso.identification.response.settings import settings
 
 
-def multisine(
-    records: Sequence[ResponseRecord], period: float | None = None, channels: Channels | None = None
-) -> FrequencyResponse:
+def multisine(records: Sequence[ResponseRecord], channels: Channels | None = None) -> FrequencyResponse:
     """Estimate the response on excited lines from realisations of a periodic excitation.
 
     A realisation is a record with its own random phases. With a reference, the response is indirect: output over input,
-    each relative to the reference. `period` [s] is the approximate period (default: searched). The deviation covers
+    each relative to the reference. The deviation covers
     noise and, with two realisations or with lines left free in the excitation, nonlinear distortion. Raises InputError
     for records that are not periodic or do not belong together.
     """
-    spectra_of_records, remarks = _together([spectra(record, period) for record in records])
+    spectra_of_records, remarks = _together([spectra(record) for record in records])
     excited = np.logical_and.reduce([realisation.excited for realisation in spectra_of_records])
     if not excited.any():
         actual = "realisations without a common line"

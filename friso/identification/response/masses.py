@@ -269,7 +269,7 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
     if off > settings.misfit_of_no_model:
         text = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
         expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
-        raise InputError("response", text, expected, '--band "3 Hz .. 20 Hz"')
+        raise InputError("response", text, expected, "")
 
 
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:

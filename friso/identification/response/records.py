@@ -101,16 +101,15 @@ class Spectra:
     warnings: tuple[str, ...] = ()
 
 
-def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
+def spectra(record: ResponseRecord) -> Spectra:
     """Compute the spectra of a record over whole periods, without the transient.
 
-    The external signal, the reference or else the input, gives the periods. `period` [s] is their approximate length.
+    The external signal, the reference or else the input, gives the periods.
     Drift from period to period is removed first. Raises InputError if nothing repeats or fewer than two periods are
     left.
     """
     record = record.checked()
-    expected = None if period is None else period / record.sample_time
-    periods = find_periods(record.driving, expected)
+    periods = find_periods(record.driving)
     driving = _harmonics(record.driving, periods)
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
@@ -250,15 +249,13 @@ def relative_error(
     model: Callable[[np.ndarray], np.ndarray],
     record: ResponseRecord,
     band: tuple[float, float],
-    period: float | None = None,
 ) -> float:
     """Return ||G U - Y|| / ||Y|| of a model on a periodic record that it was not fitted to.
 
     `model` gives complex responses G at frequencies [Hz]; U and Y are averaged over periods, on the excited lines in
-    `band` [Hz]. `period` [s] is the approximate period (default: searched). Raises InputError if the record is not
-    periodic or no line lies in the band.
+    `band` [Hz]. Raises InputError if the record is not periodic or no line lies in the band.
     """
-    measured = spectra(record, period)
+    measured = spectra(record)
     inside = measured.excited & (measured.frequency >= band[0]) & (measured.frequency <= band[1])
     if not inside.any():
         raise InputError("band", f"{band[0]:g} to {band[1]:g} Hz", "a band that holds excited lines", "3 to 20 Hz")

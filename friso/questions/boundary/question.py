@@ -13,7 +13,7 @@ from friso.equations.bandwidth import range_example
 from friso.hunting import CYCLE_RTOL, KeyRange
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import AxisRange, Changes, Links, StageLike, Tolerance
+from friso.interface.inputs import AxisRange, Changes, StageLike, Tolerance
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, any_sign
 from friso.stage import Stage
@@ -27,12 +27,11 @@ class BoundaryAnswer(Answer):
     """The values at which hunting ends, over one key or two.
 
     `result` is a `Diagram` over one key or a `Plane` of two. `texts` holds the ranges
-    as the user gave them, and `links` the keys that are tied to others.
+    as the user gave them.
     """
 
     stage: Stage
     texts: Sequence[str]
-    links: Mapping[str, str]
     name: str
 
     @property
@@ -51,7 +50,7 @@ class BoundaryAnswer(Answer):
     def keys(self) -> tuple[ShownKey, ...]:
         """Return the keys in the units in which their ranges were given."""
         ranges = zip(self.result.space.ranges, self.texts, strict=True)
-        varied = frozenset([*self.varied, *self.links])
+        varied = frozenset(self.varied)
         return tuple(replace(_in_its_unit(swept, text, self.axis_kind), varied=varied) for swept, text in ranges)
 
     @property
@@ -76,8 +75,6 @@ def boundary(
     *,
     x: AxisRange | None = None,
     y: AxisRange | None = None,
-    link: Links = None,
-    log: bool = False,
     rtol: Tolerance = CYCLE_RTOL,
     set: Changes = None,
     progress: Progress = silent,
@@ -103,7 +100,7 @@ def boundary(
     Raises
     ------
     InputError
-        For a range, a link or a stage that is not usable, such as one that cannot hunt.
+        For a range or a stage that is not usable, such as one that cannot hunt.
 
     Examples
     --------
@@ -115,7 +112,6 @@ def boundary(
     ranges = inputs.axes_of(axes or {}, {"x": x, "y": y}, example)
     if not ranges or (y and not (x or axes)):
         raise inputs.wrong("x", "no key", "one key or two with their ranges", example)
-    links = inputs.pairs_of(link, "link", 'masses.cart="0.7 * mass"')
     from friso.studies.boundary import boundary as traced_boundary
 
     def begins() -> None:
@@ -123,8 +119,8 @@ def boundary(
         inputs.mention_unstable_loop(chosen)
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 
-    traced = traced_boundary(chosen, ranges, links, tolerance, log, begins, progress)
-    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], links=links, name=inputs.stem_of(stage))
+    traced = traced_boundary(chosen, ranges, tolerance, begins, progress)
+    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], name=inputs.stem_of(stage))
 
 
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:

@@ -16,13 +16,8 @@ class DoctorAnswer(Answer):
 
 
 @question
-def doctor(full_paths: bool = False, *, progress: Progress = silent) -> DoctorAnswer:
+def doctor(*, progress: Progress = silent) -> DoctorAnswer:
     """Does friso work on this machine? Text to paste into a bug report.
-
-    Parameters
-    ----------
-    full_paths : bool
-        Name folders in full, with the user's name in them.
 
     Returns
     -------
@@ -32,7 +27,7 @@ def doctor(full_paths: bool = False, *, progress: Progress = silent) -> DoctorAn
     Raises
     ------
     InputError
-        For a `full_paths` that is neither true nor false.
+        For a `progress` that cannot be called.
 
     Examples
     --------
@@ -41,4 +36,4 @@ def doctor(full_paths: bool = False, *, progress: Progress = silent) -> DoctorAn
     """
     from friso.studies.doctor import checks
 
-    return DoctorAnswer([*checks(full_paths)])
+    return DoctorAnswer([*checks()])

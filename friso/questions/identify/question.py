@@ -23,7 +23,6 @@ from friso.interface.inputs import (
     LOGGER,
     Changes,
     ChannelUnits,
-    FrequencyBand,
     FrequencyLike,
     KindName,
     Roles,
@@ -31,7 +30,6 @@ from friso.interface.inputs import (
     StageLike,
     TimeLike,
 )
-from friso.intervals import Span
 from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
@@ -46,7 +44,7 @@ if TYPE_CHECKING:
     from friso.shown.pages import Report
     from friso.studies.contradiction import Contradiction
 
-_HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
+_HERTZ = Quantity("Hz", positive, "20 Hz")
 
 MappingKeeper = Callable[[dict[Path, Mapping]], object]
 """A function that stores what the user said of logs for the next time."""
@@ -113,8 +111,6 @@ def identify(
     merge: bool = False,
     predict: LogFiles = (),
     bandwidth: FrequencyLike | None = None,
-    band: FrequencyBand | None = None,
-    period: TimeLike | None = None,
     check: bool = False,
     against: StageLike | None = None,
     folder: Path = Path(),
@@ -139,10 +135,6 @@ def identify(
         Other logs, simulated with the identified stage.
     bandwidth : str or float, optional
         Bandwidth of the moves, "20 Hz" or a number [Hz], for the filters.
-    band : str, optional
-        Band of the response: "3 Hz .. 20 Hz".
-    period : str or float, optional
-        Period of a periodic excitation, "5 s" or a number [s].
     check : bool
         Also say whether the identified stage hunts, as friso check does of the stage file that is written.
     against : Stage, path or dict, optional
@@ -179,7 +171,7 @@ def identify(
     beside = None if stage is None else axis_written(tables)
     if axis is None and beside is not None and beside != LINEAR:
         axis = beside.name
-    settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
+    settings, options = _settings(bandwidth), options_of(map, unit, scale, dt, as_, axis)
     paths, other_paths = paths_of(logs), paths_of(predict)
     held, unusable = (
         ([read_merged(paths, options, folder)], []) if merge else read_usable(paths, options, folder, other_paths)
@@ -285,24 +277,16 @@ def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
     return [f"the stage file has no {listed}: begun from the log, and our choice where that does not tell"]
 
 
-def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, period: TimeLike | None) -> AnalysisSettings:
-    """Return the user's choices for the analyses, in SI.
+def _settings(bandwidth: FrequencyLike | None) -> AnalysisSettings:
+    """Return the user's choice for the analyses, in SI.
 
     Raises InputError for a text or number that is not usable.
     """
-    values = []
-    for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
-        text = None if value is None else inputs.text_of(value, quantity.unit)
-        try:
-            values.append(None if text is None else float(quantity.read(text)))
-        except InputError as error:
-            raise error.found_in(f"--{name}") from None
     try:
-        limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
+        hertz = None if bandwidth is None else float(_HERTZ.read(inputs.text_of(bandwidth, _HERTZ.unit)))
     except InputError as error:
-        raise error.found_in("--band") from None
-    band_limits = None if limits is None else (limits.low, limits.high)
-    return AnalysisSettings(values[0], band_limits, values[1], tell=mention_first_estimates)
+        raise error.found_in("--bandwidth") from None
+    return AnalysisSettings(hertz, tell=mention_first_estimates)
 
 
 def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:

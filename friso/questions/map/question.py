@@ -20,8 +20,7 @@ from friso.errors import InputError, StoreError
 from friso.hunting import is_moved_evenly
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import LOGGER, Address, AxisPoints, Changes, Links, MetricName, StageLike, Tolerance
-from friso.interface.output_folder import check_file, refuse_place, write
+from friso.interface.inputs import LOGGER, Address, AxisPoints, Changes, MetricName, StageLike, Tolerance
 from friso.platform.extras import need
 from friso.platform.system import MOST_PROCESSES, cause_of, path_of, shell_word, usable_cores
 from friso.progress import Progress, silent
@@ -29,13 +28,11 @@ from friso.questions.map.study import (
     Varied,
     as_stored,
     coloured_by,
-    export_files,
     path_beside,
     place_of_store,
     refuse_overwriting,
     stored_study,
     study_for,
-    write_beside,
 )
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
@@ -70,7 +67,6 @@ class SweepAnswer(Answer):
     study: Study
     metric: str
     store: Path | None
-    exports: Sequence[Path]
     edges: MapEdges | None
 
     @property
@@ -156,10 +152,9 @@ class SweepAnswer(Answer):
         return {**image_files(figure, "map"), "map.html": self.page().html()}
 
     def files_beside(self) -> Mapping[Path, Content]:
-        """Return the figure and the page beside the store, and the exports."""
+        """Return the figure and the page beside the store."""
         views = {} if self.store is None else self.files()
-        beside = {path_beside(self.store, name.removeprefix("map.")): views[name] for name in views if self.store}
-        return {**beside, **export_files(self.result, [*self.exports])}
+        return {path_beside(self.store, name.removeprefix("map.")): views[name] for name in views if self.store}
 
 
 @question
@@ -171,16 +166,12 @@ def sweep(
     x: AxisPoints | None = None,
     y: AxisPoints | None = None,
     axis: Iterable[AxisPoints] = (),
-    link: Links = None,
-    latin: bool = False,
-    log: bool = False,
     set: Changes = None,
     metric: MetricName | None = None,
     confirm: bool = False,
     rtol: Tolerance | None = None,
     workers: int | None = None,
     scheduler: Address | None = None,
-    export: Iterable[str | os.PathLike[str]] = (),
     out: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     yes: bool = False,
@@ -207,8 +198,6 @@ def sweep(
         Vertical axis.
     axis : list of str, optional
         A further axis; may be repeated.
-    latin : bool
-        Make the samples a Latin hypercube.
     metric : str, optional
         Quantity shown in colour, of the stage or of each run; default: sketch, whether the stage hunts by coarse return
         maps.
@@ -221,17 +210,15 @@ def sweep(
     scheduler : str, optional
         Address of a Dask scheduler to run on. Anyone who can reach the address can run code there and here; tls://,
         with the certificates of the configuration of Dask, keeps others out.
-    export : list of paths, optional
-        Files ending in .nc or .csv that are written as well.
     out : path, optional
         Folder of the results, a Zarr store, resumed if it exists; of a store: folder of its figure and page.
     overwrite : bool
-        Replace the store of another study, and figures and exports of the same name.
+        Replace the store of another study, and figures of the same name.
     yes : bool
         Confirm a study of more than ten million cells.
     beside : bool
-        Whether the caller writes figure, page and exports (``answer.files_beside()``): that they can be is made sure
-        before anything is run. Default: exports are written, all of them or none.
+        Whether the caller writes figure and page (``answer.files_beside()``): that they can be is made sure before
+        anything is run.
 
     Returns
     -------
@@ -242,7 +229,7 @@ def sweep(
     Raises
     ------
     InputError
-        For a stage, an axis, a link, a store or an option that is not usable.
+        For a stage, an axis, a store or an option that is not usable.
 
     Examples
     --------
@@ -251,10 +238,9 @@ def sweep(
     >>> runs.sizes["joint.stroke"]
     3
     """
-    exports = _checked_exports(export)
     if confirm and metric not in (None, "sketch", "verdict"):
         raise InputError("confirm", f"--confirm and --metric {metric}", "one of the two: it searches for verdicts", "")
-    varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
+    varied = Varied.of_texts(axes or {}, x, y, axis, samples)
     store = None if out is None else place_of_store(out)
     if scheduler is not None:
         need("cluster", "scheduler")
@@ -277,13 +263,11 @@ def sweep(
             study = study if store is None else as_stored(study, store, metric, overwrite)
         speak_of(study.stage.axis_kind)
         if store is None:
-            for path in exports:
-                check_file("export", path, overwrite)
             inputs.mention_unstable_loop(study.stage)
             runs = run_in_memory([study], crew, progress)[0]
         else:
             example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
-            refuse_overwriting(study, store, exports, overwrite, example if beside else "")
+            refuse_overwriting(study, store, overwrite, example if beside else "")
             inputs.mention_unstable_loop(study.stage)
             runs = _filled(study, store, crew, overwrite, metric, progress)
         held = in_memory(runs) if store is not None and study.cells <= CONFIRMED_FROM else runs
@@ -292,17 +276,12 @@ def sweep(
 
         shown = coloured_by(study, metric)
         edges = fine_edges(study, held, shown, own_values(held), crew, progress)
-    if store is None:
-        write(export_files(held, exports), overwrite)
-    elif exports and not beside:
-        write_beside(export_files(held, exports), overwrite, progress)
     return SweepAnswer(
         held,
         stage=study.stage,
         study=study,
         metric=shown,
         store=store,
-        exports=tuple(exports),
         edges=edges,
     )
 
@@ -373,15 +352,3 @@ def _filled(study: Study, store: Path, crew: Crew, overwrite: bool, metric: str,
         if store.exists():
             LOGGER.warning(f"{far}; to resume: {resumed}")
         raise
-
-
-def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
-    """Return the paths of exports. Raises InputError for a path that cannot be written."""
-    files = [Path(os.path.realpath(path) if os.path.islink(path) else path) for path in export]  # a link stays a link
-    for path in files:
-        refuse_place("export", path)
-        if path.suffix not in (".nc", ".csv") or path.is_dir():
-            raise inputs.wrong("export", str(path), "a file that ends in .nc or .csv", "map.nc")
-        if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
-            raise inputs.wrong("export", str(path), "a file in an existing folder that can be written", "map.nc")
-    return files

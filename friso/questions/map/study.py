@@ -9,14 +9,13 @@ import os
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.errors import InputError, StoreError
-from friso.interface.inputs import Changes, axes_of, pairs_of, wrong
+from friso.interface.inputs import axes_of, wrong
 from friso.interface.output_folder import check_file, check_store_folder, refuse_place, write
 from friso.platform.system import shell_word
 from friso.progress import Progress
@@ -28,8 +27,6 @@ from friso.studies.metric import METRICS, metrics, with_usual
 from friso.studies.study import Request, Study, study_of
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from friso.shown.files import Content
 
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
@@ -43,13 +40,10 @@ BYTES_PER_NUMBER = 8
 
 @dataclass(frozen=True)
 class Varied:
-    """What the user asked to vary: axes, links between keys, and how to sample them."""
+    """What the user asked to vary: axes, and how to sample them."""
 
     axes: Mapping[str, AxisValues] = field(default_factory=dict)
-    links: Mapping[str, str] = field(default_factory=dict)
     samples: int | Samples | None = None
-    latin: bool = False
-    log: bool = False
 
     @classmethod
     def of_texts(
@@ -58,20 +52,14 @@ class Varied:
         x: str | None,
         y: str | None,
         more: Iterable[str],
-        link: Changes,
-        samples: int | Samples | None,
-        latin: bool,
-        log: bool,
+        samples: int | Samples | None = None,
     ) -> Varied:
         """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
 
-        The texts are `x`, `y` and those in `more`. `latin` and `log` say how keys are sampled and spaced. Raises
-        InputError for an axis or a link that is not usable.
+        The texts are `x`, `y` and those in `more`. Raises InputError for an axis that is not usable.
         """
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
-        return cls(
-            axes_of(axes, named, AXIS_EXAMPLE), pairs_of(link, "link", 'masses.cart="0.7 * mass"'), samples, latin, log
-        )
+        return cls(axes_of(axes, named, AXIS_EXAMPLE), samples)
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, most: int | None, crew: Crew) -> Study:
@@ -79,7 +67,7 @@ def study_for(stage: Stage, varied: Varied, metric: str, most: int | None, crew:
 
     Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its cost.
     """
-    axes, links, samples = varied.axes, varied.links, varied.samples
+    axes, samples = varied.axes, varied.samples
     if not axes and samples is None:
         axes = USUAL_AXES
     if not axes and not isinstance(samples, Samples):
@@ -87,11 +75,9 @@ def study_for(stage: Stage, varied: Varied, metric: str, most: int | None, crew:
     if isinstance(samples, int):
         if len(axes) == 1:
             raise InputError("samples", "samples of one key", "two keys or more; for one, a range with its points")
-        axes, samples = {}, Samples(axes, samples, "latin" if varied.latin else "sobol")
-    elif varied.latin:
-        raise InputError("latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
+        axes, samples = {}, Samples(axes, samples)
     METRICS.checked(metric, "metric", "metric={}")
-    request = Request(stage, axes, samples, links, varied.log)
+    request = Request(stage, axes, samples)
     if most is not None and (runs := request.size()) > most:
         raise _too_large(runs, request.trial(), crew)
     return request.study(with_usual(metric))
@@ -182,14 +168,7 @@ def place_of_store(folder: str | os.PathLike[str]) -> Path:
     return path
 
 
-def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
-    """Return the study as NetCDF or CSV, by the suffix of each path."""
-    from friso.studies.store import export
-
-    return dict.fromkeys(paths, partial(export, runs))
-
-
-def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
+def refuse_overwriting(study: Study, store: Path, overwrite: bool, beside: str = "") -> None:
     """Refuse to write over the store of another study, and over files.
 
     If figure and page are written beside the store, `beside` is the example in a refusal. Raises InputError for files
@@ -198,19 +177,15 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
     from friso.studies.store import refuse_other
     from friso.studies.store_files import is_store
 
-    if store in exports:
-        raise wrong("export", f"{store}, which is the store", "another name", "map.nc")
     check_store_folder(store)
     if not overwrite and is_store(store):
         refuse_other(store, study)
     for view in _views(store) if beside else ():
         check_file("--out", view, overwrite, [store], example=beside)
-    for path in exports:
-        check_file("--export", path, overwrite, [store])
 
 
 def write_beside(files: Mapping[Path, Content], overwrite: bool, progress: Progress) -> list[Path]:
-    """Write figure, page and exports of a store, and return their paths.
+    """Write figure and page of a store, and return their paths.
 
     Files that are there are replaced only with `overwrite`. Raises OSError if a file cannot be written.
     """

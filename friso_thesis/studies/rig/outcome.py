@@ -301,4 +301,4 @@ def loop(log: RigLog) -> FrequencyResponse:
     """Estimate the open loop from one log: the controller's force over the total, sign reversed."""
     injected, commanded = log.logged["disturbance"], log.logged["force"]
     record = ResponseRecord(commanded, injected - commanded, log.interval, injected)
-    return multisine([record], None, Channels("error", "1", "loop", "1"))
+    return multisine([record], Channels("error", "1", "loop", "1"))
