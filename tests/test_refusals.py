@@ -86,7 +86,10 @@ def change(row: Row, folder: Path) -> None:
 
 def log(row: Row, folder: Path) -> None:
     """Read a log to identify from it."""
-    friso.identify(written({"file": "log.csv", **row}, folder), folder=folder, **row.get("options", {}))
+    path = written({"file": "log.csv", **row}, folder)
+    if "kept" in row:
+        (folder / "log.csv.friso.toml").write_text(text_of(row["kept"]), row.get("encoding", "utf-8"))
+    friso.identify(path, folder=folder, **row.get("options", {}))
 
 
 def drive(row: Row, folder: Path) -> None:
@@ -154,5 +157,5 @@ def test_what_is_wrong_is_refused(row: Row, tmp_path: Path, monkeypatch: pytest.
     assert all(part in error.actual for part in told(row, "given")), error.actual
     assert all(part in str(error) for part in told(row, "words")), str(error)
     files = {path.name for path in tmp_path.iterdir()}
-    assert files <= {row.get("file", "given.toml"), "log.csv"}, files
+    assert files <= {row.get("file", "given.toml"), "log.csv", "log.csv.friso.toml"}, files
     assert not files or error.origin.startswith(str(tmp_path)) or error.key in row.get("options", ())

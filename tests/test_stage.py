@@ -12,7 +12,7 @@ from refusals import refused
 from systems import posix
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
-from friso.errors import InputError, StageError
+from friso.errors import InputError
 from friso.interface.inputs import stage_of
 from friso.platform import paths
 from friso.quantities import Quantity, Value, any_sign, positive
@@ -55,13 +55,6 @@ def test_thesis_rig_in_si(rig: Stage) -> None:
     }
     assert rig.flat() == {f"{table}.{key}": value for table, keys in numbers.items() for key, value in keys.items()}
     assert {type(value) for value in rig.flat().values()} == {float, bool, str}
-
-
-def test_a_key_set_in_a_table_that_the_stage_has_not_is_named_itself() -> None:
-    with pytest.raises(StageError) as refused:
-        loads(RIGID).replace({"joint.locked": True})
-    assert refused.value.key == "joint.locked"
-    assert "joint.limiter_stiffness" in refused.value.expected
 
 
 def test_defaults_of_a_rigid_mass_without_friction() -> None:
