@@ -1,6 +1,5 @@
 """Sweeps: axes and links read, cells against runs alone, structures mixed in one sweep, cells no stage may have."""
 
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +30,7 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
     runs = sweep(rig, axes, metrics=[*usual_metrics(), "verdict"], rtol=1e-6)
     assert runs.peaks.dims == ("joint.locked", "controller.crossover")
     assert runs["controller.crossover"].attrs["units"] == "Hz"
-    for locked, crossover in product((True, False), (4.0, 8.0, 20.0)):
+    for locked, crossover in ((True, 8.0), (False, 4.0), (True, 20.0)):
         cell = runs.sel({"joint.locked": locked, "controller.crossover": crossover})
         alone = rig.replace({"joint.locked": locked, "controller.crossover": f"{crossover} Hz"})
         case = friso.check(alone, rtol=1e-6)["given"]
