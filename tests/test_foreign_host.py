@@ -130,46 +130,6 @@ def test_what_windows_alone_refuses_or_calls_otherwise(axis: Path) -> None:
     assert process.returncode == 0, err
 
 
-STORES = """
-import shutil, sys
-from pathlib import Path
-import friso
-from friso.studies.study import Request
-from friso.studies.store import Store, read_store
-
-def opened(text, **options):
-    study = Request(stage, {"controller.crossover": text}).study()
-    with Store.opened(store, study, **options) as other:
-        return len(other.read()["controller.crossover"])
-
-if __name__ == "__main__":
-    stage, store = friso.load("axis.toml"), Path("a.zarr")
-    store.mkdir()
-    assert opened("10 Hz, 20 Hz") == 2
-    shutil.copytree(store, f".a.zarr.{'a' * 32}/store")  # a killed process left this
-    assert opened("1 Hz, 2 Hz, 3 Hz", overwrite=True) == 3
-    store.rename(f".a.zarr.{'b' * 32}.old")  # one was killed while it replaced the store
-    assert opened("1 Hz, 2 Hz, 3 Hz") == 3
-    with Store.opened(store, Request(stage, {"controller.crossover": "1 Hz, 2 Hz, 3 Hz"}).study()):
-        try:
-            opened("10 Hz, 20 Hz", overwrite=True)
-        except friso.StoreError as error:
-            assert "another friso" in str(error), error
-        else:
-            raise AssertionError("replaced while it was in use")
-"""
-
-
-@pytest.mark.thorough
-def test_a_store_is_made_in_an_empty_folder_replaced_and_put_back(axis: Path) -> None:
-    """The lock of a store is a file in it, and Windows renames and deletes no folder with a file that is open."""
-    (axis / "stores.py").write_text(STORES)
-    with started("win32", axis, command=("stores.py",)) as process:
-        _, err = process.communicate()
-    assert process.returncode == 0, err
-    assert {path.name for path in axis.iterdir()} == {"axis.toml", "stores.py", "a.zarr"}
-
-
 WORDS = r"""
 import errno, os, shutil
 from pathlib import Path
