@@ -7,10 +7,9 @@ import pickle
 import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
-import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +32,7 @@ from friso.studies.checked_store import CheckedStore
 from friso.studies.execute import local_crew
 from friso.studies.settings import StudySettings
 from friso.studies.store import Store, _sum_at, own_at, read_store
-from friso.studies.store_files import LOCK, make
+from friso.studies.store_files import LOCK
 from friso.studies.study import Request, Study, study_of
 from friso.studies.sweep import run_in_store, sweep
 
@@ -189,17 +188,6 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, first: 
     assert before == sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
 
 
-def test_chunks_that_a_power_cut_took_are_run_again(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
-    path = tmp_path / "a.zarr"
-    sweep(rig, AXES, store=path)
-    chunks = [sorted((path / name).glob("c.*")) for name in ("peaks", "outcome")]
-    chunks[0][1].unlink()
-    chunks[1][3].write_bytes(b"")
-    with Store.opened(path, study_on(rig)) as store:
-        assert len(list(store.missing())) == 2
-    same(sweep(rig, AXES, store=path), whole)
-
-
 def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("friso.studies.study.code_digest", lambda *folders: "another digest")
     with Store.opened(tmp_path / "a.zarr", study_on(rig)):
@@ -325,21 +313,64 @@ def unfinished(path: Path) -> list[str]:
     return [store._number(block) for block in store.missing()]
 
 
-@pytest.mark.parametrize(("name", "place"), [("peaks", 0.2), ("period", 0.6), ("status", 0.99), ("outcome", 0.6)])
-def test_a_damaged_block_is_run_again(
-    stored: Path, finished: Path, rig: Stage, name: str, place: float, caplog: pytest.LogCaptureFixture
+def exchange(first: Path, second: Path) -> None:
+    """Give two files each other's names."""
+    spare = first.with_name("spare")
+    first.rename(spare)
+    second.rename(first)
+    spare.rename(second)
+
+
+def file_of(store: Path, name: object, number: str) -> Path:
+    """Return the chunk of a variable in a block, or the block's record (".friso")."""
+    return store / str(name) / (number if name == ".friso" else f"c.{number}")
+
+
+def exchanged(*names: str) -> Callable[[Path], object]:
+    """Exchange intact chunks of two blocks, of some variables or of all that there are."""
+
+    def damage(store: Path) -> None:
+        for name in names or [*read_store(store).data_vars, ".friso"]:
+            exchange(file_of(store, name, "0.0"), file_of(store, name, "1.0"))
+
+    return damage
+
+
+def emptied(store: Path) -> None:
+    """As a power cut may leave files."""
+    (store / "peaks" / "c.0.0").unlink()
+    (store / "outcome" / "c.1.0").write_bytes(b"")
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
+    "numbers": (lambda store: flip(store / "peaks" / "c.1.0", 0.2), ["1.0"]),
+    "not numbers": (lambda store: flip(store / "period" / "c.1.0", 0.6), ["1.0"]),
+    "texts": (lambda store: flip(store / "status" / "c.1.0", 0.99), ["1.0"]),
+    "emptied": (emptied, ["0.0", "1.0"]),
+    "numbers exchanged": (exchanged("peaks"), ["0.0", "1.0"]),
+    "texts exchanged": (exchanged("outcome"), ["0.0", "1.0"]),
+    "numbers exchanged with their record": (exchanged("peaks", ".friso"), ["0.0", "1.0"]),
+    "blocks exchanged": (exchanged(), ["0.0", "1.0"]),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damaged_blocks_are_run_again(
+    stored: Path, finished: Path, rig: Stage, name: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Results of a block with a flipped bit are never used, by friso or by other programs."""
+    """Results of a block with a flipped bit, or of other cells, are never used, by friso or by other programs."""
+    damage, numbers = DAMAGES[name]
     assert unfinished(stored) == []
-    flip(stored / name / "c.1.0", place)
-    with pytest.raises(StoreError, match=rf"{name}/c\.1\.0"):
-        read_store(stored)[name].load()
-    with pytest.raises(ValueError, match="checksum"):
-        xr.open_zarr(stored)[name].load()
-    with Store.opened(stored, study_on(rig)) as store:
-        assert len(list(store.missing())) == 1
-    assert "block 1.0" in caplog.text
+    damage(stored)
+    assert unfinished(stored) == numbers
+    if name in ("numbers", "not numbers", "texts"):
+        variable = {"numbers": "peaks", "not numbers": "period", "texts": "status"}[name]
+        with pytest.raises(StoreError, match=rf"{variable}/c\.1\.0"):
+            read_store(stored)[variable].load()
+        with pytest.raises(ValueError, match="checksum"):
+            xr.open_zarr(stored)[variable].load()
     sweep(rig, AXES, store=stored)
+    assert name == "emptied" or f"block {numbers[0]}" in caplog.text
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
 
@@ -578,32 +609,6 @@ def test_leftovers_of_a_killed_run_are_removed(rig: Stage, tmp_path: Path) -> No
         assert being_made.exists()
 
 
-def exchange(first: Path, second: Path) -> None:
-    """Give two files each other's names."""
-    spare = first.with_name("spare")
-    first.rename(spare)
-    second.rename(first)
-    spare.rename(second)
-
-
-def file_of(store: Path, name: object, number: str) -> Path:
-    """Return the chunk of a variable in a block, or the block's record (".friso")."""
-    return store / str(name) / (number if name == ".friso" else f"c.{number}")
-
-
-@pytest.mark.parametrize("names", [["peaks"], ["outcome"], ["peaks", ".friso"], None])
-def test_exchanged_chunks_are_run_again(
-    stored: Path, finished: Path, rig: Stage, names: list[str] | None, caplog: pytest.LogCaptureFixture
-) -> None:
-    """The chunks are intact, but belong to other cells, even if all that belongs to the cells is exchanged (None)."""
-    for name in names or [*read_store(stored).data_vars, ".friso"]:
-        exchange(file_of(stored, name, "0.0"), file_of(stored, name, "1.0"))
-    assert unfinished(stored) == ["0.0", "1.0"]
-    sweep(rig, AXES, store=stored)
-    assert "block 0.0" in caplog.text
-    xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
-
-
 @pytest.mark.parametrize("damage", ["exchanged", "missing", "foreign", "record", "unreadable"])
 def test_damaged_cells_are_not_handed_out(stored: Path, damage: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The error names the chunk; the others are read."""
@@ -692,19 +697,6 @@ def test_a_store_stays_where_the_one_in_its_place_cannot_be_made(
         pass
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
     assert [path.name for path in stored.parent.iterdir()] == ["a.zarr"]
-
-
-def test_ctrl_c_while_a_store_is_made_leaves_nothing(tmp_path: Path) -> None:
-    def slow(folder: Path) -> None:
-        folder.mkdir()
-        signal.raise_signal(signal.SIGINT)
-        for number in range(20):
-            time.sleep(0.01)
-            (folder / str(number)).write_text("")
-
-    with pytest.raises(KeyboardInterrupt):
-        make(tmp_path / "a.zarr", slow)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_where_what_attracts_is_surveyed_blocks_are_small(rig: Stage, tmp_path: Path) -> None:
