@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from patience import grows_with_the_square
 
 import friso
 from friso.drives.format import FORMATS
@@ -321,6 +322,34 @@ def test_no_damage_to_a_file_raises_anything_but_one_message(
     path.write_text(text[:first] + data.draw(strange) + text[first + size :], "utf-8")
     with suppress(InputError):
         stage_from(path, None, ANSWERS[kind])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [*TEXTS, "stage"])
+@pytest.mark.parametrize("filler", [" ", "\t", '"', "1", "a.", "a(", "[", "=", "<a ", "/", "_"])
+def test_a_long_text_is_read_or_refused_in_a_time_like_its_length(tmp_path: Path, kind: str, filler: str) -> None:
+    """In a line of its own, before and behind a value, and in a comment."""
+    text = TEXTS[kind] if kind != "stage" else friso.example("lugre_stick_slip").read_text("utf-8")
+    place = text.index("=" if "=" in text else ":" if ":" in text else " ", len(text) // 3) + 1
+    path = tmp_path / "file.txt"
+
+    def read(length: int) -> None:
+        long = filler * length
+        for changed in (
+            f"{text}\n{long}\n",
+            f"{long}{text}",
+            f"{text[:place]}{long}{text[place:]}",
+            f"{text[:place]} 1{long}!{text[place:]}",
+            f"# {long} x\n{text}",
+        ):
+            with suppress(InputError):
+                if kind == "stage":
+                    friso.loads(changed)
+                else:
+                    path.write_text(changed, "utf-8")
+                    stage_from(path, None, ANSWERS[kind])
+
+    assert not grows_with_the_square(read, 10_000)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1", "nobody-knows"])
