@@ -28,7 +28,6 @@ from target_stages import CONTROLLERS, EXAMPLES, MACHINES, stage_of
 
 import friso
 from friso.drives.program import Program
-from friso.drives.settings import TargetSettings
 from friso.drives.target import TARGETS, CodeTarget, Parcel
 from friso.drives.targets.difference import biquads
 from friso.errors import InputError
@@ -162,16 +161,6 @@ def test_every_kind_of_stage_leaves_friso() -> None:
             assert off <= parcel.tolerance, name
             count += all(TARGETS[target].files(parcel) for target in TARGETS)
     assert count > 40
-
-
-def test_another_parser_reads_the_structured_text(tmp_path: Path) -> None:
-    """The parser blark, which knows TwinCAT's words, reads function block and program."""
-    parse = pytest.importorskip("blark.parse", reason="blark, a parser of structured text, is not installed")
-    parcel = parcel_of("cascade", "rigid_lugre")
-    with TargetSettings(text_samples=5).in_use():
-        folder = written(tmp_path / "st", "st", parcel)
-    for name in ("FB_axis.st", "FB_axis.TcPOU", "PRG_axis_test.st", "PRG_axis_test.TcPOU"):
-        assert [part.exception for part in parse.parse(folder / name) if part.exception] == []
 
 
 @pytest.mark.parametrize("control", CONTROLLERS)
