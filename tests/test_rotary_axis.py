@@ -2,7 +2,6 @@
 
 import json
 import re
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from inside import friso_inside
-from refusals import refused
 
 import friso
 from friso.axis import LINEAR, ROTARY, AxisKind, speak_of, unit_shown
-from friso.design_method.prepare import outline
-from friso.errors import InputError, StageError
 from friso.intervals import UncertainValue
 from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage, numeric_keys
@@ -87,29 +83,6 @@ def test_the_numbers_are_those_of_a_linear_axis_in_other_units(pair: tuple[Stage
     changed = turntable.replace(changes)
     assert [changed.flat()[key] for key in changes] == pytest.approx([3.0, np.radians(0.1), 1e5, 1.2])
     assert isinstance(changed.friction.static, UncertainValue)  # type: ignore[union-attr]
-
-
-@pytest.mark.parametrize("entry", ["3 N", "3 N/rad", "3 rad", "3 kg*m^2"])
-def test_a_force_is_no_torque(pair: tuple[Stage, Stage], entry: str) -> None:
-    with refused("friction.static") as caught:
-        pair[1].replace({"friction.static": entry})
-    message = str(caught.value)
-    assert "N*m" in message
-    assert '[axis] kind = "rotary"' in message
-    assert "also" not in message
-
-
-def test_a_torque_is_no_force_and_leaf_springs_guide_along_a_line(pair: tuple[Stage, Stage]) -> None:
-    """The design refuses an axis that turns with a specification and without; no specification is written."""
-    with pytest.raises(StageError, match=r'it would be of a rotary axis, \[axis\] kind = "rotary"'):
-        pair[0].replace({"friction.static": "3 N*m"})
-    with refused("axis.kind"):
-        pair[0].replace({"axis.kind": "round"})
-    with pytest.raises(StageError, match="leaf springs on an axis"):
-        rotary(friso.load(EXAMPLES / "thesis_leaves.toml"))
-    for asks in (friso.design, outline, partial(friso.design, spec=EXAMPLES / "specs" / "thesis.toml")):
-        with pytest.raises(InputError, match="leaf springs guide along a line"):
-            asks(pair[1])
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,6 @@ from systems import posix
 import friso as friso_api
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
-from friso.studies.axes import Samples
 from friso.studies.checked_store import CheckedStore
 from friso.studies.execute import local_crew
 from friso.studies.settings import StudySettings
@@ -172,8 +171,14 @@ LISTS = {"joint.stroke": ["0.1 mm", "1 mm"], "controller.alpha": [0.1, 0.2]}
         ({}, {"metrics": ["peaks"]}),
         ({}, {"links": {"friction.static": "3 * friction.coulomb"}}),
         # sampled keys of equal values, fewer keys, or links in another order
-        ({"samples": Samples(SAMPLES, 8)}, {"samples": Samples({"masses.cart": "0.5 kg..1 kg"}, 8)}),
-        ({"samples": Samples(LISTS)}, {"samples": Samples({"joint.stroke": LISTS["joint.stroke"]})}),
+        (
+            {"samples": friso_api.Samples(SAMPLES, 8)},
+            {"samples": friso_api.Samples({"masses.cart": "0.5 kg..1 kg"}, 8)},
+        ),
+        (
+            {"samples": friso_api.Samples(LISTS)},
+            {"samples": friso_api.Samples({"joint.stroke": LISTS["joint.stroke"]})},
+        ),
         ({"axes": AXES, "links": FOLLOW}, {"axes": AXES, "links": dict(reversed(FOLLOW.items()))}),
     ],
 )
@@ -706,7 +711,7 @@ def test_where_what_attracts_is_surveyed_blocks_are_small(rig: Stage, tmp_path: 
 
 
 def test_a_store_of_samples_has_their_values_as_coordinates(rig: Stage, tmp_path: Path) -> None:
-    samples = Samples({"controller.crossover": "4 Hz..12 Hz", "joint.stroke": "0.1 mm..1 mm"}, 4)
+    samples = friso_api.Samples({"controller.crossover": "4 Hz..12 Hz", "joint.stroke": "0.1 mm..1 mm"}, 4)
     stored = sweep(rig, {}, samples, store=tmp_path / "a.zarr")
     assert {"controller.crossover", "joint.stroke"} <= set(stored.coords)
     same(stored, sweep(rig, {}, samples))
