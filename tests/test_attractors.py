@@ -90,10 +90,10 @@ DAMPED = VARIANTS["rigid"].replace({"controller.alpha": 0.4, "controller.crossov
 """With much phase lead the symmetric cycle attracts, and creeps through its reversals."""
 
 HUNTING = {  # stage, jump that hunts [m], amplitude [m], period [s]
-    "long wait": (LONG_WAIT, 16.6e-3, 22.3e-3, 56.6),
-    "creeping": (CREEPING, 1.1043e-3, 0.876e-3, 2.13),
-    "light": (LIGHT, 0.2, 16.5e-3, 0.786),
     "damped": (DAMPED, 4e-3, 0.386e-3, 0.476),
+    "light": (LIGHT, 0.2, 16.5e-3, 0.786),
+    "creeping": (CREEPING, 1.1043e-3, 0.876e-3, 2.13),
+    "long wait": (LONG_WAIT, 16.6e-3, 22.3e-3, 56.6),
 }
 
 
@@ -106,6 +106,7 @@ def attractors_of(name: str) -> Attractors:
     return attractors(held(HUNTING[name][0]), thorough=True)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("name", HUNTING)
 def test_what_attracts_beside_cycles_that_repel(name: str) -> None:
     """Amplitudes and periods agree to 1 % with simulations at two tolerances (see the next test)."""
@@ -116,6 +117,7 @@ def test_what_attracts_beside_cycles_that_repel(name: str) -> None:
     assert attractors_of(name).decided.all()
 
 
+@pytest.mark.cases(first=6)
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])
 @pytest.mark.parametrize("name", HUNTING)
 def test_jumps_swing_on(name: str, rtol: float) -> None:
@@ -127,6 +129,7 @@ def test_jumps_swing_on(name: str, rtol: float) -> None:
     assert np.ptp(late.to_numpy()) / 2 == pytest.approx(amplitude, rel=0.02)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("name", HUNTING)
 def test_many_stages_at_once_tell_the_same(name: str) -> None:
     """A survey of many stages, which begins from fewer states, finds the attractors as well."""
@@ -137,6 +140,7 @@ def test_many_stages_at_once_tell_the_same(name: str) -> None:
     assert attracted.target.amplitude == pytest.approx([amplitude, amplitude], rel=0.02)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(("crossover", "hunts"), [("13.35 Hz", True), ("13.6 Hz", False)])
 def test_a_basin_narrower_than_starts_are_apart(crossover: str, hunts: bool) -> None:
     """Near its fold at 13.47 Hz a cycle attracts from 1 % less to 3 % more than its distance alone: simulated for 6000
@@ -147,6 +151,7 @@ def test_a_basin_narrower_than_starts_are_apart(crossover: str, hunts: bool) -> 
     assert (survey.attracts.tolist(), survey.decided.tolist()) == ([hunts], [True])
 
 
+@pytest.mark.slow
 def test_irregular_swings_are_tried_again_from_where_they_were_seen() -> None:
     """Irregular swings continue at 1e-6 and 1e-9, and in SciPy (0.8303 mm).
 
@@ -172,6 +177,7 @@ def test_irregular_swings_are_tried_again_from_where_they_were_seen() -> None:
     assert (survey.decided.tolist(), survey.flips.tolist()) == ([True], [False])
 
 
+@pytest.mark.slow
 def test_a_stage_that_settles_from_everywhere() -> None:
     """Above its edge at 9.77 Hz the rigid mass has a cycle that repels; nothing attracts."""
     above = attractors(held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"})), thorough=True)
@@ -189,6 +195,7 @@ def test_the_period_of_a_doubled_orbit_is_told_by_its_swings() -> None:
         assert motion.period == pytest.approx(4.144, rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_orbit_that_attracts_to_the_end_of_the_range_has_no_end_in_it() -> None:
     """The rigid mass hunts to 1.63 times 6 Hz; a search to 1.2 times has to say so, one to 10 times ends beyond it."""
     flat = VARIANTS["rigid"].replace({"controller.crossover": "6 Hz"}).flat()
@@ -203,7 +210,8 @@ def test_an_orbit_that_attracts_to_the_end_of_the_range_has_no_end_in_it() -> No
     assert end.certain
 
 
-@pytest.mark.parametrize("crossover", [11.279, 12.3332, 12.9, 13.1, 14.1995])
+@pytest.mark.cases(slow=2)
+@pytest.mark.parametrize("crossover", [11.279, 12.9, 12.3332, 13.1, 14.1995])
 def test_the_edge_is_that_of_the_last_attractor(crossover: float) -> None:
     """Beyond its flip at 11.97 Hz the creeping stage has asymmetric cycles, of one period and of many, up to 12.95 Hz,
     where the symmetric one attracts again, until it folds: by brute force between 13.026 and 13.029 Hz."""
@@ -215,6 +223,7 @@ def test_the_edge_is_that_of_the_last_attractor(crossover: float) -> None:
     assert edge.crossover * (1 + edge.reserve) > 13.026
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])
 def test_the_creeping_stage_just_below_and_above_its_edge(rtol: float) -> None:
     """Stuck at about 0.77 mm it keeps swinging at 13.026 Hz, and comes to rest at 13.029 Hz."""
@@ -226,6 +235,7 @@ def test_the_creeping_stage_just_below_and_above_its_edge(rtol: float) -> None:
         assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
 
 
+@pytest.mark.slow
 def test_many_stages_at_once_are_judged_alike_where_basins_are_narrow() -> None:
     """From 12.95 Hz on, the creeping stage's symmetric cycle attracts from less than 0.25 % about its distance."""
     flat, crossovers = CREEPING.flat(), np.array([12.6553, 12.9, 12.955, 12.98, 13.02, 13.04])
@@ -320,6 +330,7 @@ LOSING = Stage(
 (`benchmarks.truth --seed 1301 --number 3`)."""
 
 
+@pytest.mark.slow
 def test_an_orbit_that_is_lost_while_it_attracts_well_ends_about_there() -> None:
     outward = EdgeSearch(bandwidth_path(LOSING.flat(), True), 10.0)
     motions = what_attracts(outward.path.stages(np.array([1.3]))).motions
@@ -384,6 +395,7 @@ WINDOWED = Stage(
 brute force at 1e-9 (`benchmarks.laws --law rolling --seed 27`, number 91)."""
 
 
+@pytest.mark.thorough
 def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -> None:
     """The edge lies beyond it."""
     outward = EdgeSearch(bandwidth_path(WINDOWED.flat(), True), 10.0)
@@ -392,6 +404,7 @@ def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -
     assert 3 * end.outside > 3.35
 
 
+@pytest.mark.slow
 def test_no_window_is_looked_for_beyond_the_range_or_a_stage_that_settles() -> None:
     """A stage in the gap below the window was said to be contradicted by an orbit that is followed to it."""
     end = EdgeSearch(bandwidth_path(WINDOWED.flat(), True), 10.0, 3.06 / 3).end(
@@ -461,6 +474,7 @@ def test_every_window_in_which_a_stage_hunts_is_searched() -> None:
         assert crossover * again.inside == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])
 def test_what_back_calculation_does_at_38_and_at_40_hz(rtol: float) -> None:
     """Released from 0.1 mm to 1 m it rests after 200 s at 38 Hz; at 40 Hz some of these swing on."""
@@ -472,6 +486,7 @@ def test_what_back_calculation_does_at_38_and_at_40_hz(rtol: float) -> None:
         assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
 
 
+@pytest.mark.slow
 def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulations at a hundredth of the tolerance decide where no orbit was closed: here they are made to fail to see
     what the others do, by beginning at rest."""
@@ -483,6 +498,7 @@ def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.Mon
     assert not attracted.motions
 
 
+@pytest.mark.slow
 def test_runs_that_are_given_up_leave_it_unknown() -> None:
     """Just above its edge many runs of the rigid mass still swing after two rounds, each in its own way. Of a stage of
     which one alone is followed on, and that settles, nothing is known."""
@@ -494,6 +510,7 @@ def test_runs_that_are_given_up_leave_it_unknown() -> None:
         assert not attractors(above).decided.any()
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("thorough", [False, True])
 def test_a_survey_out_of_steps_knows_nothing(thorough: bool) -> None:
     """Just above its edge the rigid mass settles from everywhere, and takes more steps than these to show it."""
@@ -517,6 +534,7 @@ def with_little_gap(static: str) -> Stage:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_swing_of_ten_minutes_is_seen() -> None:
     """With static friction 0.5 % above Coulomb friction the stage waits five minutes at 2 mm, and keeps swinging."""
@@ -527,6 +545,7 @@ def test_a_swing_of_ten_minutes_is_seen() -> None:
     assert judgement.cycle.period == pytest.approx(572, rel=0.01)
 
 
+@pytest.mark.slow
 def test_swings_that_are_smaller_than_is_looked_for_leave_a_doubt() -> None:
     """With 0.05 %, swings of an hour could exist unresolved: the motion is followed for many of them."""
     judgement = friso.check(with_little_gap("401.2 N"))["given"].judgement
@@ -549,6 +568,7 @@ SMALL_SWINGS = {  # static and Coulomb friction, Stribeck velocity, exponent, cr
 }
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("thorough", [True, False])
 @pytest.mark.parametrize("name", SMALL_SWINGS)
 def test_swings_of_half_a_percent_of_the_deflection(name: str, thorough: bool) -> None:
@@ -619,6 +639,7 @@ SOFT_ELEMENT = VARIANTS["rigid"].replace(
 """Its softest element yields by 3.1 mm, more than the stage swings, and never slips then."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("crossover", "amplitude"), [("12 Hz", 0.8907e-3), ("10 Hz", 1.2043e-3)])
 def test_of_several_bristles_some_remember_how_a_stage_came_to_stick(crossover: str, amplitude: float) -> None:
     """No start with relaxed bristles leads to this swing: the stage was said to settle, for certain.
@@ -667,6 +688,7 @@ def test_a_run_tells_by_which_fraction_its_swings_approach_a_repetition(slope: f
         assert _slope(repeats, 2.0 * swings) == pytest.approx(expected, rel=1e-6, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_at_rest() -> None:
     """A survey of many stages stops at one motion that attracts: there may be smaller ones."""
     flat = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz"}).flat()
@@ -728,6 +750,7 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
         assert judge_runs(flat, moving, StageAttractors.of(survey, survey.decided), 1e-6).tolist() == ["undecided"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sure() -> None:
     """The thesis's friction and speeds a hundredth as large: hunts by 5.2 um, of which this survey knows nothing."""
@@ -782,6 +805,7 @@ def asymmetric_stage() -> Stage:
     )
 
 
+@pytest.mark.slow
 def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_may_come_to_rest() -> None:
     """Released from 18.7 mm the stage swings like them, at 1e-6, for up to 5000 s; at 1e-8 to 1e-10 it is at rest from
     2000 s on."""
@@ -794,6 +818,7 @@ def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_ma
     assert own.swing < 1e-9
 
 
+@pytest.mark.slow
 def test_a_motion_that_swings_less_often_than_what_was_observed_is_not_told_at_rest() -> None:
     """Released from 12.09817 mm, the stage swings as far, but every 1215 s, with pauses of 940 s."""
     seldom = asymmetric_stage().replace({"motion.displacement": "12.09817 mm"})
@@ -804,6 +829,7 @@ def test_a_motion_that_swings_less_often_than_what_was_observed_is_not_told_at_r
     assert own_motion(seldom, target, np.inf).swing > target.amplitude
 
 
+@pytest.mark.slow
 def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     """Without anti-windup, where b k_p < m k_i: in a run from 500 mm each swing is larger than the one before."""
     stage = VARIANTS["rigid"].replace(
@@ -838,6 +864,7 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
 UNWINDING = {"controller.anti_windup": "none", "controller.crossover": "20 Hz"}
 
 
+@pytest.mark.slow
 def test_many_stages_are_judged_no_more_surely_than_one() -> None:
     """At 500 kN no motion tried reaches the limit for long, but farther ones do, and may grow."""
     stage = VARIANTS["rigid"].replace({**UNWINDING, "controller.force_limit": "500 kN"})
@@ -919,6 +946,7 @@ def test_of_runs_beside_a_cycle_that_repels_those_that_leave_it_first_are_follow
     assert not learned.unknown.any()
 
 
+@pytest.mark.slow
 def test_an_orbit_beside_the_edge_of_a_window_beyond_which_a_controller_pushes_is_closed() -> None:
     """An orbit along the edge of a window has no derivative: the push holds the stage there as a relay does.
 

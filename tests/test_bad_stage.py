@@ -36,6 +36,7 @@ def edited(old: str, new: str) -> str:
 STIFFNESS = 'stiffness = "2.4 N/mm"'
 
 
+@pytest.mark.cases(first=9)
 @pytest.mark.parametrize(
     ("value", "shown"),
     [
@@ -79,6 +80,7 @@ def test_values(value: str, shown: str) -> None:
     assert {"N/m,", "greater"} <= {*caught.value.expected.split()}
 
 
+@pytest.mark.cases(first=30)
 @pytest.mark.parametrize(
     ("old", "new", "key", "words"),
     [

@@ -84,6 +84,7 @@ def hunts(chosen: Stage) -> bool:
     return bool(swing > 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 @RIGID
 def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
@@ -119,6 +120,7 @@ def test_displacements_that_start_hunting() -> None:
     assert bands.smallest == bands.windows[0][0]
 
 
+@pytest.mark.cases(first=3)
 @RIGID
 @pytest.mark.parametrize("edge", range(5))
 def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
@@ -201,6 +203,7 @@ def test_a_run_that_goes_on_where_its_reference_stands_is_the_whole_run(kind: st
     assert np.max(np.abs(on - ends(flat, first + rest))[:, : scales.shape[1]] / scales) < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 @RIGID
 def test_moves_by_single_runs() -> None:
@@ -236,6 +239,7 @@ def test_motions_without_acceleration_have_no_share() -> None:
     assert moves_that_hunt(MOVING.replace({"motion.acceleration": "0 m/s^2"}), target()) is None
 
 
+@pytest.mark.slow
 @given(drawn=st.integers(1, 500), data=st.data())
 def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
     """At its lower end, so many hits or more have a probability of 2.5 %, at its upper end, so many or fewer.
@@ -280,6 +284,7 @@ def test_faster_gains_are_those_of_the_tuned_controller_at_a_higher_crossover() 
         assert float(scaled[f"controller.{name}"]) == pytest.approx(wanted[f"controller.{name}"], rel=1e-12)
 
 
+@pytest.mark.cases(slow=1)
 @pytest.mark.parametrize(
     "chosen", [pytest.param(rigid(8), marks=RIGID), pytest.param(equal_gains(8), marks=GAINS)], ids=["tuned", "gains"]
 )
@@ -299,6 +304,7 @@ def at(chosen: Stage, factor: float) -> Stage:
     return chosen.replace({key: f"{float(scaled[key])!r} {unit}" for key, unit in texts.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 @RIGID
 def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -319,8 +325,9 @@ def test_margin_from_above_is_that_from_below() -> None:
     assert below.crossover == pytest.approx(above.crossover, rel=1e-5)
 
 
+@pytest.mark.cases(first=1)
 @RIGID
-@pytest.mark.parametrize(("crossover", "attracting"), [(0.9, True), (110, False)])
+@pytest.mark.parametrize(("crossover", "attracting"), [(110, False), (0.9, True)])
 def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: bool) -> None:
     """The edge at 9.77 Hz is too far off to be looked for."""
     assert not SEARCH_LIMITS.lowest_bandwidth < 9.77 / crossover < SEARCH_LIMITS.highest_bandwidth

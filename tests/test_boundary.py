@@ -44,7 +44,6 @@ def special(diagram: Diagram, symmetric: bool) -> dict[str, list[tuple[float, Lo
     return points
 
 
-@pytest.mark.first
 def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Diagram) -> None:
     """references.md: it stops attracting near 9.77 Hz; the issue: the unstable cycle lives on to a fold at 16.2 Hz."""
     points = special(over_crossover, symmetric=True)
@@ -56,6 +55,7 @@ def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Di
     assert fold[1].point.multiplier == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.inner
 def test_what_overlapping_branches_meet_is_listed_once(over_crossover: Diagram) -> None:
     """The error of a merged point is the difference; points at another place, or of another cycle, stay separate."""
@@ -116,6 +116,7 @@ def test_orbits_closed_at_once_are_those_closed_one_by_one() -> None:
         assert one.multiplier == pytest.approx(other.multiplier, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> None:
     """Straight lines through scattered values: the reserve usually holds the true place.
@@ -152,6 +153,7 @@ def test_a_branch_whose_places_scatter_turns_within_its_reserve() -> None:
     assert turn(lengths, lengths) is None
 
 
+@pytest.mark.thorough
 def test_what_is_simulated_within_the_error_of_a_flip_tells_nothing_of_it(over_crossover: Diagram) -> None:
     """Near a flip, cycles are so weakly unstable that runs may stay on them.
 
@@ -173,6 +175,7 @@ def test_what_is_simulated_within_the_error_of_a_flip_tells_nothing_of_it(over_c
     assert [change for change in stability_changes(doubtful) if not change.begins] == [first]
 
 
+@pytest.mark.thorough
 def test_a_window_within_the_error_of_a_special_point_is_told(over_crossover: Diagram) -> None:
     places = over_crossover.places
     attracts = np.abs(places - 0.8) < 0.05
@@ -184,6 +187,7 @@ def test_a_window_within_the_error_of_a_special_point_is_told(over_crossover: Di
     assert [change.begins for change in stability_changes(window)] == [True, False]
 
 
+@pytest.mark.thorough
 def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagram) -> None:
     """Subcritical: the pair ends in the flip of the symmetric cycle, and folds at 8.47 Hz."""
     points = special(over_crossover, symmetric=False)
@@ -208,6 +212,7 @@ def test_errors_are_honest(over_crossover: Diagram) -> None:
                 assert over_crossover.error(result) < 1e-4
 
 
+@pytest.mark.thorough
 @pytest.mark.inner
 def test_the_branch_is_what_is_found_at_single_stages(over_crossover: Diagram) -> None:
     (symmetric,) = (branch for branch in over_crossover.branches if branch.sign < 0)
@@ -234,6 +239,7 @@ def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) 
     assert over_crossover.value(folds[0]) == pytest.approx(over_crossover.value(folds[1]), abs=1e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.inner
 @pytest.mark.parametrize("poison", [np.nan, 0.0, 1.0, 1e6])
 def test_a_wrong_jacobian_does_not_end_a_walk(over_crossover: Diagram, poison: float) -> None:
@@ -251,6 +257,7 @@ def test_a_wrong_jacobian_does_not_end_a_walk(over_crossover: Diagram, poison: f
     assert over_crossover.value(points[-1].place) == pytest.approx(9.78, abs=0.2)
 
 
+@pytest.mark.thorough
 @pytest.mark.inner
 def test_a_branch_that_turns_back_does_not_reach_the_farthest_place(over_crossover: Diagram) -> None:
     """The pair from 9.5 Hz on: it meets the symmetric cycle at 9.77 Hz, and goes on as its own mirror image."""
@@ -265,6 +272,7 @@ def test_a_branch_that_turns_back_does_not_reach_the_farthest_place(over_crossov
     assert "symmetric" in reason
 
 
+@pytest.mark.thorough
 @pytest.mark.inner
 def test_a_flip_is_met_from_beside_it(over_crossover: Diagram) -> None:
     """Begun 0.2 % beside it, without the Jacobian of a point nearby."""
@@ -287,6 +295,7 @@ def over_friction() -> Plane:
     return plane(Space.of(AT_8_HZ, axes), nodes=5)
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> None:
     """Flips of the symmetric cycle: 0.2 % to either side of the curve the cycle attracts on one and repels on the
@@ -301,6 +310,7 @@ def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> Non
                 assert sorted(np.abs(cycles.multiplier) < 1) == [False, True]
 
 
+@pytest.mark.slow
 def test_curves_in_two_keys_pass_through_the_points_in_one(over_friction: Plane) -> None:
     """At 1 N of Coulomb friction, folds and flips over static friction lie on the curves."""
     static = KeyRange("friction.static", 1.0, 6.0, unit="N")
@@ -324,6 +334,7 @@ def at_1_n(plane: Plane, curve: Any) -> list[float]:
     return [float(static[i] - coulomb[i] * (static[i + 1] - static[i]) / (coulomb[i + 1] - coulomb[i])) for i in at]
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 def test_multipliers_on_a_grid_and_the_curve_agree_within_a_cell(over_friction: Plane) -> None:
     """The multipliers of the symmetric cycle say whether it attracts."""
@@ -347,6 +358,7 @@ def refined(points: np.ndarray) -> np.ndarray:
     return np.concatenate([a + shares * (b - a) for a, b in pairwise(points)])
 
 
+@pytest.mark.slow
 def test_an_asymmetric_stage_loses_its_cycle_in_a_fold() -> None:
     """Unequal friction unfolds the pitchfork: the flip of the half period becomes a fold of the whole one."""
     traced = diagram(
@@ -363,6 +375,7 @@ def test_a_range_without_a_boundary_has_no_points() -> None:
     assert not any(traced.special)
 
 
+@pytest.mark.slow
 def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
     """With back-calculation, it rests at 38 Hz and swings at 40 Hz, released from up to 1 m (test_attractors.py).
 
@@ -408,6 +421,7 @@ def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str]) -> 
         friso.boundary(stage, axes)
 
 
+@pytest.mark.thorough
 @pytest.mark.inner
 def test_a_branch_goes_on_along_a_parabola(over_crossover: Diagram) -> None:
     points = max((branch.points for branch in over_crossover.branches), key=len)[2:-2]  # its ends may stand there twice
@@ -423,6 +437,7 @@ def test_a_branch_goes_on_along_a_parabola(over_crossover: Diagram) -> None:
     assert parabola < straight / 3
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 def test_where_hunting_ends_beyond_a_curve_it_is_searched_on() -> None:
     """Beyond the flip that is drawn, an asymmetric cycle attracts on: a thorough search agrees on both sides."""

@@ -51,6 +51,7 @@ def compiled() -> None:
     kernels([*map(KernelRequest, forms), *(KernelRequest(form, True) for form in forms)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_cycles_against_simulation_and_scipy(law: str) -> None:
     """Amplitude by a long run at two tolerances, and half a period by Radau on the law written by hand."""
@@ -98,6 +99,7 @@ def test_up_to_break_away_it_is_a_spring_and_a_damper() -> None:
     assert beyond.imag > 1.2 * table.stiffness.values[0, 0].imag
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_small_motions(law: str) -> None:
     """Stuck on the bristles; sliding on the Stribeck curve."""

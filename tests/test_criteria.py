@@ -73,6 +73,7 @@ def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool, bool]
     assert (word == "transient") == (sure and not attracts and not rests)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(*[st.booleans()] * 5), min_size=1, max_size=30))
 def test_verdicts_of_a_batch_are_those_of_each(several: list[tuple[bool, bool, bool, bool, bool]]) -> None:
     columns = np.array(several).T
@@ -80,6 +81,7 @@ def test_verdicts_of_a_batch_are_those_of_each(several: list[tuple[bool, bool, b
     assert together.tolist() == [verdicts(*columns[:, [k]])[0] for k in range(len(several))]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.xdist_group("rig")
 def test_check_is_the_batch_of_one(rig: Stage) -> None:
@@ -107,6 +109,7 @@ ends = st.tuples(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(ends, min_size=1, max_size=20), st.floats(1e-7, 1e-3), st.floats(0.0, 5.0))
 def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: float) -> None:
     """The definitions of `friso.hunting.criteria.run_outcome` are tested; a batch equals its single runs."""
@@ -124,6 +127,7 @@ def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: flo
         assert outcomes(one(end, k), band, hold)[0] == words[k]
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.floats(0.3, 5.0), st.floats(1e-5, 1e-2), st.floats(-1e-3, 1e-3), st.floats(0.5, 50.0), st.floats(1e-7, 1e-2))
 def test_outcomes_of_traces(frequency: float, size: float, offset: float, decay: float, band: float) -> None:
@@ -144,6 +148,7 @@ def test_outcomes_of_traces(frequency: float, size: float, offset: float, decay:
     assert alone == words.tolist()
 
 
+@pytest.mark.slow
 @given(lengths, lengths, st.floats(1e-8, 1e-1))
 def test_a_wider_band_makes_no_swing(swing: float, earlier: float, band: float) -> None:
     wide, narrow = lasts(np.array([swing]), earlier, 2 * band), lasts(np.array([swing]), earlier, band)
@@ -212,6 +217,7 @@ def sampled_peaks(values: np.ndarray) -> list[float]:
 waves = st.lists(st.tuples(st.floats(0.1, 4.0), st.floats(1e-5, 1e-3), st.floats(0, 6.28)), min_size=1, max_size=4)
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(waves, st.floats(-1e-3, 1e-3))
 def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float, float]], offset: float) -> None:
@@ -245,6 +251,7 @@ def test_where_a_trace_ends_is_no_peak() -> None:
     assert counts[24:].tolist() == [0] * 6
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.floats(0.01, 1.0), st.integers(-500, 500)), min_size=2, max_size=60))
 def test_distinct_peaks_are_fewer(gaps: list[tuple[float, int]]) -> None:
     """A distinct peak is late, tall and apart as well; without small ripple both rules say the same."""
@@ -269,6 +276,7 @@ def test_ripple_is_counted_by_the_thesis_and_is_not_distinct() -> None:
     assert distinct_peaks(times, values, np.array([4])).sum() == 1
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(-1e-3, 1e-3)), min_size=2, max_size=40))
 def test_a_batch_of_turning_points_is_all_of_its_runs(gaps: list[tuple[float, float]]) -> None:
     times = 5.0 + np.cumsum([gap for gap, _ in gaps])

@@ -145,6 +145,7 @@ def test_a_sample_time_beyond_all_measure_is_refused(time: str) -> None:
         mapping.from_options(dt=time)
 
 
+@pytest.mark.cases(first=7)
 @pytest.mark.parametrize(
     ("stage", "key", "value", "meant"),
     [
@@ -181,6 +182,7 @@ def test_rows_of_an_array_are_no_tables() -> None:
         parsed("".join(f'[ a . "b {k}" ] # a, b\n' for k in range(1100)), "a stage")
 
 
+@pytest.mark.slow
 def test_a_doubt_is_said_before_the_answer(tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "bode", EXAMPLES / "thesis_rig.toml", "--set", "friction.static=52 kN")
     assert "52 kN" in done.stderr.partition("\n")[0]
@@ -214,6 +216,7 @@ NUMBERS = st.one_of(
 KEYS = sorted(numeric_keys(loads(RIG).flat()))
 
 
+@pytest.mark.slow
 @given(key=st.sampled_from(KEYS), number=NUMBERS, unit=st.sampled_from(["", "m", "N"]))
 @settings(max_examples=200)
 def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, unit: str) -> None:
@@ -227,6 +230,7 @@ def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, un
     assert again.flat() == stage.flat()
 
 
+@pytest.mark.slow
 @given(text=st.text(st.characters(), max_size=20))
 def test_any_text_can_be_saved_and_read_again(text: str) -> None:
     try:

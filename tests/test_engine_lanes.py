@@ -73,6 +73,7 @@ def reference(native: Kernel, flat: Flat) -> Results:
     return results
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(("threads", "chunk"), [(1, 4096), (2, 4096), (5, 4096), (2, 1), (1, 7), (3, 32)])
 def test_any_number_of_threads_and_chunks(
     native: Kernel, flat: Flat, reference: Results, threads: int, chunk: int

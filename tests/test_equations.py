@@ -84,6 +84,7 @@ def points(name: str, twin: ModuleType, count: int) -> list[tuple[float, Point]]
     return rows
 
 
+@pytest.mark.cases(first=13)
 def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleType) -> None:
     by_hand = plain.rates(VARIANTS[name].flat(), twin.STATE_NAMES)
     values = parameters(name)
@@ -99,6 +100,7 @@ def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleT
         assert np.all(seen.min(axis=0) == 0), "a side of a kink was never looked at"
 
 
+@pytest.mark.cases(first=35)
 def test_every_state_and_kink_matters(name: str) -> None:
     """No state or kink is dead: each is in the right-hand side, changes states, or decides on a mode."""
     used = set().union(*(sp.sympify(f).free_symbols for f in model(name).rhs))
@@ -109,6 +111,7 @@ def test_every_state_and_kink_matters(name: str) -> None:
     assert set(model(name).symbols) - {sp.Symbol("position", real=True)} <= used
 
 
+@pytest.mark.cases(first=5, slow=21)
 def test_jacobian_against_differences(name: str, twin: ModuleType) -> None:
     """SymPy's derivatives against central differences of the equations written by hand."""
     m, flat = model(name), VARIANTS[name].flat()

@@ -86,6 +86,7 @@ def test_paths_and_order() -> None:
     assert answer(loop, OMEGA, VELOCITY) == pytest.approx(-50 * KINDS["biquad"][1](OMEGA))
 
 
+@pytest.mark.slow
 def test_bode_of_a_loop_with_filters_is_stable_where_its_poles_are() -> None:
     machine = filtered(
         FORWARD_FILTERS + FEEDBACK_FILTERS, gains(2000, 5000, 60, extra='derivative_on = "measurement"\n')
@@ -115,6 +116,7 @@ def commanded(machine: Stage, sample_time: float, errors: np.ndarray) -> np.ndar
     return np.array(forces)
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_drive_takes_a_filter_by_tustin(kind: str) -> None:
     """The difference equation of SciPy's bilinear transform."""
@@ -128,6 +130,7 @@ def test_a_drive_takes_a_filter_by_tustin(kind: str) -> None:
     )
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("rule", ["backward_euler", "prewarped"])
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "sampled_biquad"])
 def test_a_drive_takes_a_filter_by_its_own_rule(kind: str, rule: str) -> None:

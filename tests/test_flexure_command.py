@@ -261,6 +261,7 @@ def test_without_a_mode_that_interferes_there_is_no_limit(models: BothModels, sn
 # ---------------------------------------------------------------- figures and page
 
 
+@pytest.mark.slow
 def test_files_and_page(folder: Path) -> None:
     pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
     assert {path.name for path in folder.iterdir()} == pictures | {"flexure.html"}

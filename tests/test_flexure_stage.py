@@ -253,6 +253,7 @@ def _changed(key: str, value: str) -> str:
     return "\n".join([*rows, f"{key} = {value}" if value else "", 'material = "titanium"'])
 
 
+@pytest.mark.cases(first=7)
 @pytest.mark.parametrize(
     ("table", "key", "said"),
     [

@@ -35,6 +35,7 @@ def test_every_law_is_among_the_common_variants(law: str) -> None:
     assert any(variant.flat()["friction.model"] == law for variant in VARIANTS.values())
 
 
+@pytest.mark.cases(first=9)
 @pytest.mark.parametrize("file", [*sorted(LAWS.glob("*.py")), Path(maxwell_slip.__file__)], ids=lambda file: file.stem)
 def test_a_law_mentions_no_solver(file: Path) -> None:
     """A law is one file, which imports only units, the stage's tables and the basis of the equations."""
@@ -44,6 +45,7 @@ def test_a_law_mentions_no_solver(file: Path) -> None:
     assert all(name.startswith(allowed) for name in ours)
 
 
+@pytest.mark.cases(first=16)
 @pytest.mark.parametrize("name", VARIANTS)
 def test_friction_in_a_steady_motion_is_that_of_the_linear_systems(name: str) -> None:
     flat = VARIANTS[name].flat()

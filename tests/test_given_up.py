@@ -123,6 +123,7 @@ def judged(
         return judge(stage, run_to(settling), 1e-6)
 
 
+@pytest.mark.cases(first=5)
 @pytest.mark.parametrize(
     ("run", "doubt"),
     [
@@ -150,6 +151,7 @@ def test_a_longer_run_that_is_not_completed_gives_no_verdict() -> None:
     assert MORE_WORK in HuntingDoubt.WORK  # sentences name the commands by these words
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(
     ("certain", "changes", "sure"),
     [
@@ -171,6 +173,7 @@ def test_no_edge_is_more_certain_than_the_verdict_or_than_large_motions_are_boun
     assert judgement.windows[0].high is None
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("starts", "certain"),
     [

@@ -51,6 +51,7 @@ def compiled() -> None:
     kernels([*map(KernelRequest, forms), KernelRequest(hunts, True)])
 
 
+@pytest.mark.slow
 def test_inner_loops_close_to_rounding() -> None:
     """If the level does not depend on speed, each deflection is that of a spring that slips at its strength.
 
@@ -84,6 +85,7 @@ def test_masing_s_rule() -> None:
     assert np.max(np.abs(response.friction_force.values[branch] - expected)) < 1e-8 * 2
 
 
+@pytest.mark.slow
 def test_a_loop_against_scipy_with_events() -> None:
     """The first slips and sticks of a stage on a falling curve: how many, and where the stage is then."""
     flat = HUNTS.flat()
@@ -119,6 +121,7 @@ def test_an_element_bent_against_the_motion_goes_on_sticking() -> None:
     assert [rates[names.index(f"deflection_{n}")] for n in (1, 2, 3)] == [fast] * 3
 
 
+@pytest.mark.slow
 def test_the_cycle_against_simulation_and_scipy_with_events() -> None:
     stages = Ensemble.held(HUNTS.flat(), 1)
     cycles = find_cycles(stages)

@@ -56,6 +56,7 @@ def near_sine() -> tuple[float, float]:
 # where it works
 
 
+@pytest.mark.slow
 def test_single_harmonic_balance_finds_a_cycle_that_is_there() -> None:
     amplitude, omega = near_sine()
     harmonic = single_harmonic(unstable("1e8 N/m"), *GRID)
@@ -120,6 +121,7 @@ def test_frequencies_are_close_enough_for_the_loop() -> None:
     assert len(fine) < len(DEFAULT_FREQUENCIES) + 10
 
 
+@pytest.mark.slow
 def test_multi_harmonic_balance_finds_it_too() -> None:
     """With one harmonic it equals single-harmonic balance; with many, the motion comes back to its start."""
     amplitude, omega = near_sine()
@@ -219,6 +221,7 @@ def test_hunting_by_harmonic_balance() -> None:
     assert result["period_error"].values[3:] == pytest.approx([2.69e-3, 4.1e-5], rel=0.02)
 
 
+@pytest.mark.slow
 def test_no_single_harmonic_answer_from_4_to_9_5_hz() -> None:
     for crossover, least in ((4.0, 0.17), (6.0, 0.22), (9.5, 0.30)):
         harmonic = single_harmonic(hunting(crossover), *GRID)
@@ -227,6 +230,7 @@ def test_no_single_harmonic_answer_from_4_to_9_5_hz() -> None:
         assert GRID[1][0] < harmonic.least_frequency < GRID[1][-1]
 
 
+@pytest.mark.slow
 def test_where_the_integrator_can_drive_the_loop_is_a_spring_too() -> None:
     """Why: friction that damps (Im N > 0) needs a frequency at which the loop feeds, and there the loop is a spring, so
     that friction would have to be a negative one, which it is by far too little there."""
@@ -251,6 +255,7 @@ def test_any_linear_mechanics() -> None:
     assert np.abs(result.stage - result.cart).max() > 0
 
 
+@pytest.mark.slow
 def test_intervals_are_fine_enough() -> None:
     flat, motion = hunting(8.0).flat(), one_period(hunting(8.0))
     usual, fine = (balanced(flat, *motion, 201, intervals=item * 201) for item in (32, 128))

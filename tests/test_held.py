@@ -18,6 +18,7 @@ FLIP = 0.135006
 """Factor of the bandwidth at which the symmetric cycle of the steep stage begins to repel; subcritical near by."""
 
 
+@pytest.mark.slow
 def test_an_edge_moves_on_to_what_attracts_beyond_a_flip() -> None:
     """Irregular swings beside the cycle, and others, attract to more than 1 % beyond its end."""
     outward = EdgeSearch(bandwidth_path(STEEP.flat(), True), 1.0)
@@ -26,6 +27,7 @@ def test_an_edge_moves_on_to_what_attracts_beyond_a_flip() -> None:
     assert 1.0125 * FLIP < end.inside < end.outside < 1.03 * FLIP
 
 
+@pytest.mark.slow
 def test_the_steep_stage_swings_on_beyond_its_flip() -> None:
     """For 300 periods, 0.1 and 1.25 % above."""
     distances = np.linspace(112e-6, 128e-6, 24)
@@ -35,6 +37,7 @@ def test_the_steep_stage_swings_on_beyond_its_flip() -> None:
         assert np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 200e-6)
 
 
+@pytest.mark.slow
 def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_scatter(rig: Stage) -> None:
     """The thesis rig's multiplier passes -1 at 5.599, 5.609 and 5.614 Hz; the start decides which is met."""
     flat = rig.replace({"joint.locked": False}).flat()

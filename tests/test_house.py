@@ -110,6 +110,7 @@ def texts(source: str) -> Iterator[str]:
             yield node.value
 
 
+@pytest.mark.slow
 def test_keys_of_a_controller_are_known_to_controllers_alone() -> None:
     knowing = {
         name for name, source in sources().items() for text in texts(source) if re.match(r"controller\.[\w{]", text)
@@ -122,11 +123,13 @@ def test_keys_are_imported_where_the_rules_of_tuning_are_the_subject() -> None:
     assert [name for name in importing if not name.startswith((*KNOW_CONTROLLERS, *ABOUT_TUNING))] == []
 
 
+@pytest.mark.slow
 def test_the_name_of_a_type_stands_for_one_thing() -> None:
     assert {name: where for name, where in types().items() if len(where) > 1} == {}
 
 
-@pytest.mark.parametrize("folder", ["friso", "friso_thesis", "tests", "benchmarks"])
+@pytest.mark.cases(slow=2)
+@pytest.mark.parametrize("folder", ["friso_thesis", "benchmarks", "tests", "friso"])
 def test_names_of_values_say_what_they_hold(folder: str) -> None:
     named = []
     for path in sorted((ROOT / folder).rglob("*.py")):
@@ -139,6 +142,7 @@ def test_names_of_values_say_what_they_hold(folder: str) -> None:
     assert named == []
 
 
+@pytest.mark.slow
 def test_percentages_are_written_by_one_function() -> None:
     """Percentages come from `quantities.percent` or `prefixes.percentage`, not from f-strings or hand-written text."""
     by_hand = []
@@ -193,11 +197,13 @@ def test_the_drawing_of_the_house_is_of_what_there_is() -> None:
     assert folders | modules == drawn
 
 
+@pytest.mark.slow
 def test_benchmarks_take_of_hunting_its_interface_alone() -> None:
     behind = {path.name: inner_names(syntax(path)) for path in (ROOT / "benchmarks").rglob("*.py")}
     assert {name: names for name, names in behind.items() if names} == {}
 
 
+@pytest.mark.slow
 def test_tests_of_inner_modules_of_hunting_are_marked() -> None:
     """Whatever uses a name from behind the interface, itself or by a function beside it, is marked as `inner`."""
     paths = (ROOT / "tests").rglob("test_*.py")

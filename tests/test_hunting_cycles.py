@@ -118,6 +118,7 @@ RIGS = [
 ]
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(("crossover", "amplitude", "multiplier", "joint"), RIGS)
 def test_reference_cycles_of_the_rig(crossover: float, amplitude: float, multiplier: float, joint: str) -> None:
     """Amplitudes [mm] and multipliers fitted to simulated turning points; the latter good to one or two percent."""
@@ -137,6 +138,7 @@ COMPUTED = [
 ]
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(("crossover", "amplitude", "multiplier", "joint"), COMPUTED)
 def test_cycles_of_the_rig_stay_what_they_were(
     crossover: float, amplitude: float, multiplier: float, joint: str
@@ -150,6 +152,7 @@ def test_cycles_of_the_rig_stay_what_they_were(
     assert cycle.multiplier == pytest.approx(multiplier, abs=2e-5)
 
 
+@pytest.mark.slow
 @RIGID
 @pytest.mark.parametrize(("crossover", "attracting"), [(8, True), (12, False)])
 def test_flip_of_the_rigid_mass(crossover: float, attracting: bool) -> None:
@@ -167,12 +170,14 @@ def only_symmetric(survey: Hunting) -> Cycle:
     return cycle
 
 
+@pytest.mark.slow
 @RIGID
 def test_cycle_attracts_below_the_flip_only() -> None:
     assert only_symmetric(hunting_of(rigid(9.76))).attracts
     assert not only_symmetric(hunting_of(rigid(9.78))).attracts
 
 
+@pytest.mark.slow
 @LOCKED_RIG
 def test_edge_of_the_locked_rig() -> None:
     """references.md: the slope passes -1 near 9.7 Hz (from fits to simulations, about 1 %)."""
@@ -181,6 +186,7 @@ def test_edge_of_the_locked_rig() -> None:
     assert edge.crossover == pytest.approx(9.7, rel=0.01)
 
 
+@pytest.mark.slow
 @FREE_RIG
 def test_edge_of_the_free_rig() -> None:
     """About 5.6 Hz, where the multiplier grows from -0.954 at 5 Hz past -1."""
@@ -190,6 +196,7 @@ def test_edge_of_the_free_rig() -> None:
     assert edge.factor == pytest.approx(edge.crossover / 5, rel=1e-12)
 
 
+@pytest.mark.cases(first=1)
 @RIGID
 @pytest.mark.parametrize(("crossover", "multiplier"), [(8.6, 2.28), (9, 1.324), (9.6, 1.0358)])
 def test_asymmetric_pair_between_its_fold_and_the_flip(crossover: float, multiplier: float) -> None:
@@ -208,6 +215,7 @@ def test_asymmetric_pair_between_its_fold_and_the_flip(crossover: float, multipl
     assert turns[1] > 1.03 * symmetric.amplitude
 
 
+@pytest.mark.slow
 @RIGID
 def test_asymmetric_pair_shrinks_into_the_flip() -> None:
     """The pair's multiplier falls to 1, and its turns approach each other like the root of the distance to the flip."""
@@ -219,6 +227,7 @@ def test_asymmetric_pair_shrinks_into_the_flip() -> None:
     assert off[9.65] / off[9.74] == pytest.approx(np.sqrt((9.77 - 9.65) / (9.77 - 9.74)), rel=0.02)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.inner
 @RIGID
 @pytest.mark.parametrize("crossover", [4, 8.3, 9.9, 12])
@@ -254,6 +263,7 @@ CONVERGING = [
 ]
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("chosen", CONVERGING)
 def test_results_do_not_depend_on_the_tolerance(chosen: Stage) -> None:
     """From rtol 1e-9 to 1e-11, period and amplitude agree to 1e-6, and the deciding multiplier to 1e-4.
@@ -275,6 +285,7 @@ def test_orbits_are_closed_at_a_rough_tolerance_too() -> None:
     assert symmetric_cycles(stages, 1e-5).closed.all()
 
 
+@pytest.mark.slow
 @FREE_RIG
 @pytest.mark.parametrize("rtol", [1e-5, 1e-6])
 def test_a_chattering_limiter_needs_no_finer_tolerance(rtol: float) -> None:
@@ -320,6 +331,7 @@ def machines() -> list[Stage]:
     return [VARIANTS["rigid"].replace(machine(rng)) for _ in range(10)]
 
 
+@pytest.mark.slow
 @RIGID
 def test_multipliers_of_machines_drawn_at_random() -> None:
     """Floquet multiplier, slope of the simulated return map, and growth beside the cycle are equal.
@@ -336,6 +348,7 @@ def test_multipliers_of_machines_drawn_at_random() -> None:
         assert -2 < cycle.multiplier < 0
 
 
+@pytest.mark.slow
 @RIGID
 def test_machines_drawn_at_random_hunt_as_their_cycles_say() -> None:
     """Machines are released at 32 displacements from 0.1 to 30 mm and followed for a hundred periods.
@@ -371,6 +384,7 @@ SYMMETRIC = [
 ]
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(("chosen", "share"), SYMMETRIC)
 def test_trace_of_a_symmetric_cycle(chosen: Stage, share: float) -> None:
     """x(t + T/2) = -x(t) for whatever moves, to a share of its range: followed at rtol 1e-8, the stage breaks away some
@@ -391,6 +405,7 @@ def moving_parts(trace: xr.Dataset) -> dict[str, np.ndarray]:
     return {str(name): signal.to_numpy() for name, signal in trace.items() if name != "reference"}
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
     "chosen",
     [
@@ -420,6 +435,7 @@ def test_mirror_image_of_a_cycle_is_one(chosen: Stage, sign: float) -> None:
     assert mirrored.states == pytest.approx(-result.states, rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.slow
 @UNEQUAL
 def test_unequal_friction_keeps_a_cycle_off_the_reference() -> None:
     """1 and 2 % more friction forward, as much less back: at 4 Hz the stage swings farther ahead than back, about as
@@ -436,6 +452,7 @@ def test_unequal_friction_keeps_a_cycle_off_the_reference() -> None:
         assert cycle.multiplier == pytest.approx(0.8172509**2, rel=1e-3)
 
 
+@pytest.mark.cases(first=1)
 @UNEQUAL
 @pytest.mark.parametrize(("crossover", "share"), [(4, 0.01), (4, 0.05), (8, 0.01)])
 def test_simulation_with_unequal_friction_settles_on_the_cycle(crossover: float, share: float) -> None:
@@ -469,6 +486,7 @@ def test_much_unequal_friction_ends_hunting() -> None:
     assert np.all(last_swing(chosen, np.geomspace(1e-4, 3e-2, 32), 150, 4) < BRISTLES)
 
 
+@pytest.mark.cases(first=1)
 @BIASED
 @pytest.mark.parametrize("bias", [0.3, -4.5])
 def test_constant_force_is_carried_by_the_integrator_alone(bias: float) -> None:
@@ -566,6 +584,7 @@ def test_units_of_length_and_force_do_not_matter_rigid(scale: float) -> None:
     same_but_for_scale(only(rigid(8)), only(rigid(8, **larger)), scale)
 
 
+@pytest.mark.slow
 @FREE_RIG
 def test_units_of_length_and_force_do_not_matter_free() -> None:
     """The stroke is a length too."""
@@ -655,6 +674,7 @@ def test_both_cycles_near_a_fold_are_found() -> None:
     assert attracting.middle - attracting.amplitude == pytest.approx(-0.274e-3, abs=0.5e-6)
 
 
+@pytest.mark.slow
 @FREE_RIG
 def test_an_asymmetric_pair_takes_over_beyond_a_supercritical_flip() -> None:
     """With a joint mode at 30 Hz the free rig at 4.7 Hz has an unstable symmetric cycle and a stable pair.
@@ -685,6 +705,7 @@ def test_a_cycle_that_is_passed_through_several_times_is_closed_as_itself() -> N
     assert closed.tolist() == [1.0] * passes.size
 
 
+@pytest.mark.slow
 def test_nothing_is_certain_of_bristles_that_runs_do_not_resolve(rig: Stage) -> None:
     """1e10 times as stiff as the loop, runs at every tolerance let them break away as if friction did not fall: nothing
     attracts in them, where the exact map of such a stage has a cycle (`benchmarks.oracles`)."""

@@ -54,6 +54,7 @@ def across(*verdicts: LawVerdict) -> VerdictsByLaw:
 FAST, SLOW, LOST = ("hunts", 9.7), ("settles", 6.0), ("settles", None, True, True, ("other bandwidths",))
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
     ("lugre", "other", "verdicts", "hunts", "words"),
     [
@@ -89,6 +90,7 @@ def test_what_laws_say_together(lugre: Any, other: str, verdicts: list[Any], hun
     assert laws.depends_on_law("given") == ("depends on the friction law" in laws_sentences(laws)[0])
 
 
+@pytest.mark.slow
 def test_what_decides_between_laws() -> None:
     """The measurement that separates the fewer laws from the others, or what is open in the law that is not certain."""
     rolling = under("rolling", ("settles", 6.0), ("settles", 6.1))
@@ -125,6 +127,7 @@ def test_hunting_beyond_the_edge_is_told_under_any_law() -> None:
     assert "edge 9.10 to 9.70 Hz, and hunting again from 19.6 Hz" in laws_sentences(laws)[0]
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(
     ("verdicts", "edge"),
     [
@@ -189,6 +192,7 @@ OTHERS = ("dwell", "elasto_plastic", "gms", "load_dependent", "rolling")
 """Laws that keep what is measured under LuGre."""
 
 
+@pytest.mark.slow
 def test_nothing_hunts_without_an_integrator() -> None:
     laws = verdicts_by_law(PD)
     assert [verdict.law for verdict in laws.verdicts] == ["lugre", *OTHERS]
@@ -200,6 +204,7 @@ def test_nothing_hunts_without_an_integrator() -> None:
     assert laws.verdicts[0].conversion.stage == PD
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path) -> None:
     file = tmp_path / "pd.toml"
     file.write_text(PD.to_toml())

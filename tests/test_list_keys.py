@@ -60,6 +60,7 @@ def test_the_whole_array_or_one_element_is_set(three: Stage) -> None:
     assert numbers.flat()[f"{STRENGTH}.3"] == 1 / 3
 
 
+@pytest.mark.cases(first=8)
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [

@@ -141,6 +141,7 @@ MINUTES: dict[str, Callable[[Stage], object]] = {
 }
 
 
+@pytest.mark.cases(first=2, slow=1)
 @pytest.mark.parametrize("command", MINUTES)
 def test_an_unstable_loop_is_mentioned_before_work_that_takes_minutes(
     command: str, rig: Stage, caplog: pytest.LogCaptureFixture
@@ -229,6 +230,7 @@ damping_ratio = 1.0
 """
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 def test_where_the_loop_is_unstable_no_bandwidth_is_left_undecided(tmp_path: Path) -> None:
     """That hunting was not determined, for its work, was told of bandwidths at which the loop is unstable alone."""

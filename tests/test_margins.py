@@ -57,6 +57,7 @@ def attracts(stage: Stage, factor: float) -> bool:
     return bool(find_attractors(with_static_friction(stage.flat(), factor), 1).attracts[0])
 
 
+@pytest.mark.slow
 def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) -> None:
     """The locked rig hunts; with half its static friction it does not, nor with half as much again."""
     margin = check(locked)["locked"].static_friction
@@ -73,6 +74,7 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) ->
     assert margin.below.inside < 1 < margin.above.inside
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 def test_an_end_just_above_coulomb_friction_is_found() -> None:
     """Hunting ended between 107 and 109 mN, closer to Coulomb friction than a step beyond an orbit's end."""
@@ -99,6 +101,7 @@ def test_an_end_just_above_coulomb_friction_is_found() -> None:
     assert not attracts(stage, 0.107 / 0.2222)
 
 
+@pytest.mark.slow
 def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
     """At half its static friction the locked rig settles; with a little more it hunts. The first lines say so."""
     case = check(rig.replace({"friction.static": "1.4 N", "joint.locked": True}))["locked"]
@@ -126,6 +129,7 @@ def test_static_friction_alone_is_scaled_or_all_of_it() -> None:
         assert least_static_factor(flat) == flat["friction.coulomb"] / flat["friction.static"]
 
 
+@pytest.mark.slow
 def test_the_joint_has_margins_where_it_is_free(rig: Stage) -> None:
     cases = check(rig)
     margins = joint_margins(cases["free"].stage, cases["free"].judgement)

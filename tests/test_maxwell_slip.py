@@ -94,6 +94,7 @@ def closures(displacement: np.ndarray) -> int:
     return closed
 
 
+@pytest.mark.slow
 def test_force_over_displacement_remembers_every_turn() -> None:
     """Every element's deflection is that of the reference to rounding, on a path with loops within loops.
 
@@ -127,6 +128,7 @@ def test_masing_s_rule() -> None:
     assert np.max(np.abs(total[branch] - expected)) < 1e-8 * STRENGTH.sum()
 
 
+@pytest.mark.slow
 def test_a_loop_against_scipy_with_events() -> None:
     """The first slips and sticks of a stage whose elements drop: when each comes, and where the stage is then."""
     flat = DROPS.flat()

@@ -56,6 +56,7 @@ def test_runs_of_a_batch_do_not_mix() -> None:
     assert distinct_peaks(times, values, np.array([3, 1])).sum(axis=1).tolist() == [2, 0]
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.floats(0.01, 0.4), st.integers(-500, 500)), min_size=2, max_size=60))
 def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
     """Against find_peaks with the same prominence (the swing), and the tallest kept first done slowly."""

@@ -85,6 +85,7 @@ def answer(folder: Path, stage: Stage, command: str, *arguments: object, status:
     return json.loads(run.stdout)
 
 
+@pytest.mark.thorough
 def test_check(locked: Stage, tmp_path: Path) -> None:
     """The multiplier of its cycle is that of a simulation; the remedy names its own key and value."""
     document = answer(tmp_path, locked, "check")
@@ -97,6 +98,7 @@ def test_check(locked: Stage, tmp_path: Path) -> None:
     assert float(factor) >= EDGE / 6.0
 
 
+@pytest.mark.slow
 def test_boundary(locked: Stage, tmp_path: Path) -> None:
     """None of the stage's cycles is stable beyond the edge."""
     document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=6 Hz..15 Hz")
@@ -104,6 +106,7 @@ def test_boundary(locked: Stage, tmp_path: Path) -> None:
     assert min(abs(point["value"] - EDGE) for point in document["points"]) < 0.05
 
 
+@pytest.mark.slow
 def test_map_of_multipliers(locked: Stage, tmp_path: Path) -> None:
     places = f"{BANDWIDTH}={EDGE * 0.97} Hz, {EDGE * 1.03} Hz"
     document = answer(tmp_path, locked, "map", "--x", places, "--metric", "multiplier", "--out", "map")
@@ -113,6 +116,7 @@ def test_map_of_multipliers(locked: Stage, tmp_path: Path) -> None:
     assert not outside < 1
 
 
+@pytest.mark.slow
 def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
     document = answer(tmp_path, whole, "bode")
     assert "At 6.00 Hz" in document["conclusion"]
@@ -124,6 +128,7 @@ def small(stage: Stage) -> np.ndarray:
     return rails(stage)[:2]
 
 
+@pytest.mark.slow
 def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
     save(whole, tmp_path / "stage.toml")
     sizes = {
@@ -147,6 +152,7 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
     assert not document["stages"]["own"]["failed"]
 
 
+@pytest.mark.slow
 def test_tune(locked: Stage, tmp_path: Path) -> None:
     """The answer knows the stage's cycles and tunes its bandwidth; with so few machines no remedy is sure to work."""
     tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=12, further=12)
@@ -172,6 +178,7 @@ def test_export(locked: Stage, tmp_path: Path) -> None:
     assert "[ pi-d ]--[ limit ]" in document["structure"][0]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""

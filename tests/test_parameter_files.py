@@ -547,6 +547,7 @@ BAD: dict[str, tuple[str | bytes, str]] = {
 }
 
 
+@pytest.mark.cases(first=13)
 @pytest.mark.parametrize("name", BAD)
 def test_what_is_no_parameter_file(tmp_path: Path, name: str) -> None:
     content, part = BAD[name]

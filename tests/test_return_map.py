@@ -53,6 +53,7 @@ def test_equal_nearest_landings_reach_as_far_in_as_one() -> None:
     assert twice.foretold(nearer) > 0.11
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.floats(0.2, 0.95), st.floats(0.1, 1.0))
 def test_a_map_with_a_slope_below_1_is_drawn_to_its_fixed_point(slope: float, fixed: float) -> None:
@@ -66,6 +67,7 @@ def test_a_map_with_a_slope_below_1_is_drawn_to_its_fixed_point(slope: float, fi
         assert set(within) <= set(attractor.basin)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 10**9), st.booleans())
 def test_the_cycle_to_which_straight_pieces_lead_is_that_of_many_landings(seed: int, symmetric: bool) -> None:
@@ -157,6 +159,7 @@ def survey(locked: Stage) -> MapSurvey:
     return survey_maps(Ensemble.held(locked.flat(), 1))
 
 
+@pytest.mark.slow
 def test_landings_of_the_rig_alternate_and_come_to_its_cycle(locked: Stage) -> None:
     stages = Ensemble.held(locked.flat(), 1).take(np.zeros(4, np.int64))
     starts = np.array([0.2, 0.23, 0.26, 1.5]) * stages.length
@@ -169,6 +172,7 @@ def test_landings_of_the_rig_alternate_and_come_to_its_cycle(locked: Stage) -> N
     assert 2 * np.diff(landed.times, axis=1)[:, -1] == pytest.approx(cycle.period, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_map_shows_what_attracts_the_rig(rig: Stage, locked: Stage, survey: MapSurvey) -> None:
     (motion,) = survey.motions
     (cycle,) = hunting(locked).attracting
@@ -185,6 +189,7 @@ def _map_of(stage: Stage) -> LandingMap | None:
     return resolved_map(Ensemble.held(stage.flat(), 1), surveyed.motions)
 
 
+@pytest.mark.slow
 def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
     target, landing_map = hunting(locked).target, _map_of(locked)
     assert target is not None
@@ -202,6 +207,7 @@ def test_no_map_decides_on_kicks_under_friction_that_follows_the_drive(locked: S
     assert _map_of(followed) is None
 
 
+@pytest.mark.slow
 def test_a_map_without_all_that_attracts_tells_nothing_of_kicks(locked: Stage) -> None:
     surveyed = hunting(locked).surveyed
     assert surveyed is not None
@@ -211,6 +217,7 @@ def test_a_map_without_all_that_attracts_tells_nothing_of_kicks(locked: Stage) -
     assert resolved_map(Ensemble.held(locked.flat(), 1), ()) is None
 
 
+@pytest.mark.slow
 def test_the_edge_of_the_locked_rig_by_maps(locked: Stage) -> None:
     """9.750 Hz, where its cycle flips; nothing attracts a hundredth beyond."""
     margin = find_margin(locked, attracting=True)
@@ -245,6 +252,7 @@ def _everywhere(stages: Ensemble) -> Sketch:
     return Sketch(yes, yes)
 
 
+@pytest.mark.slow
 def test_what_seems_to_attract_up_to_the_top_is_proved_there(locked: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     """A sketch that says of all bandwidths that something attracts there moves no edge."""
     monkeypatch.setattr("friso.hunting.path_search.sketched", _everywhere)
@@ -270,6 +278,7 @@ def test_bandwidths_that_no_work_was_left_for_make_no_edge(rig: Stage) -> None:
         assert search_bandwidths(free, False, survey) == replace(NOT_SOUGHT, undecided=True)
 
 
+@pytest.mark.slow
 def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
     """A stable orbit of four swings lies within 3 % of an unstable orbit of two.
 
@@ -284,6 +293,7 @@ def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
     assert edge.factor < 0.46474 < edge.quiet
 
 
+@pytest.mark.slow
 def test_simulations_that_take_too_much_leave_bandwidths_open_and_no_more() -> None:
     """Many maps of this stage are not resolved; its edge at 9.54 times the bandwidth is found all the same."""
     touching = draw(7001, 47, "stages").variants()["locked"]
@@ -292,6 +302,7 @@ def test_simulations_that_take_too_much_leave_bandwidths_open_and_no_more() -> N
     assert edge.factor == pytest.approx(9.5422, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_window_that_is_followed_to_the_stage_itself_contradicts_that_nothing_attracts_it(
     locked: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -304,6 +315,7 @@ def test_a_window_that_is_followed_to_the_stage_itself_contradicts_that_nothing_
     assert search_bandwidths(quiet, attracting=False).contradicts
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("attracts", [True, False])
 def test_what_one_survey_observed_makes_no_edge_certain_unless_a_thorough_one_does(
     locked: Stage, monkeypatch: pytest.MonkeyPatch, attracts: bool
@@ -336,6 +348,7 @@ SCHEDULED = Stage(
 half of the displacements, up to between 0.910 and 0.915 times."""
 
 
+@pytest.mark.slow
 def test_an_asymmetric_cycle_that_outlives_a_flip_makes_the_edge() -> None:
     edge = find_margin(SCHEDULED, attracting=False)
     assert edge is not None

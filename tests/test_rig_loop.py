@@ -21,6 +21,7 @@ from friso_thesis.studies.rig.outcome import freed
 STIFFNESS, STATIC = "joint.stiffness", "friction.static"
 
 
+@pytest.mark.slow
 def test_rig_logs_come_back_as_a_stage_file_that_holds_the_truth(tmp_path: Path) -> None:
     machine = built(3)
     slow = slow_legs(machine.truth, 1, 1)

@@ -69,6 +69,7 @@ def test_an_object_of_settings_reads_the_values_in_use_and_can_be_copied() -> No
             assert one.longest_run == 1.0
 
 
+@pytest.mark.cases(first=25)
 @pytest.mark.parametrize("settings", settings_classes(), ids=lambda settings: settings.__name__)
 def test_every_setting_has_a_reason(settings: type[Settings]) -> None:
     rows = settings.rows()
@@ -77,6 +78,7 @@ def test_every_setting_has_a_reason(settings: type[Settings]) -> None:
     assert [row.name for row in rows if "_" not in row.name] == []
 
 
+@pytest.mark.slow
 def test_tuning_numbers_are_settings() -> None:
     """A room names no more numbers of its own than it did, and fewer lower the list."""
     counts = Counter(dict.fromkeys(LITERALS, 0))
@@ -91,6 +93,7 @@ def test_tuning_numbers_are_settings() -> None:
     assert {room: count for room, count in counts.items() if count} == LITERALS
 
 
+@pytest.mark.slow
 def test_names_of_numbers_say_what_they_are() -> None:
     """One word, such as MOST or NEAR, stands for another number in every module."""
     short = [

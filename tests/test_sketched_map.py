@@ -34,6 +34,7 @@ def sketched(locked: Stage) -> SweepAnswer:
     return friso.sweep(locked, {"speed": SPEEDS.tolist(), "friction": [0.5, 1.0, 2.0]})
 
 
+@pytest.mark.slow
 def test_the_default_map_is_a_sketch_of_the_verdicts_that_a_search_gives(locked: Stage, sketched: SweepAnswer) -> None:
     searched = friso.sweep(locked, {"speed": SPEEDS.tolist(), "friction": [0.5, 1.0, 2.0]}, confirm=True)
     assert sketched.metric == "sketch"
@@ -43,6 +44,7 @@ def test_the_default_map_is_a_sketch_of_the_verdicts_that_a_search_gives(locked:
     np.testing.assert_array_equal(sketch, verdict)
 
 
+@pytest.mark.slow
 def test_a_cell_has_the_verdict_that_check_gives(locked: Stage) -> None:
     """At half its static friction the rig is soon within 10 um at its last place, but not at the one before."""
     stage = locked.replace({"friction.static": "1.5 N"})
@@ -52,6 +54,7 @@ def test_a_cell_has_the_verdict_that_check_gives(locked: Stage) -> None:
         assert runs.data["verdict"].values[k] == case.verdict
 
 
+@pytest.mark.slow
 def test_a_scaled_cell_is_a_stage_with_a_faster_controller_or_more_friction(
     locked: Stage, sketched: SweepAnswer
 ) -> None:
@@ -135,6 +138,7 @@ def test_regions_of_a_map_are_written_on_and_the_stage_points_to_the_nearest_edg
     assert cells.text[1, 2] == "2 1"
 
 
+@pytest.mark.slow
 def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(locked: Stage, sketched: SweepAnswer) -> None:
     """Without edges, the nearest cell is not called the stage."""
     (sentence,) = own_place(sketched.data, "sketch", sketched.edges)

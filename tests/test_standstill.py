@@ -93,6 +93,7 @@ def by_hand(flat: dict[str, Any], times: np.ndarray, step: float) -> np.ndarray:
     return np.array(positions)
 
 
+@pytest.mark.cases(slow=4)
 @pytest.mark.parametrize("name", [*SETTINGS, "all"])
 def test_a_trace_against_a_model_by_hand(name: str) -> None:
     settings = {key: value for part in SETTINGS.values() for key, value in part.items()}
@@ -177,6 +178,7 @@ def test_a_dead_zone_before_a_filter_runs_on_a_machine_as_built() -> None:
     assert np.abs(without[:-1] - ideal).max() > 5e-5
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     "name", ["leak", "hysteresis", "push", "standstill", "wide deadband", "dead zone", "wide dead zone"]
 )

@@ -39,6 +39,7 @@ def judged(stage: Stage, measures: Measures) -> str:
     return judge(stage, measures, 1e-6).verdict
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 @pytest.mark.usefixtures("own_bandwidth")
 def test_cells_equal_runs_alone(rig: Stage) -> None:
@@ -58,6 +59,7 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
             assert cell[name].item() == getattr(case, name)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_defaulted_tuned_mass_follows_a_swept_mass(rig: Stage) -> None:
     light = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
@@ -81,6 +83,7 @@ def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
     assert below.outcome.values.tolist() == ["swings", "invalid"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     """Total mass at a fixed ratio, and F_s = max(F_s, F_c), which leaves no cell invalid."""
@@ -98,6 +101,7 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     assert study_of(runs).cell_stage((0, 1)).friction.static == 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     ranges = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "10 um..1 mm:log"}
@@ -140,6 +144,7 @@ def test_only_the_metrics_asked_for_are_kept(rig: Stage) -> None:
     assert set(runs.data_vars) == {"peaks", "outcome", "status"}
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     shape=st.lists(st.integers(1, 15), min_size=1, max_size=4),
@@ -249,6 +254,7 @@ def test_an_unknown_metric_is_refused(rig: Stage) -> None:
         sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> None:
     """Asked for by name; the motion plays no part, and a cell that nothing attracts has no number."""
@@ -269,6 +275,7 @@ def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> N
     assert "multiplier" not in sweep(locked, {"controller.crossover": ["8 Hz"]})
 
 
+@pytest.mark.slow
 def test_measures_are_those_of_an_asymmetric_cycle_where_that_attracts() -> None:
     """The symmetric cycle repels at both crossovers; the other one is 0.876 mm large at the lower, by simulations at
     1e-7 and 1e-9, and gone at the higher."""

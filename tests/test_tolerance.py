@@ -51,6 +51,7 @@ def test_a_stage_that_rests_in_its_dead_zone_settles_there(resting: Stage) -> No
     assert case.settling_time[4e-4] == pytest.approx(entered, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_check_judges_within_what_the_user_says(resting: Stage) -> None:
     plain = resting.replace({"controller.freeze_window": None, "controller.freeze_window_exit": None})
     by_option, by_file = (friso.check(plain, within="50 um"), friso.check(plain.replace({"tolerance.within": "50 um"})))

@@ -83,12 +83,14 @@ TRANSFERS = {
 }
 
 
+@pytest.mark.cases(first=7)
 @pytest.mark.parametrize("way", ["coefficients", "roots", "matrices"])
 @pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
 def test_the_controller_is_its_transfer_function(transfer: tuple[list[float], list[float]], way: str) -> None:
     assert is_transfer(controlled(ways(*transfer)[way]), transfer)
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
 def test_loops_are_those_of_python_control(transfer: tuple[list[float], list[float]]) -> None:
     """Open and closed loop of the mass without friction, by arithmetic on transfer functions."""
@@ -124,6 +126,7 @@ def test_a_faster_controller_has_gain_and_frequencies_scaled(factor: float) -> N
     assert np.abs(quick / (factor**2 * slow) - 1).max() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [{}, {"force_limit": "7 N"}], ids=["free", "limited"])
 def test_the_trace_is_that_of_the_pid_controller_that_it_is(limit: dict[str, str]) -> None:
     """With a force limit the integral stays at the limit, by the same anti-windup."""
@@ -147,6 +150,7 @@ def test_it_hunts_as_the_pid_controller_that_it_is() -> None:
     assert other.attracting[0].amplitude == pytest.approx(one.attracting[0].amplitude, rel=1e-5)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("divided", [1, 4])
 @pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
 def test_coefficients_for_samples_run_as_they_are(transfer: tuple[list[float], list[float]], divided: int) -> None:
@@ -183,6 +187,7 @@ def test_the_integral_unwinds_by_its_own_samples(divided: int) -> None:
     assert command == pytest.approx(by_hand[: len(command)], abs=1e-8)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("pole", [0.0, 1e-3, 0.1])
 def test_a_slow_pole_winds_up_as_an_integral_does(pole: float) -> None:
     """A pole that leaks within 10 s or more changes little on a cycle of 0.6 s."""
@@ -206,6 +211,7 @@ def test_a_lag_that_winds_up_without_an_integral_is_not_surely_calm() -> None:
     assert verdict.reason == HuntingDoubt.LOOP
 
 
+@pytest.mark.cases(first=5)
 @pytest.mark.inner
 @pytest.mark.parametrize("name", [name for name, stage in VARIANTS.items() if cannot_hunt(stage)])
 def test_filters_of_controllers_without_integral_are_no_lags(name: str) -> None:
@@ -221,6 +227,7 @@ def test_a_filter_that_lags_winds_up() -> None:
     assert lags(Ensemble.held(both, 2)).tolist() == [False, True]
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 def test_a_lag_of_a_tenth_hunts_where_hardly_any_coulomb_friction_brakes() -> None:
     """Two poles at 0.5 1/s, and a static gain 1.11 times that which slip needs: +-0.98 mm every 2.2 s."""
@@ -302,7 +309,8 @@ def test_a_transfer_function_that_cannot_be_is_refused(keys: dict[str, Any], wor
     assert words in caught.value.expected
 
 
-@pytest.mark.parametrize("step", [0.5e-3, 8e-3])
+@pytest.mark.cases(first=1)
+@pytest.mark.parametrize("step", [8e-3, 0.5e-3])
 def test_what_only_samples_make_unstable_is_told_first(step: float, own_bandwidth: None) -> None:
     """The poles are computed by hand without friction.
 

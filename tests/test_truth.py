@@ -66,6 +66,7 @@ def test_small_swings_are_rest() -> None:
     assert evenly(np.full(300, 1e-4)) == RESTS
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("series", SERIES)
 def test_stages_are_drawn_again_by_seed_and_number(series: str) -> None:
     for number in range(len(SERIES[series])):
@@ -155,6 +156,7 @@ class Narrow(Bench):
         return SimpleNamespace(words=np.where(near, SWINGS, RESTS).astype(object))
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(("share", "refuted"), [(0.011, False), (0.0015, False), (0.0005, True)])
 def test_a_basin_of_a_hundredth_is_found_before_a_claim_is_called_wrong(share: float, refuted: bool) -> None:
     """Number 3 of seed 777, whose cycle attracts from 1 % to either side: no start of the battery comes so near."""
@@ -190,6 +192,7 @@ def test_what_was_found_before_an_attack_is_given_up_counts() -> None:
     assert _outcomes({"verdict": iter(())}) == ({"verdict": STOOD}, [])
 
 
+@pytest.mark.slow
 def test_stages_are_counted_by_class_of_machine() -> None:
     """Classes are law, joint and controller, settings, backlash, and friction on both sides of a transmission."""
     names = {name for series in SERIES for number in range(30) for name in classes_of(draw(7, number, series).flat())}
@@ -219,6 +222,7 @@ def outcome(number: int, wrong: bool = False) -> dict[str, Any]:
     return stage | {"claims": claims, "refuted": refuted}
 
 
+@pytest.mark.slow
 def test_attacks_are_told_by_class_and_in_a_table(tmp_path: Path) -> None:
     kept = KeptAttacks(tmp_path / "attacks.jsonl")
     records = [kept.add(outcome(number, wrong=number == 2)) for number in range(5)]

@@ -53,6 +53,7 @@ def test_a_text_file_has_a_largest_size_and_a_name_a_longest(tmp_path: Path) -> 
             friso.load(tmp_path / name)
 
 
+@pytest.mark.slow
 def test_a_table_of_countless_keys_is_refused_at_once() -> None:
     """For each of which the nearest known one would be looked for."""
     text = (RIG).read_text(encoding="utf-8")
@@ -62,6 +63,7 @@ def test_a_table_of_countless_keys_is_refused_at_once() -> None:
             friso.loads(text.replace(place, place + keys, 1))
 
 
+@pytest.mark.slow
 @posix
 def test_a_file_whose_name_is_no_text_is_answered(tmp_path: Path) -> None:
     """A name so long that no suffix fits is answered as well."""
@@ -89,6 +91,7 @@ def test_a_stage_is_not_saved_over_a_file_that_appears_meanwhile(
     assert ([*tmp_path.iterdir()], place.read_text()) == ([place], "mine")
 
 
+@pytest.mark.cases(first=1)
 @posix
 @pytest.mark.parametrize("arguments", [[], ["schema"]])
 @pytest.mark.parametrize(("way", "status"), [(">/dev/full", 1), ("<&- >&- 2>&-", 0)])
@@ -109,6 +112,7 @@ def test_every_public_function_checks_its_arguments() -> None:
 RANGES = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "0.1 mm..1 mm"}
 
 
+@pytest.mark.cases(first=19)
 @pytest.mark.parametrize(
     ("name", "value"),
     [

@@ -103,6 +103,7 @@ def velocities(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
     return results.samples[0][:, names.index("cart_velocity" if "cart_velocity" in names else "velocity")]
 
 
+@pytest.mark.slow
 @pytest.mark.inner
 @pytest.mark.xdist_group("rigid")
 @STEADY
@@ -135,6 +136,7 @@ CASES = [
 ]
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.inner
 @pytest.mark.parametrize(("name", "time", "crosses"), CASES)
 def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -> None:
@@ -245,6 +247,7 @@ def declared(name: str) -> tuple[Model, Model]:
     return model, variational(model)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("name", [RIGID, LIMITED, LOCKED_RIG, FREE_RIG, "touching"])
 def test_deviations_follow_the_linearised_equations(name: str) -> None:
     """After the states come as many deviations; their rates are the Jacobian times them."""
@@ -315,6 +318,7 @@ def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> M
     return Meeting(dict(values), dict(zip(map(str, whole.jumps[kink]), map(float, result), strict=True)))
 
 
+@pytest.mark.cases(first=6, slow=14)
 @pytest.mark.parametrize("name", VARIANTS)
 def test_deviations_jump_at_a_limiter_alone(name: str) -> None:
     """No friction law's rates jump at v = 0, nor a controller's at its limit.
@@ -334,6 +338,7 @@ def test_deviations_jump_at_a_limiter_alone(name: str) -> None:
         assert list(point.jumps.values()) == pytest.approx([0.0], abs=1e-9 * size)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(("side", "leaves"), list(product(("ahead", "behind"), (False, True))))
 def test_jump_at_a_limiter_by_hand(side: str, leaves: bool) -> None:
     """The force of its damper, d_l times a speed, is shared over that speed: whatever it is, the velocities deviate by
@@ -348,6 +353,7 @@ def test_jump_at_a_limiter_by_hand(side: str, leaves: bool) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_kink_whose_surface_is_level_at_a_trial_point_has_a_jump() -> None:
     """Two windows and a cascade: the surface of one does not depend there on the symbol that it is linear in."""
     stage = friso.load(friso.example("thesis_rig")).replace(

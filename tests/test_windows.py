@@ -244,6 +244,7 @@ def test_margins_are_of_every_set_of_gains() -> None:
     assert not any("schedule" in key for state in states for key in state)
 
 
+@pytest.mark.slow
 def test_cycles_are_as_stable_as_runs_beside_them_show() -> None:
     """Deviations are carried through the switches: multipliers of orbits against the growth in runs."""
     for name in ("deadband with time", "inner gains", "schedule over the error"):
@@ -260,6 +261,7 @@ def test_without_an_integral_a_switched_force_leaves_the_answer_open() -> None:
     assert (hunting_of(switched).certain, hunting_of(switched).reason) == (False, HuntingDoubt.SWITCHES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["deadband with exit", "freeze", "inner gains", "decay"])
 def test_what_is_said_of_hunting_is_what_a_long_run_by_hand_does(name: str) -> None:
     chosen = machine(WINDOWS[name], release("2 mm", "40 s"))
