@@ -18,7 +18,6 @@ from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner, standing
 from friso.hunting import (
     SEARCH_LIMITS,
-    AttractionEnd,
     Cycle,
     Ensemble,
     Kick,
@@ -31,10 +30,7 @@ from friso.hunting import (
     pushes_that_hunt,
 )
 from friso.hunting.basin import ends_in, evenly
-from friso.hunting.cycle.ensemble import done
-from friso.hunting.cycle.rest import pushed
 from friso.hunting.doubt import HuntingDoubt
-from friso.hunting.edge_search import EdgeSearch
 from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import own_motion
 from friso.stage import Stage
@@ -133,19 +129,6 @@ def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
 
 @pytest.mark.inner
 @RIGID
-def test_mirrored_releases_start_hunting_as_well() -> None:
-    several = np.geomspace(1e-3, 0.1, 32)
-    flat = rigid(8).flat()
-    one, other = (
-        ends_in({**flat, "motion.displacement": sign * several}, 32, target())[0].tolist() for sign in (1, -1)
-    )
-    assert one == other
-    assert True in one
-    assert False in one
-
-
-@pytest.mark.inner
-@RIGID
 def test_pushes_that_start_hunting() -> None:
     """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
     chosen = rigid(8)
@@ -155,17 +138,11 @@ def test_pushes_that_start_hunting() -> None:
     stages = Ensemble.held(chosen.flat(), 4)
     starts = np.zeros((4, 5))
     starts[:, stages.kernel.states.index("velocity")] = velocities
-    assert np.array_equal(starts, pushed(stages, velocities))
     duration = LONG * cycle().period
     results = stages.run(starts, np.full(4, duration), 1e-7, interval=duration / 20000)
-    assert done(results).all()
     swing = np.ptp(results.samples[:, -600:, stages.kernel.position], axis=1) / 2
     assert swing[:2] == pytest.approx(cycle().amplitude, rel=0.05)
     assert np.all(swing[2:] < 0.05 * cycle().amplitude)
-
-
-def test_nothing_that_starts_hunting() -> None:
-    assert Kick((), (1e-5, 1e-1)).smallest is None
 
 
 MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
@@ -304,17 +281,6 @@ def at(chosen: Stage, factor: float) -> Stage:
     return chosen.replace({key: f"{float(scaled[key])!r} {unit}" for key, unit in texts.items()})
 
 
-@pytest.mark.slow
-@pytest.mark.inner
-@RIGID
-def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search up to the edge, within its error, then contains no bandwidth at all."""
-    monkeypatch.setattr(EdgeSearch, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
-    edge = find_margin(rigid(38), attracting=False)
-    assert edge is not None
-    assert edge.factor == pytest.approx(0.9999 * SEARCH_LIMITS.lowest_bandwidth)
-
-
 @RIGID
 @pytest.mark.thorough
 def test_margin_from_above_is_that_from_below() -> None:
@@ -332,12 +298,6 @@ def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: 
     """The edge at 9.77 Hz is too far off to be looked for."""
     assert not SEARCH_LIMITS.lowest_bandwidth < 9.77 / crossover < SEARCH_LIMITS.highest_bandwidth
     assert find_margin(rigid(crossover), attracting) is None
-
-
-@pytest.mark.inner
-def test_edges_are_sought_finer_than_they_are_checked() -> None:
-    """The checks above at 2 % mean something only while edges are found to 1 %."""
-    assert BasinSettings().kick_edge_share <= 0.01
 
 
 @pytest.mark.inner
