@@ -587,7 +587,7 @@ def test_swings_that_repeat_themselves() -> None:
 @pytest.mark.slow
 def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_at_rest() -> None:
     """A survey of many stages stops at one motion that attracts: there may be smaller ones."""
-    flat = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz"}).flat()
+    flat = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz", "motion.displacement": "4 mm"}).flat()
     still_moving = Motions(np.ones(1, bool), np.zeros(1, bool), np.zeros(1), np.full(1, np.nan), np.full(1, np.nan))
     assert judge_runs(flat, still_moving, ten_times_larger(flat), 1e-6).tolist() == ["hunts"]
 
@@ -650,7 +650,7 @@ def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sur
     changes = {f"friction.{name}": value for name, value in friction.items()}
     small = VARIANTS["rigid"].replace({**changes, "controller.crossover": "8 Hz", "motion.duration": "60 s"})
     nothing = replace(hunting(small), target=None, cycles=())
-    with patched({verdict: {"hunting": lambda stage, work: nothing}}):
+    with patched({verdict: {"hunting": lambda stage, work, side: nothing}}):
         case = check_given(small)
     assert case.settling_time[1e-5] is not None
     assert 1.02e-5 < case.peak_to_peak < 1.06e-5
@@ -689,13 +689,13 @@ def asymmetric_stage() -> Stage:
             "alpha": 0.13612704933979777,
             "beta": 4.330557094225373,
         },
-        motion={"kind": "release", "displacement": "0.0187486 m", "duration": "20 s"},
+        motion={"kind": "step", "size": "-0.0187486 m", "duration": "20 s"},
     )
 
 
 @pytest.mark.slow
 def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_may_come_to_rest() -> None:
-    """Released from 18.7 mm the stage swings like them, at 1e-6, for up to 5000 s; at 1e-8 to 1e-10 it is at rest from
+    """After a step of 18.7 mm the stage swings like them, at 1e-6, for up to 5000 s; at 1e-8 to 1e-10 it rests from
     2000 s on."""
     stage = asymmetric_stage()
     target = hunting(stage).target
@@ -709,8 +709,8 @@ def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_ma
 
 @pytest.mark.slow
 def test_a_motion_that_swings_less_often_than_what_was_observed_is_not_told_at_rest() -> None:
-    """Released from 12.09817 mm, the stage swings as far, but every 1215 s, with pauses of 940 s."""
-    seldom = asymmetric_stage().replace({"motion.displacement": "12.09817 mm"})
+    """After a step of 12.09817 mm, the stage swings as far, but every 1215 s, with pauses of 940 s."""
+    seldom = asymmetric_stage().replace({"motion.size": "-12.09817 mm"})
     target = hunting(seldom).target
     assert target is not None
     ends, completed, swing = ends_in(seldom.flat(), 1, target)

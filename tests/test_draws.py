@@ -322,7 +322,7 @@ def test_check_draws(
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "none of 8 machines" in page
     beside.write_text('keys = ["masses.cart"]\nmatrix = [[1]]')
-    assert run(monkeypatch, "check", path, *options) == 2
+    assert run(monkeypatch, "check", path, *options, "--overwrite") == 2
     assert "masses.cart" in rows_of(capsys.readouterr().err)["given"]
 
 

@@ -158,7 +158,7 @@ def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments:
 @pytest.mark.slow
 @pytest.mark.parametrize("numbers", [("5", "0"), ("0",), ("a", "b"), ("-1", "0")])
 def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str, ...]) -> None:
-    done = friso_inside(mapped[0], "simulate", "--cell", "a.zarr", "--", *numbers)
+    done = friso_inside(mapped[0], "simulate", "--cell", "a.zarr", "--out", "new", "--", *numbers)
     assert done.returncode == 2
     ranges = [("controller.crossover", "0", "4"), ("joint.stroke", "0", "3")]
     assert re.findall(r"([a-z]+\.[a-z]+) (\d+) to (\d+)", done.stderr) == ranges

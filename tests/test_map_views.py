@@ -393,7 +393,7 @@ def test_a_large_map_is_a_picture_inside_a_vector_file():
 
 def page_of(runs: xr.Dataset, metric: str = "peaks", store: str = "map.zarr") -> str:
     """The page of made-up runs in a store."""
-    study = Request(RIG, {STROKE: ([0.0, 1e-3], "m")}, None, {}, False).study([])
+    study = Request(RIG, {STROKE: ([0.0, 1e-3], "m")}).study([])
     parts = {"stage": RIG, "study": study, "metric": metric, "store": Path(store), "exports": (), "edges": None}
     return SweepAnswer(runs, **parts).page().html()
 

@@ -236,7 +236,7 @@ def test_a_lag_of_a_tenth_hunts_where_hardly_any_coulomb_friction_brakes() -> No
     friction |= {"bristle_stiffness": "1e7 N/m", "bristle_damping": "6000 N*s/m", "viscous": "0 N*s/m"}
     numerator, denominator = 1000 * np.polymul(fast, [1.9e-4, 1.0]), np.polymul(slow, [9.5e-6, 1.0])
     keys = {"numerator": [*map(float, numerator)], "denominator": [*map(float, denominator)]}
-    motion = {"kind": "release", "displacement": "1.3 mm", "duration": "300 s"}
+    motion = {"kind": "release", "displacement": "1.5 mm", "duration": "300 s"}
     friction |= {"stribeck_exponent": 2}
     stage = controlled(keys, masses={"cart": "1 kg"}, friction=friction, motion=motion)
     assert lags(Ensemble.held(stage.flat(), 1)).all()

@@ -127,7 +127,7 @@ def test_the_command_line_reads_the_list(guessed: Stage, tmp_path: Path) -> None
     assert document["condition"].startswith(f"If {KEY}")
     assert document["conclusion"].startswith(f"If {KEY}")
     assert "condition" not in json.loads(
-        friso_inside(tmp_path, "simulate", path, "--set", f"{KEY}=2e5 N/m", "--json").stdout
+        friso_inside(tmp_path, "simulate", path, "--set", f"{KEY}=2e5 N/m", "--out", "known", "--json").stdout
     )
 
 

@@ -203,7 +203,7 @@ def _starts(plain: Plain, amplitude: float) -> Iterator[np.ndarray]:
         yield plain.stuck(share * amplitude)
     for place, distance in enumerate(DISTANCES[::-1] * plain.length):
         yield plain.stuck(distance if place % 2 else -distance)
-        yield plain.released(-distance if place % 2 else distance)
+        yield plain.jumped(-distance if place % 2 else distance)
 
 
 def _followed(plain: Plain, start: np.ndarray, periods: float, rtol: float, last: bool) -> tuple[str, Run]:

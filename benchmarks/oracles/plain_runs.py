@@ -147,6 +147,16 @@ class Plain:
         """Return a start at rest at a displacement [m], with nothing wound up."""
         return np.append(self.equations.start(displacement), 0.0)
 
+    def jumped(self, displacement: float) -> np.ndarray:
+        """Return a start at rest at a displacement [m] after a jump of the reference.
+
+        Filters of the error have not followed it yet.
+        """
+        y = self.released(displacement)
+        if self._number("on_error") or self._number("observer"):
+            y[[LOW, RATE, INTEGRAL]] = 0.0
+        return y
+
     def stuck(self, displacement: float) -> np.ndarray:
         """Return a start at rest at a displacement [m], with the integral in balance.
 
