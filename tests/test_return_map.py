@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from benchmarks.truth.draws import draw
 from friso.engine.allowance import allowance
 from friso.equations.bandwidth import faster
-from friso.hunting import Ensemble, displacements_that_hunt, hunting, find_attractors, find_margin, find_swings, sketch_attractors
+from friso.hunting import (
+    Ensemble,
+    displacements_that_hunt,
+    find_attractors,
+    find_margin,
+    find_swings,
+    hunting,
+    sketch_attractors,
+)
 from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.return_map.attracting import survey_maps
 from friso.hunting.return_map.landing_map import LandingMap
