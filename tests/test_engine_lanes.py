@@ -112,10 +112,6 @@ def test_half_as_many_lanes_or_twice_as_many(native: Kernel, flat: Flat, referen
     assert_identical(run(other, flat, BASE), reference)
 
 
-def test_again(native: Kernel, flat: Flat, reference: Results) -> None:
-    assert_identical(run(native, flat, BASE), reference)
-
-
 def test_a_run_out_of_steps_harms_no_other(native: Kernel, flat: Flat, reference: Results) -> None:
     attempted = reference.statistics[:, 5]
     budget = int(np.median(attempted))
@@ -156,20 +152,6 @@ def test_runs_of_different_length(native: Kernel, flat: Flat) -> None:
     assert_identical(
         run(native, flat | {"motion.duration": lengths}, RunOptions(1e-5, interval=5e-3, chunk=7)), together
     )
-
-
-@pytest.mark.parametrize(
-    ("status", "remedy"),
-    [
-        (Status.BUDGET, "loosen rtol"),
-        (Status.UNDERFLOW, "check the controller's gains"),
-        (Status.DIVERGED, "check the controller's gains"),
-        (Status.FULL, "shorten the motion"),
-        (Status.NOT_RUN, "interrupted"),
-    ],
-)
-def test_the_text_of_a_failure_names_the_remedy(status: Status, remedy: str) -> None:
-    assert remedy in status.text
 
 
 def test_many_turning_points_get_room() -> None:

@@ -13,7 +13,6 @@ from patched import patched
 
 import friso
 from friso.engine.arrays import Status
-from friso.equations.as_built import AsBuilt
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
@@ -24,9 +23,6 @@ from friso.remedies import method
 from friso.remedies.catalogue import remedies
 from friso.remedies.search import Budget
 from friso.stage import Stage, save
-from friso.virtual_rig.run import as_built_keys
-from friso_thesis.studies.rig.experiments import hunting
-from friso_thesis.studies.rig.moves_on_rails import rails
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 CONTROLLER = {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg", "force_limit": "200 N"}
@@ -122,28 +118,6 @@ def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
     assert "At 6.00 Hz" in document["conclusion"]
     slow = crossover.limits(whole.replace({"drive.delay": None, "drive.sample_time": None}).flat())
     assert document["highest_stable_crossover_hz"] < slow.highest_stable
-
-
-def small(stage: Stage) -> np.ndarray:
-    return rails(stage)[:2]
-
-
-@pytest.mark.slow
-def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
-    save(whole, tmp_path / "stage.toml")
-    sizes = {
-        "RELATIVE_CROSSOVERS": np.array([0.3, 0.5]),
-        "SHOWN_CROSSOVERS": (0, 1),
-        "RELEASE_DISTANCES": (0.02,),
-        "rails": small,
-    }
-    with patched({hunting: sizes}):
-        run = friso_inside(tmp_path, "rig", "hunting", "stage.toml", "--json")
-    assert run.returncode == 0, run.stderr
-    document = json.loads(run.stdout)
-    assert len(document["logs"]) == 4
-    assert document["results"]["crossovers_hz"] == pytest.approx([1.8, 3.0])
-    assert AsBuilt.of(as_built_keys(whole)).structure.controller is not None
 
 
 def test_compare(whole: Stage, tmp_path: Path) -> None:
