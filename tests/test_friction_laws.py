@@ -130,14 +130,6 @@ def test_friction_creates_no_energy_where_it_is_passive(
     assert np.max(losses) > 0
 
 
-def test_the_thesis_values_are_not_passive() -> None:
-    """sigma_2 0.5 against 632: where a stuck mass is torn loose at speed, friction gives energy back."""
-    flat = VARIANTS["rigid"].flat()
-    torn = np.array([[0.0, 0.05, 2.9e-5]])
-    assert energy_loss(flat, torn)[0] < 0
-    assert energy_loss(flat | friction_keys(viscous=633.0), torn)[0] > 0
-
-
 def swing_heights(results: Results) -> np.ndarray:
     """Return distinct turning points, without the ringing at a stop."""
     values = results.turn_values[0, : results.turn_counts[0]]

@@ -1,7 +1,6 @@
 """Whether a loop is stable, friction aside, against the criterion of Hurwitz."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ import friso
 from friso.equations.bandwidth import faster
 from friso.hunting import AttractionEnd, BandwidthWindow, Ensemble, loops_unstable, unstable
 from friso.hunting.loop import at_lower_gains
-from friso.hunting.margin import search_bandwidths, unstable_bandwidths
-from friso.hunting.settings import CheckSettings, EdgeSettings
+from friso.hunting.margin import unstable_bandwidths
 from friso.stage import Stage
 
 
@@ -48,20 +46,6 @@ def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None
     mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
     gain = share * flat["friction.viscous"] * flat["controller.kp"] / mass
     assert loop_at_lower_gains(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == always
-
-
-@pytest.mark.inner
-def test_many_loops_are_looked_at_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All loops at once took 0.1 MB each, hence 1 GB for a map of 100 by 100 cells."""
-    flat, shares, held = VARIANTS["rigid, Stribeck 2, PI, limit"].flat(), np.array([0.9, 1.1, 0.9, 1.1, 1.1]), []
-    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
-    gains = shares * flat["friction.viscous"] * flat["controller.kp"] / mass
-    stages, at_once = Ensemble.held({**flat, "controller.ki": gains}, len(gains)), Ensemble.held
-    monkeypatch.setattr(Ensemble, "held", lambda keys, count, **how: held.append(count) or at_once(keys, count, **how))
-    with CheckSettings(loops_at_once=2).in_use():
-        words = at_lower_gains(stages).tolist()
-    assert words == ["stable" if share < 1 else "unstable" for share in shares]
-    assert max(held) == 2 * CheckSettings().lower_gain_shares[-1]
 
 
 @pytest.mark.inner
@@ -190,55 +174,3 @@ def test_what_lies_outside_of_another_window_is_left() -> None:
     ):
         parts = whole.without(lost)
         assert [(part.low and part.low.inside, part.high and part.high.inside) for part in parts] == left
-
-
-LAGGED = """
-name = "cascade whose velocity is low-passed"
-masses = { stage = "8 kg" }
-
-[motion]
-kind = "there_and_back"
-duration = "20 s"
-acceleration = "3 m/s^2"
-acceleration_time = "80 ms"
-return_at = "5 s"
-
-[friction]
-model = "lugre"
-static = "12 N"
-coulomb = "8 N"
-stribeck_velocity = "2 mm/s"
-stribeck_exponent = 2
-viscous = "30 N*s/m"
-bristle_stiffness = "3 N/um"
-bristle_damping = "1500 N*s/m"
-
-[controller]
-kind = "cascade"
-kv = "60 1/s"
-kp = "2513 N*s/m"
-velocity_integral_time = "0.1 s"
-force_limit = "2513 N"
-anti_windup = "clamp"
-
-[[controller.filters]]
-kind = "low_pass"
-path = "feedback"
-frequency = "159 Hz"
-order = 2
-damping_ratio = 1.0
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.inner
-def test_where_the_loop_is_unstable_no_bandwidth_is_left_undecided(tmp_path: Path) -> None:
-    """That hunting was not determined, for its work, was told of bandwidths at which the loop is unstable alone."""
-    (tmp_path / "lagged.toml").write_text(LAGGED, encoding="utf-8")
-    chosen = friso.load(tmp_path / "lagged.toml")
-    (window,) = unstable_bandwidths(chosen)
-    with EdgeSettings(simulated_work=1e6).in_use():
-        sought = search_bandwidths(chosen, attracting=False)
-    assert (sought.margin, sought.undecided) == (None, False)
-    assert window.low is not None
-    assert [part for hunting in sought.windows for part in hunting.without(window)] == []
