@@ -47,8 +47,6 @@ from friso.stage import Stage
 from friso.studies.boundary import REPELS, UNKNOWN, place_verdicts
 from friso.studies.sweep import sweep
 
-pytestmark = pytest.mark.inner
-
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
     {
         "masses": {"cart": "3.2095 kg", "stage": "1.4139 kg"},

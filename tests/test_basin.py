@@ -81,7 +81,6 @@ def hunts(chosen: Stage) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.inner
 @RIGID
 def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
     """A verdict is uncertain at the very end of a window of kicks, and certain a hundredth beside it."""
@@ -127,7 +126,6 @@ def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
     assert not hunts(released(place / inwards))
 
 
-@pytest.mark.inner
 @RIGID
 def test_pushes_that_start_hunting() -> None:
     """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
@@ -148,7 +146,6 @@ def test_pushes_that_start_hunting() -> None:
 MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
 
 
-@pytest.mark.inner
 @RIGID
 def test_share_of_moves_is_reproducible() -> None:
     """Equal draws give equal numbers."""
@@ -181,7 +178,6 @@ def test_a_run_that_goes_on_where_its_reference_stands_is_the_whole_run(kind: st
 
 
 @pytest.mark.slow
-@pytest.mark.inner
 @RIGID
 def test_moves_by_single_runs() -> None:
     """The count equals that of single runs of the draws; eight of them, hunting and resting, are simulated."""
@@ -300,7 +296,6 @@ def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: 
     assert find_margin(rigid(crossover), attracting) is None
 
 
-@pytest.mark.inner
 def test_a_stage_that_rests_just_below_break_away_is_not_shaken_loose_by_rounding() -> None:
     """Behind a backlash the motor stands on its flank with 99.94 % of the static friction once the error is gone: for
     ever, at tolerances of 1e-7 to 1e-9; at 1e-6 the stage broke away again."""

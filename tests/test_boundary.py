@@ -81,7 +81,6 @@ def test_a_hundredth_of_a_key_does_not_depend_on_the_range(swept: KeyRange, valu
     assert slanted(2 * place) == pytest.approx(2 * swept.hundredth(place))
 
 
-@pytest.mark.inner
 def test_a_branch_whose_places_scatter_turns_within_its_reserve() -> None:
     """Parabolas through places that scatter: the reserve mostly holds the true one; a line does not turn."""
     draws, lengths = np.random.default_rng(1), np.linspace(-0.03, 0.03, 8)

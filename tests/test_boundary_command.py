@@ -324,7 +324,6 @@ def test_where_curves_end_is_told(two: Plane) -> None:
     assert marks == {LOST: 2}
 
 
-@pytest.mark.inner
 def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane) -> None:
     """Hunting ends on a curve or between two stages, along the first key or else the second.
 

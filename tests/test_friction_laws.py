@@ -55,7 +55,6 @@ def test_friction_in_a_steady_motion_is_that_of_the_linear_systems(name: str) ->
     assert friction == pytest.approx(np.concatenate([forward, -backward]), rel=1e-12)
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize(("share", "possible"), [(0.9995, True), (0.6, False)])
 def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_a_little(
     share: float, possible: bool
@@ -64,7 +63,6 @@ def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_
     assert small_cycles_possible(Ensemble.held(flat, 1)) == possible
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize(("play", "why"), [("200 um", ""), ("20 um", ""), ("100 nm", HuntingDoubt.BEYOND)])
 def test_what_a_backlash_deflects_the_loop_by_is_no_friction_that_falls(play: str, why: str) -> None:
     """Friction falls by two thirds at speeds far above those of small swings.

@@ -38,8 +38,6 @@ from friso.hunting.verdict import (
 )
 from friso.stage import Stage
 
-pytestmark = pytest.mark.inner
-
 STAGE = VARIANTS["rigid"]
 TARGET = Target(1e-3, 1.6, 100.0, 25.0)
 HUNTING = Kick(((2e-3, 1e-2),), (1e-5, 0.1))

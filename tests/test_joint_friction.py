@@ -106,7 +106,6 @@ def test_what_is_said_of_hunting_is_what_runs_from_many_places_do(law: str, cros
         assert min(abs(one.amplitude / max(swings) - 1) for one in said.attracting) < 1e-3
 
 
-@pytest.mark.inner
 def test_without_an_integral_nothing_is_sure_of_friction_that_follows_the_drive() -> None:
     proportional = stage(release(), friction=load_dependent(0.3), controller=PD)
     said = hunting_of(proportional)

@@ -37,7 +37,6 @@ def test_a_loop_without_proportional_gain_is_looked_at() -> None:
     assert unstable(VARIANTS["rigid stage, PI"].replace({"controller.kp": "0 N/m"})) == ()
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize(("share", "always"), [(0.98, "stable"), (1.02, "unstable")])
 def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None:
     """m s^3 + sigma_2 s^2 + N kp s + N ki has its roots on the left at all gains N where m ki < sigma_2 kp."""
@@ -48,7 +47,6 @@ def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None
     assert loop_at_lower_gains(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == always
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize("mass", [0.01, 0.1, 0.3, 0.6, 1.7, 200.0])
 def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     """The roots of (m s^2 + sigma_2 s) tau_i s (tau_p s + 1) + k_p (tau_z s + 1)(tau_i s + 1) decide (Eq. 7, 8)."""
@@ -65,7 +63,6 @@ def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     assert lost == (mass < 0.2)
 
 
-@pytest.mark.inner
 def test_van_dijks_rules_need_their_gain_where_hardly_anything_is_viscous() -> None:
     """The derivative makes the loop stable at its own gain; at lower ones m ki > sigma_2 kp decides."""
     assert unstable(VARIANTS["rigid"]) == ()
@@ -83,7 +80,6 @@ def test_a_stage_without_friction_is_judged_too() -> None:
     assert unstable(smooth) == ("sticks", "slides")
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize(
     ("changes", "always"),
     [
@@ -144,7 +140,6 @@ def test_an_unstable_loop_is_mentioned_beside_a_run(rig: Stage, caplog: pytest.L
     assert any("is unstable while the stage sticks and while" in text for text in caplog.messages)
 
 
-@pytest.mark.inner
 def test_a_loop_is_unstable_just_inside_the_bandwidths_stated_and_stable_just_outside() -> None:
     """A cascade with filters on a parasitic mode is unstable over a range of bandwidths, and stable again above it."""
     chosen = friso.load(friso.example("twincat_cascade"))
@@ -156,7 +151,6 @@ def test_a_loop_is_unstable_just_inside_the_bandwidths_stated_and_stable_just_ou
         assert loops_unstable(faster(chosen.flat(), places), 3).tolist() == [True, False, False]
 
 
-@pytest.mark.inner
 def test_what_lies_outside_of_another_window_is_left() -> None:
     def window(low: float | None, high: float | None, reserve: float = 0.0) -> BandwidthWindow:
         low_end = None if low is None else AttractionEnd(low, low * (1 - reserve), True)

@@ -89,7 +89,6 @@ def cycle() -> tuple[Ensemble, Cycles]:
     return stages, cycles
 
 
-@pytest.mark.inner
 def test_the_cycle_against_simulation(cycle: tuple[Ensemble, Cycles]) -> None:
     """Amplitude and period of the cycle that shooting closes are those in which a long run ends; so is its multiplier:
     neighbours drift away from it by as much as they do in runs of their own."""
@@ -126,7 +125,6 @@ def test_the_cycle_against_scipy_with_events(cycle: tuple[Ensemble, Cycles]) -> 
     assert states[-1] == pytest.approx(-start, abs=1e-6 * cycles.amplitude[0])
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize("duration", [0.004, 0.03])
 def test_deviations_through_switches_against_differences(duration: float) -> None:
     """The derivative of the flow by where it began, over elements that break loose, drop and stick again."""

@@ -82,7 +82,6 @@ def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
         assert peaks(list(zip(times.tolist(), values.tolist(), strict=True))) == times[sorted(kept)].tolist()
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize("many", [0, 10**9])
 def test_period_of_a_cycle_with_ringing_on_top(many: int) -> None:
     """A 2 s cycle of 1 mm on which a 0.05 s ringing of 0.1 mm makes turning points of its own; compiled and plain."""
@@ -124,7 +123,6 @@ def test_a_period_longer_than_the_last_quarter_is_taken_from_the_last_half() -> 
     assert period[0] == pytest.approx(6.0)
 
 
-@pytest.mark.inner
 def test_compiled_loops_do_what_the_plain_ones_do() -> None:
     rng = np.random.default_rng(1)
     times = np.sort(rng.uniform(8, 20, (300, 40)), axis=1)

@@ -29,8 +29,6 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.what_attracts import map_may_decide, resolved_map
 from friso.stage import Stage
 
-pytestmark = pytest.mark.inner
-
 DISTANCES = np.geomspace(0.01, 3.0, 400)
 
 

@@ -163,7 +163,6 @@ def test_a_cycle_longer_than_the_run_is_told(locked: Stage) -> None:
     assert not caveats(runs.isel({"controller.crossover": [2]}), "sketch")
 
 
-@pytest.mark.inner
 def test_an_attractor_of_few_points_is_not_trusted(locked: Stage) -> None:
     """At 1.357 times its speed, with 2.4 % more friction, a coarse map has an attractor that no orbit confirms."""
     flat = with_friction(faster(locked.flat(), 1.3572), 1.02436)

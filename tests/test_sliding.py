@@ -8,8 +8,6 @@ from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, stick_slip
 from friso.shown.motion_words import stick_slip_sentences
 from friso.stage import Stage
 
-pytestmark = pytest.mark.inner
-
 
 @pytest.fixture(scope="module")
 def pulled() -> Stage:

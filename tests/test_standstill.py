@@ -214,7 +214,6 @@ def test_an_integral_that_leaks_is_waited_for_until_it_changes_no_more() -> None
     assert after == pytest.approx(long_after, rel=1e-3)
 
 
-@pytest.mark.inner
 def test_nothing_is_sure_beyond_a_wide_dead_zone() -> None:
     """The break-away force deflects the loop by 1.5 mm; most starts are nearer than 3.5 mm to the reference."""
     wide = hunting_of(machine({"error_deadband": "3.5 mm"}))

@@ -40,7 +40,6 @@ def judged(stage: Stage, measures: Measures) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.inner
 @pytest.mark.usefixtures("own_bandwidth")
 def test_cells_equal_runs_alone(rig: Stage) -> None:
     """Any cell, run alone as a stage of its own, gives the same numbers bit for bit, and the verdict of a check."""

@@ -197,7 +197,6 @@ def test_a_slow_pole_winds_up_as_an_integral_does(pole: float) -> None:
     assert cycle.period == pytest.approx(0.634, rel=0.02)
 
 
-@pytest.mark.inner
 def test_a_lag_that_winds_up_without_an_integral_is_not_surely_calm() -> None:
     """The controller has two slow poles: "cannot hunt" was said of a stage that hunts in simulation."""
     fast = np.polymul([KD + KP * TAU, KP + KI * TAU, KI], [1.0, 5.0])
@@ -212,13 +211,11 @@ def test_a_lag_that_winds_up_without_an_integral_is_not_surely_calm() -> None:
 
 
 @pytest.mark.cases(first=5)
-@pytest.mark.inner
 @pytest.mark.parametrize("name", [name for name, stage in VARIANTS.items() if cannot_hunt(stage)])
 def test_filters_of_controllers_without_integral_are_no_lags(name: str) -> None:
     assert not lags(Ensemble.held(VARIANTS[name].flat(), 1)).any()
 
 
-@pytest.mark.inner
 def test_a_filter_that_lags_winds_up() -> None:
     """A stage without stiffness hides no lag beside it."""
     lag = {"kind": "lead_lag", "zero_frequency": "0.5 Hz", "pole_frequency": "0.005 Hz"}
@@ -228,7 +225,6 @@ def test_a_filter_that_lags_winds_up() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.inner
 def test_a_lag_of_a_tenth_hunts_where_hardly_any_coulomb_friction_brakes() -> None:
     """Two poles at 0.5 1/s, and a static gain 1.11 times that which slip needs: +-0.98 mm every 2.2 s."""
     slow, fast = np.poly([-0.5, -0.5]), np.poly([-0.5 / np.sqrt(0.9)] * 2)

@@ -319,7 +319,6 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
     assert cannot_hunt(backlash_alone.replace({"transmission.backlash": "0 um"}))
 
 
-@pytest.mark.inner
 def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) -> None:
     """All motions shrink in proportion to the backlash, so no small share of it ends them."""
     result = feeding(backlash_alone)
@@ -329,7 +328,6 @@ def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) 
 
 
 @pytest.mark.slow
-@pytest.mark.inner
 @pytest.mark.parametrize(("share", "certain"), [(0.01, True), (0.001, False)])
 def test_what_feeds_it_is_computed(share: float, certain: bool) -> None:
     """A belt with backlash and little friction still swings without friction, and rests with less backlash.
@@ -343,7 +341,6 @@ def test_what_feeds_it_is_computed(share: float, certain: bool) -> None:
     assert result == Feeding(Decline(share, None, True), Decline(1.0, share, certain))
 
 
-@pytest.mark.inner
 def test_what_feeds_it_is_told() -> None:
     keys = dry_friction(machine().flat())
     assert {"friction.static", "motor_friction.bristle_stiffness", "friction.bristle_damping"} <= {*keys}

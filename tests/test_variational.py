@@ -104,7 +104,6 @@ def velocities(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.inner
 @pytest.mark.xdist_group("rigid")
 @STEADY
 @given(
@@ -137,7 +136,6 @@ CASES = [
 
 
 @pytest.mark.cases(first=3)
-@pytest.mark.inner
 @pytest.mark.parametrize(("name", "time", "crosses"), CASES)
 def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -> None:
     """Each structure runs up to its first reversal and past several.
@@ -151,7 +149,6 @@ def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -
     assert np.all(off(stages, start, time, flow(stages, start, time)) < CLOSE)
 
 
-@pytest.mark.inner
 @pytest.mark.xdist_group("gains")
 @pytest.mark.parametrize("time", [0.02, 0.05, 0.1, 0.3, 0.5])
 def test_flow_at_the_force_limit(time: float) -> None:
@@ -212,7 +209,6 @@ def bounce() -> Bounce:
     return Bounce()
 
 
-@pytest.mark.inner
 @pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> None:
@@ -221,7 +217,6 @@ def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> Non
     assert np.all(off(bounce.stages, bounce.start, time, flow(bounce.stages, bounce.start, time)) < CLOSE)
 
 
-@pytest.mark.inner
 @pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_deviations_jump_at_the_limiter_by_the_saltation_matrix(bounce: Bounce, time: float) -> None:

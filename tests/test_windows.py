@@ -252,7 +252,6 @@ def test_cycles_are_as_stable_as_runs_beside_them_show() -> None:
         assert cycle.multiplier == pytest.approx(cycle.growth, abs=2e-3)
 
 
-@pytest.mark.inner
 def test_without_an_integral_a_switched_force_leaves_the_answer_open() -> None:
     """A dead zone that is left later than it is entered takes force away where it would brake."""
     plain = machine({"error_deadband": "100 um"}).replace({"controller.ki": "0 N/(m*s)"})
