@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusals import refused
 
 import friso
 from friso.axis import KINDS
@@ -123,20 +122,6 @@ def test_without_an_actuator_each_gain_in_amperes_says_what_it_needs(tables: dic
     assert sum("[actuator] motor_constant" in text for text in said) == len(amperes)
 
 
-@pytest.mark.parametrize("constant", ["50", "50 N", "0 N/A", 50, None])
-def test_a_wrong_constant_is_the_one_mistake(constant: Any) -> None:
-    actuator = {} if constant is None else {"motor_constant": constant}
-    with refused("actuator.motor_constant", friso.StageError) as caught:
-        Stage(**{**LINEAR, "actuator": actuator})
-    assert not caught.value.also
-
-
-@pytest.mark.parametrize("text", ["2 A/rpm", "2 A*s", "2 A^2*s/m", "2 V*s/m", "2 A/m"])
-def test_amperes_of_another_kind_are_refused(text: str) -> None:
-    with refused("controller.kd"):
-        Stage(**LINEAR).replace({"controller.kd": text})
-
-
 def test_amperes_stand_wherever_a_value_of_the_stage_is_given() -> None:
     stage = Stage(**LINEAR)
     swept = read_axis(stage, "controller.kp", ["50 A/mm", "100 A/mm"], free=False)
@@ -203,24 +188,6 @@ def test_what_export_prints_in_volts_may_stand_in_the_file() -> None:
                 tried += 1
                 assert stage.replace({keys[0]: f"{number!r} {other}"}).flat()[keys[0]] == pytest.approx(value)
     assert tried == 3 * 4
-
-
-@pytest.mark.parametrize(
-    ("changed", "part"),
-    [
-        ({"controller.kp": "3 A/mm"}, "and no resistance"),
-        ({"actuator.resistance": None, "actuator.supply": None, "actuator.full_pwm": None}, "resistance ="),
-        ({"actuator.supply": None, "actuator.full_pwm": None}, "supply ="),
-        ({"actuator.supply": None}, "what belongs to full_pwm"),
-        ({"controller.kp": "3 PWM/count", "actuator.full_pwm": None}, "full_pwm ="),
-        ({"controller.kp": "3 V/count", "drive.encoder_resolution": None}, "encoder_resolution ="),
-        ({"controller.ki": "3 V/(m*sample)", "drive.sample_time": None}, "sample_time ="),
-    ],
-)
-def test_a_command_that_cannot_be_converted_says_what_it_needs(changed: dict[str, Any], part: str) -> None:
-    with pytest.raises(friso.StageError) as refusal:
-        Stage(**IN_VOLTS).replace(changed)
-    assert part in str(refusal.value)
 
 
 IN_PLAIN_UNITS = {"kp": "2000 N/m", "ki": "8 N/(mm*s)", "kd": "20 N*s/m", "force_limit": "120 N"}

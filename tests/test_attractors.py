@@ -16,7 +16,9 @@ from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS
 from friso.equations.roles import Role
 from friso.hunting import (
+    SEARCH_LIMITS,
     Ensemble,
+    HuntingDoubt,
     KeyRange,
     Motions,
     Space,
@@ -37,10 +39,8 @@ from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.rest import bent
-from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import run_motions
-from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import CheckSettings
 from friso.hunting.verdict import own_motion
 from friso.stage import Stage

@@ -20,6 +20,7 @@ from friso.hunting import (
     SEARCH_LIMITS,
     Cycle,
     Ensemble,
+    HuntingDoubt,
     Kick,
     MoveShare,
     Target,
@@ -30,7 +31,6 @@ from friso.hunting import (
     pushes_that_hunt,
 )
 from friso.hunting.basin import ends_in, evenly
-from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import own_motion
 from friso.stage import Stage

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from beyond_flip import CREEPING
-from refusals import refused
 from variants import VARIANTS
 
 import friso
@@ -23,7 +22,6 @@ from friso.hunting import (
     plane,
 )
 from friso.hunting.continuation.crossing import turn
-from friso.stage import Stage
 from friso.studies.boundary import stability_changes
 
 pytestmark = pytest.mark.xdist_group("rigid")
@@ -238,25 +236,6 @@ def test_a_logarithmic_range_finds_the_same_flip() -> None:
     traced = friso.boundary(RIGID, {"controller.crossover": "8 Hz..12 Hz:log"})
     (flip,) = special(traced.result, symmetric=True)["flip"]
     assert flip[0] == pytest.approx(9.77, abs=0.005)
-
-
-NO_INTEGRAL = VARIANTS["rigid cart, P"]
-
-
-@pytest.mark.parametrize(
-    ("stage", "axes"),
-    [
-        (RIGID, {}),
-        (RIGID, {"controller.crossover": "1 Hz..40 Hz:41"}),
-        (RIGID, {"controller.crossover": "40 Hz..1 Hz"}),
-        (RIGID, {"controller.crosover": "1 Hz..40 Hz"}),
-        (NO_INTEGRAL, {"controller.kp": "1 N/m..4 N/m"}),
-        (VARIANTS["rigid, no friction section"], {"controller.crossover": "1 Hz..40 Hz"}),
-    ],
-)
-def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str]) -> None:
-    with refused():
-        friso.boundary(stage, axes)
 
 
 @pytest.mark.slow

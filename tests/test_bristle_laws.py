@@ -142,11 +142,6 @@ def test_harmonic_balance_refuses_kinks_of_its_own() -> None:
         OneStateLaw.of(HUNTING["elasto_plastic"].flat())
 
 
-def test_bristles_that_would_not_slip_are_refused() -> None:
-    with pytest.raises(InputError, match="less than Coulomb friction"):
-        HUNTING["elasto_plastic"].replace({"friction.breakaway_deflection": "10 um"})
-
-
 def test_what_of_them_is_fitted() -> None:
     """Rolling friction is fitted in the keys of LuGre, with its exponent as given.
 

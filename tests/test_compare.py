@@ -36,10 +36,9 @@ from friso.remedies.loops import linear_flat, linear_loops
 from friso.remedies.machines import draw_common, draw_fleet
 from friso.shares import quantile_interval, share
 from friso.shown.drawing import matplotlib_renderer
-from friso.stage import Stage, load
+from friso.stage import Stage, element_keys, load
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
-from friso.stage.lists import element_keys
 from friso.stage.tables import motor_mass
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"

@@ -522,34 +522,10 @@ def test_linear_names_what_it_has_and_follows_its_reference(rig: Stage) -> None:
     assert rigid.output_labels == ["stage", "cart"]
 
 
-TUNED = {"crossover": 8.0, "alpha": 0.1, "beta": 2.0, "mass": 1.7}
-
-
-@pytest.mark.cases(first=14)
-@pytest.mark.parametrize(
-    ("key", "asked"),
-    [
-        ("drive.delay", lambda rig: bode(rig.replace({"drive.sample_time": "50 us", "drive.delay": "6 ms"}))),
-        ("drive.delay", lambda rig: bode(rig.replace({"drive.delay": "1 s"}))),
-        (None, lambda rig: rig.replace({"drive.sample_time": "50 ms", "controller.crossover": "10 Hz"})),
-        ("controller", lambda rig: bode(by_gains(rig, kp="0 N/m"))),
-        ("case", lambda rig: friso.linear(rig, friso.member(bias=5.0))),
-        ("case", lambda rig: friso.linear(rig, family(rig.flat()))),
-        ("case", lambda rig: friso.linear(rig.replace({"joint.locked": True}), friso.member(touched=True))),
-        ("case", lambda rig: friso.linear(rig, case="slidin")),
-        ("part", lambda rig: friso.linear(rig, part="loop")),
-        ("speed", lambda rig: friso.member(speed=-1e-3)),
-        ("bias", lambda rig: friso.member(speed=1e-3, bias=2.0)),
-        (None, lambda rig: friso.tuning(**{**TUNED, "alpha": 2.0})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "alpha": 0.0})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "beta": 0.5})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "crossover": -1.0})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "mass": 0.0})),
-    ],
-)
-def test_what_no_stage_can_be_asked_is_refused(rig: Stage, key: str | None, asked: Callable[[Stage], object]) -> None:
-    with refused(key):
-        asked(rig)
+@pytest.mark.parametrize("case", [friso.member(bias=5.0), family(VARIANTS["rigid"].flat()), friso.member(touched=True)])
+def test_a_case_that_a_stage_cannot_be_in_is_refused(rig: Stage, case: Members) -> None:
+    with refused("case"):
+        friso.linear(rig.replace({"joint.locked": True}), case)
 
 
 GAINS = {"kp": (0.6374e6, "N/m"), "ki": (136.5e6, "N/(m*s)"), "kd": (428.4, "N*s/m")}

@@ -18,10 +18,9 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.frequency.members import steady_force
-from friso.hunting import Ensemble
+from friso.hunting import Ensemble, HuntingDoubt
 from friso.hunting.attractors import Attractors
 from friso.hunting.cycle.hunting import beyond_the_survey, small_cycles_possible
-from friso.hunting.doubt import HuntingDoubt
 from friso.stage.tables import FRICTION
 
 LAWS = Path(friso.__file__).parent / "equations" / "friction"

@@ -19,6 +19,7 @@ from friso.hunting import (
     AttractionEnd,
     BandwidthWindow,
     CheckPart,
+    HuntingDoubt,
     Judgement,
     Kick,
     Margin,
@@ -29,7 +30,6 @@ from friso.hunting import (
     verdict,
 )
 from friso.hunting.attractors import Attractors
-from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.settings import BasinSettings, CheckSettings

@@ -22,7 +22,7 @@ from friso.axis import unit_of_key
 from friso.cli.app import command_line
 from friso.interface.answer import Answer
 from friso.interface.question import TOPICS
-from friso.stage.stage import Stage
+from friso.stage import Stage
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 STICK_SLIP, LEAVES = EXAMPLES / "lugre_stick_slip.toml", EXAMPLES / "thesis_leaves.toml"

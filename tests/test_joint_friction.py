@@ -15,9 +15,8 @@ import friso
 from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
-from friso.hunting import Ensemble, find_cycles
+from friso.hunting import Ensemble, HuntingDoubt, find_cycles
 from friso.hunting import hunting as hunting_of
-from friso.hunting.doubt import HuntingDoubt
 from friso.stage import Stage
 from friso.stage.tables import friction_law
 

@@ -17,8 +17,7 @@ from friso.equations.friction.gms import STIFFNESS
 from friso.errors import InputError
 from friso.frequency.members import steady_force
 from friso.identification.readings.common import stribeck_curve
-from friso.stage import Stage
-from friso.stage.lists import element_keys
+from friso.stage import Stage, element_keys
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import (
     compared,

@@ -291,30 +291,6 @@ def test_a_record_that_is_not_whole_is_refused(tmp_path: Path, time: np.ndarray,
     assert words in caught.value.actual
 
 
-@pytest.mark.parametrize(
-    ("keys", "key", "words"),
-    [
-        ({**PROFILE, "distance": ["1 mm", "0 mm"]}, "motion.distance.2", "not 0"),
-        ({**PROFILE, "distance": []}, "motion.distance", "array"),
-        ({**PROFILE, "duration": "0.1 s"}, "motion.distance, motion.duration", "all moves end"),
-        ({**PROFILE, "jerk": "0 m/s^3"}, "motion.jerk", "greater than 0"),
-        (
-            {**{k: v for k, v in PROFILE.items() if k != "jerk"}, "snap": "1e4 m/s^4"},
-            "motion.snap, motion.jerk",
-            "jerk",
-        ),
-        ({**MULTISINE, "phase": ["0 deg", "1 deg", "2 deg"]}, "", "as many"),
-        ({**SINE, "amplitude": "0 mm"}, "motion.amplitude", "greater than 0"),
-        ({"kind": "recorded", "file": "nowhere.csv"}, "motion.file", "a file with the reference"),
-    ],
-)
-def test_a_motion_that_cannot_be_is_refused(keys: dict[str, Any], key: str, words: str) -> None:
-    with pytest.raises(friso.InputError) as caught:
-        moved(keys)
-    assert key in caught.value.key
-    assert words in caught.value.expected
-
-
 def test_limits_of_a_profile_are_its_keys() -> None:
     assert {*LIMITS} < {*motion_of(moved(PROFILE).flat()).model_fields}
 

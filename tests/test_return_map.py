@@ -14,6 +14,7 @@ from friso.engine.allowance import allowance
 from friso.equations.bandwidth import faster
 from friso.hunting import (
     Ensemble,
+    ReturnMapSettings,
     displacements_that_hunt,
     find_attractors,
     find_margin,
@@ -25,7 +26,6 @@ from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.return_map.attracting import survey_maps
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import Landings
-from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.what_attracts import map_may_decide, resolved_map
 from friso.stage import Stage
 

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from inside import friso_inside
-from refusals import refused
 
 import friso
 from friso.axis import LINEAR, ROTARY, AxisKind, speak_of, unit_shown
@@ -89,22 +88,8 @@ def test_the_numbers_are_those_of_a_linear_axis_in_other_units(pair: tuple[Stage
     assert isinstance(changed.friction.static, UncertainValue)  # type: ignore[union-attr]
 
 
-@pytest.mark.parametrize("entry", ["3 N", "3 N/rad", "3 rad", "3 kg*m^2"])
-def test_a_force_is_no_torque(pair: tuple[Stage, Stage], entry: str) -> None:
-    with refused("friction.static") as caught:
-        pair[1].replace({"friction.static": entry})
-    message = str(caught.value)
-    assert "N*m" in message
-    assert '[axis] kind = "rotary"' in message
-    assert "also" not in message
-
-
-def test_a_torque_is_no_force_and_leaf_springs_guide_along_a_line(pair: tuple[Stage, Stage]) -> None:
+def test_leaf_springs_guide_along_a_line(pair: tuple[Stage, Stage]) -> None:
     """The design refuses an axis that turns with a specification and without; no specification is written."""
-    with pytest.raises(StageError, match=r'it would be of a rotary axis, \[axis\] kind = "rotary"'):
-        pair[0].replace({"friction.static": "3 N*m"})
-    with refused("axis.kind"):
-        pair[0].replace({"axis.kind": "round"})
     with pytest.raises(StageError, match="leaf springs on an axis"):
         rotary(friso.load(EXAMPLES / "thesis_leaves.toml"))
     for asks in (friso.design, outline, partial(friso.design, spec=EXAMPLES / "specs" / "thesis.toml")):

@@ -1,17 +1,13 @@
 """Maps of verdicts by sketches, and axes that make the controller faster or scale all friction."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from refusals import refused
 
 import friso
 from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import with_friction
-from friso.hunting import check, sketch_attractors
+from friso.hunting import ReturnMapSettings, check, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, SWINGS
-from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import caveats, message, own_place
 from friso.questions.map.question import SweepAnswer
@@ -74,19 +70,6 @@ def test_gains_are_scaled_with_the_speed() -> None:
     assert runs.cell(1).flat() == pytest.approx(
         {**faster(stage.flat(), 2.0), **{k: v for k, v in stage.flat().items() if isinstance(v, str)}}
     )
-
-
-@pytest.mark.parametrize(
-    ("changed", "axes", "options"),
-    [
-        ({"friction": {"model": "none"}}, {"friction": [0.5, 2.0]}, {"metric": "outcome"}),
-        ({}, {"speed": "-1,0,1"}, {}),
-        ({}, {"speed": [0.5, 1.0]}, {"metric": "outcome", "confirm": True}),
-    ],
-)
-def test_what_cannot_be_scaled_or_confirmed_is_refused(locked: Stage, changed: Any, axes: Any, options: Any) -> None:
-    with refused():
-        friso.sweep(locked.replace(changed), axes, **options)
 
 
 def test_the_edge_of_a_map_is_that_at_which_followed_cycles_cease_to_attract(

@@ -80,10 +80,3 @@ def test_no_sentence_is_finer_than_the_encoder(tmp_path: Path, resting: Stage) -
     said = friso_inside(tmp_path, "check", str(file)).stdout
     assert "nm" not in said
     assert "10" in said
-
-
-@pytest.mark.parametrize("text", ["5", "0 um", "-1 um", "5 N"])
-def test_a_tolerance_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
-    done = friso_inside(tmp_path, "check", friso.example("lugre_stick_slip"), "--within", text)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "--within" in done.stderr

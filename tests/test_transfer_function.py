@@ -7,7 +7,6 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from refusals import refused
 from scipy import signal
 from scipy.io import savemat
 from variants import VARIANTS
@@ -19,9 +18,7 @@ from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, compensator
 from friso.frequency.system import DriveTiming
-from friso.hunting import cannot_hunt, hunting
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.doubt import HuntingDoubt
+from friso.hunting import Ensemble, HuntingDoubt, cannot_hunt, hunting
 from friso.hunting.loop import lags
 from friso.shown.motion_words import motion_sentences
 from friso.stage import Stage
@@ -257,52 +254,6 @@ def test_a_loop_of_samples_is_that_of_the_plant_at_them() -> None:
     plant = SAMPLE**2 / 2 / 1.7 * (z + 1) / (z - 1) ** 2
     by_hand = plant * np.polyval(keys["numerator"], z) / np.polyval(keys["denominator"], z)
     assert np.abs(loop.loop(omega)[0] / by_hand - 1).max() < 1e-6
-
-
-BAD: dict[str, tuple[dict[str, Any], str]] = {
-    "improper": ({"numerator": [1.0, 2.0, 3.0], "denominator": [1.0, 4.0]}, "proper"),
-    "more zeros than poles in z": (
-        {"zeros": [0.5, "0.2+0.1j"], "poles": [0.0, 0.3], "gain": 2e3, "sample_time": "1 ms"},
-        "no more zeros than poles",
-    ),
-    "unstable": ({"numerator": [100.0, 200.0], "denominator": [1.0, -3.0, 0.0]}, "stable"),
-    "unstable in z": ({"numerator": [5.0, 4.0], "denominator": [1.0, -1.1], "sample_time": "1 ms"}, "stable"),
-    "lowest power first": (
-        {"numerator": [1e5, 6250.0, 95.0], "denominator": [0.0, 1.0, 0.0025]},
-        "highest powers first",
-    ),
-    "a pole that rounding moved": (
-        {"numerator": [5e4, -4.9e4], "denominator": [1.0, -1.8182, 0.81819999], "sample_time": "1 ms"},
-        "all their digits",
-    ),
-    "samples that do not divide": (
-        {"numerator": [6e4, -5.9e4], "denominator": [1.0, -0.5], "sample_time": "1 ms"},
-        "whole number of samples of the drive",
-    ),
-    "no gain": ({"zeros": [-6.0], "poles": [0.0, -400.0]}, "gain before"),
-    "two integrals": ({"numerator": [100.0, 200.0], "denominator": [1.0, 0.0, 0.0]}, "one integral"),
-    "at z = -1": ({"numerator": [5.0, 4.0], "denominator": [1.0, 1.0], "sample_time": "1 ms"}, "z = -1"),
-    "pushes away": ({"numerator": [-100.0], "denominator": [1.0, 3.0]}, "pulls back"),
-    "integral pushes away": (
-        {"numerator": [120.0, 8000.0, -4e4], "denominator": [0.001, 1.0, 0.0]},
-        "gain of the integral greater than 0",
-    ),
-    "no stiffness": ({"numerator": [100.0, 0.0], "denominator": [1.0, 3.0]}, "pulls back"),
-    "nothing": ({}, "one of numerator"),
-    "two ways": ({"numerator": [1.0], "denominator": [1.0, 2.0], "poles": [-3.0]}, "one of numerator"),
-    "no numbers": ({"numerator": ["a"], "denominator": [1.0, 2.0]}, "an array of numbers"),
-    "not square": ({"kind": "state_space", "a": "0 1", "b": "1", "c": "1"}, "one error, one force"),
-    "no matrix": ({"kind": "state_space", "a": "x", "b": "1", "c": "1"}, "rows divided by semicolons"),
-    "no file": ({"kind": "state_space", "file": "no.mat", "a": "A", "b": "B", "c": "C"}, "a MAT file"),
-}
-
-
-@pytest.mark.parametrize(("keys", "words"), BAD.values(), ids=BAD)
-def test_a_transfer_function_that_cannot_be_is_refused(keys: dict[str, Any], words: str) -> None:
-    with refused() as caught:
-        controlled(keys, drive={"sample_time": "300 us"})
-    assert caught.value.key.startswith(("controller", "drive"))
-    assert words in caught.value.expected
 
 
 @pytest.mark.cases(first=1)

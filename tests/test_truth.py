@@ -16,7 +16,7 @@ from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from benchmarks.truth.trials import Bench
 from friso.equations.bandwidth import faster
 from friso.hunting import find_swings
-from friso.stage.files import loads
+from friso.stage import loads
 
 END = 1000.0
 
