@@ -74,7 +74,6 @@ def test_runs_beyond_an_allowance_are_refused(locked: Stage) -> None:
     runs_of(locked, 1)  # without one, as many as are wanted
 
 
-@pytest.mark.inner
 @pytest.mark.thorough
 def test_what_too_little_work_does_not_settle_is_not_certain(locked: Stage) -> None:
     """The stage of the thesis hunts: the more of the work is missing, the less is said, and nothing else."""

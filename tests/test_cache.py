@@ -111,6 +111,7 @@ def entry(folder: Path) -> Path:
     return only
 
 
+@pytest.mark.slow
 @posix
 def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path: Path) -> None:
     kernels = tmp_path / "cache" / "kernels"
@@ -139,12 +140,14 @@ def test_a_damaged_file_is_made_again(copied: Path, pattern: str, damage: str) -
     assert not built(copied)
 
 
+@pytest.mark.slow
 def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:
     processes = [start(tmp_path) for _ in range(4)]
     assert sorted(finished(process)[0] for process in processes) == [False, False, False, True]
     assert not built(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_comment_compiles_nothing(whole: Path, copied: Path) -> None:
     """Another request, of which the same code is made, takes the machine code that is there."""
     (before,) = entries(copied)
@@ -154,6 +157,7 @@ def test_a_comment_compiles_nothing(whole: Path, copied: Path) -> None:
     assert not built(copied, "another")
 
 
+@pytest.mark.slow
 def test_what_has_not_been_used_for_long_is_deleted_when_something_is_built(copied: Path) -> None:
     """And requests for it with it; an entry that was built long ago and is in use stays."""
     (old,) = entries(copied)

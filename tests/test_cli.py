@@ -101,6 +101,7 @@ def _until_told(capsys: pytest.CaptureFixture[str], line: str) -> None:
     wait_until(told_so)
 
 
+@pytest.mark.slow
 def test_check_json(checked: dict[str, Any]) -> None:
     """The condition of passivity that is not met: thesis, Table 2: sigma_2 is far below sigma_1 (F_s - F_c)/F_c = 316.2
     (3 - 1)/1 N*s/m."""
@@ -150,6 +151,7 @@ def test_a_shell_completes_commands_and_options(
     assert sorted(done.stdout.split()) == sorted(fits)
 
 
+@pytest.mark.slow
 def test_simulate_writes_what_python_returns(tmp_path: Path) -> None:
     done = run("simulate", STICK_SLIP, "--sample-time", "10 ms", "--out", tmp_path)
     assert done.returncode == 0
@@ -188,6 +190,7 @@ def test_commands_that_lack_something_or_are_none() -> None:
         assert words in done.stderr
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
     """An unstable loop diverges past what numbers hold: status 1, and the response up to there is written.
 
@@ -220,6 +223,7 @@ def test_a_failure_names_the_target_or_the_remedy(
     assert words in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("module", [["-m", "friso"], ["-mfriso.__main__"], ["-W", "ignore", "-Bum", "friso"]])
 def test_as_a_module_friso_imports_nothing_from_the_current_folder(tmp_path: Path, module: list[str]) -> None:
     # Not those that Python's own -m imports before it looks for friso: types, functools, contextlib and their like.

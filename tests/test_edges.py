@@ -30,6 +30,7 @@ def test_what_is_wrong_in_several_tables_is_told_at_once() -> None:
     assert "kq" in wrong["masses.cart"]
 
 
+@pytest.mark.cases(first=7)
 @pytest.mark.parametrize(
     ("stage", "key", "value", "meant"),
     [
@@ -86,6 +87,7 @@ NUMBERS = st.one_of(
 KEYS = sorted(numeric_keys(loads(RIG).flat()))
 
 
+@pytest.mark.slow
 @given(key=st.sampled_from(KEYS), number=NUMBERS, unit=st.sampled_from(["", "m", "N"]))
 @settings(max_examples=200)
 def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, unit: str) -> None:
@@ -99,6 +101,7 @@ def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, un
     assert again.flat() == stage.flat()
 
 
+@pytest.mark.slow
 @given(text=st.text(st.characters(), max_size=20))
 def test_any_text_can_be_saved_and_read_again(text: str) -> None:
     try:

@@ -59,6 +59,7 @@ def test_the_course_of_a_channel(tmp_path: Path) -> None:
     assert content(path).channels[1].course() == pytest.approx(50 * np.arange(24) + 24.5)
 
 
+@pytest.mark.slow
 def test_what_is_open_and_the_command_for_it(bare: Path) -> None:
     assert {gap.key for gap in content(bare).gaps} == {"position", "force", "time"}
     proposed = command(bare)
@@ -104,6 +105,7 @@ def test_a_frequency_response(tmp_path: Path) -> None:
     assert (held.kind, held.response.frequency.size) == ("frequency", 100)
 
 
+@pytest.mark.slow
 def test_the_command(bare: Path, tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "logs", "bare.csv", "--out", "out")
     assert done.returncode == 0
@@ -159,6 +161,7 @@ def test_the_only_channel_of_times_that_rises_is_the_clock(tmp_path: Path) -> No
         assert (held.channels[0].role == "time") == (sign > 0)
 
 
+@pytest.mark.slow
 def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
     """A reference is not suggested as a force, rpm not as a position, a counter not as a clock.
 

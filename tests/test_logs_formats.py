@@ -50,6 +50,7 @@ def check_motion(table: ChannelTable, unit: str = "mm", scale: float = 1e3) -> N
     assert position.time == pytest.approx(M["time"], rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(
     ("delimiter", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")]
 )
@@ -64,6 +65,7 @@ def test_text_in_any_writing(tmp_path: Path, delimiter: str, decimal: str, encod
     assert f"decimal {sign}, encoding {encoding}, 4 lines before" in table.read[0]
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(
     ("heading", "units"),
     [
@@ -90,6 +92,7 @@ ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], s
 COMMAS = ROWS.replace(";", ",")
 
 
+@pytest.mark.cases(first=10)
 @pytest.mark.parametrize(
     "text",
     [
@@ -262,6 +265,7 @@ def test_time_stamps(tmp_path: Path, stamps: list[str]) -> None:
     assert time == pytest.approx([0, 1e-3, 2e-3, 3e-3], abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     rows=st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=3, max_size=30),
@@ -274,6 +278,7 @@ def test_any_numbers_come_back(tmp_path: Path, rows: list[tuple[float, ...]], wr
         assert item.values == pytest.approx(expected, rel=1e-15, abs=0)
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
     ("delimiter", "full"), [*itertools.product(["\t", ";", ","], [True, False]), (":", True), (" ", True)]
 )
@@ -312,6 +317,7 @@ def test_twincat_absolute_times(tmp_path: Path) -> None:
     assert channel(table, "ActPos").time == pytest.approx(0.25e-3 * np.arange(400), abs=1.7e-6)  # 16 ticks of 100 ns
 
 
+@pytest.mark.slow
 def test_dspace_structure_with_time_and_tdms(tmp_path: Path) -> None:
     """A file is known by its content, whatever its name."""
     signals = {"position (mm)": M["position"] * 1e3, "input (V)": M["force"]}
@@ -354,6 +360,7 @@ def test_two_variables_with_the_same_signals_are_told_apart(tmp_path: Path) -> N
 SIGNALS = {"position": ("mm", M["position"] * 1e3), "force": ("N", M["force"])}
 
 
+@pytest.mark.slow
 def test_universal_files(tmp_path: Path) -> None:
     """Units come from the label, else from the data type and the file's units; times have their axis's unit."""
     pyuff = pytest.importorskip("pyuff")
@@ -383,6 +390,7 @@ X_Value\tUntitled\tX_Value\tUntitled 1\tComment
 """
 
 
+@pytest.mark.slow
 def test_units_of_lvm_stand_above_their_columns(tmp_path: Path) -> None:
     """Units are also read with a time column per channel, and where a channel has no unit."""
     columns = zip(M["time"], M["position"], M["time"], M["force"], strict=True)
@@ -439,6 +447,7 @@ DEGREES = np.degrees(np.angle(RESPONSE))
 MOBILITY, ACCELERANCE = 2j * np.pi * FREQUENCY * RESPONSE, -((2 * np.pi * FREQUENCY) ** 2) * RESPONSE
 
 
+@pytest.mark.cases(first=6)
 @pytest.mark.parametrize(
     ("heading", "columns", "unit"),
     [
@@ -501,6 +510,7 @@ def test_what_is_no_file_of_some_size_is_refused_before_it_is_read(
             read_table(path)
 
 
+@pytest.mark.slow
 def test_a_matrix_is_a_channel_per_column(tmp_path: Path) -> None:
     both = np.stack([M["position"], M["force"]], axis=1)
     savemat(tmp_path / "old.mat", {"y": both, "image": np.zeros((90, 80))})
@@ -512,6 +522,7 @@ def test_a_matrix_is_a_channel_per_column(tmp_path: Path) -> None:
     assert any("array of 90 x 80" in line for line in read_table(tmp_path / "old.mat").read)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("way", ["link", "storage", "virtual", "link in a group", "link to a link", "reference"])
 def test_values_in_another_file_are_not_read(tmp_path: Path, way: str) -> None:
     """A file may name any other one of the system as the place of its values."""
@@ -552,6 +563,7 @@ def zeros_as_mat(path: Path, count: int) -> None:
     path.write_bytes(head + struct.pack("<ii", 15, len(data)) + data)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not LIMITS_MEMORY, reason="this system does not hold a process to an amount of memory")
 def test_a_file_that_swells_is_an_error_of_its_own(tmp_path: Path) -> None:
     with LogSettings(memory_of_reading=400 << 20).in_use():
@@ -590,6 +602,7 @@ def circular_mat(path: Path) -> None:
         group["g"] = group
 
 
+@pytest.mark.cases(first=1, slow=2)
 @pytest.mark.parametrize(
     ("write", "words"),
     [
@@ -612,6 +625,7 @@ def test_a_small_file_that_its_library_cannot_read_is_refused(
     assert words in caught.value.actual
 
 
+@pytest.mark.slow
 def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit counts processor time; a file is given up only if it takes far longer."""
     slow, program = tmp_path / "slow.py", confined.binary.__file__
@@ -638,6 +652,7 @@ with LogSettings(time_of_reading=1e5).in_use():
 """
 
 
+@pytest.mark.slow
 def test_the_process_that_reads_ends_with_who_started_it(tmp_path: Path) -> None:
     """However that ends: a killed process cannot stop it."""
     endless_mat(tmp_path / "a.mat")
@@ -649,6 +664,7 @@ def test_the_process_that_reads_ends_with_who_started_it(tmp_path: Path) -> None
     children[0].wait(LIMIT)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("text", ["import os\nos.abort()\n", NEVER_ENDING], ids=["crash", "endless"])
 def test_a_library_that_crashes_or_writes_for_ever_is_an_error_of_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
@@ -673,6 +689,7 @@ def test_nothing_but_numbers_and_texts_comes_back(tmp_path: Path, monkeypatch: p
     assert not mark.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("column", [0, 2])
 def test_a_column_of_forty_thousand_digits_is_left_out(tmp_path: Path, column: int) -> None:
     """Which once took a time that grew with the square of their number."""
@@ -710,6 +727,7 @@ def test_a_long_line_is_read_or_refused_in_a_time_like_its_length(tmp_path: Path
     assert not grows_with_the_square(read)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("text", ["time [s],position{}\n0,1\n1,2\n", "0,1\n1,2\n2,{}\n", "Name,{}\n\nName,x\n0,1\n"])
 def test_a_cell_longer_than_csv_reads(tmp_path: Path, text: str) -> None:
     (tmp_path / "log.csv").write_text(text.format("x" * 200_000))

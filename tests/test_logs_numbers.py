@@ -52,6 +52,7 @@ def test_points_group_thousands_where_commas_begin_the_decimals(tmp_path: Path) 
     assert (shown["low"], shown["high"]) == (micrometres.min(), micrometres.max())
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
     ("delimiter", "rows", "expected"),
     [
@@ -94,6 +95,7 @@ def test_decimals_that_nothing_speaks_against_are_decimals(
     assert values(written(tmp_path / "a.txt", rows, "t;x"))[1] == expected
 
 
+@pytest.mark.cases(first=1, slow=3)
 @pytest.mark.parametrize(
     ("first", "last", "expected"),
     [
@@ -130,6 +132,7 @@ def test_a_rate_above_a_table_is_read_with_its_decimal_sign(line: str, step: flo
     assert (None if time is None else pytest.approx(time[1])) == step
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("rows", [f"0.5{NO_BREAK};{NO_BREAK}5", f"{NO_BREAK}0.5\t5{NO_BREAK}", f"0.5 {NO_BREAK}5"])
 def test_spaces_around_numbers_are_no_part_of_them(rows: str, tmp_path: Path) -> None:
     """Words beside numbers with commas leave the delimiter."""
@@ -184,6 +187,7 @@ def tables(draw: st.DrawFn, telling: bool) -> tuple[str, list[list[str]], list[l
 FREELY = settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
+@pytest.mark.slow
 @FREELY
 @given(tables(telling=True))
 def test_numbers_in_any_format_come_back_where_one_column_tells_it(tmp_path: Path, table: tuple) -> None:
@@ -192,6 +196,7 @@ def test_numbers_in_any_format_come_back_where_one_column_tells_it(tmp_path: Pat
     assert values(tmp_path / "a.txt") == expected
 
 
+@pytest.mark.slow
 @FREELY
 @given(tables(telling=False))
 def test_no_number_in_any_format_is_read_as_another(tmp_path: Path, table: tuple) -> None:

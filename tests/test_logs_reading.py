@@ -52,6 +52,7 @@ def is_among(lines: Sequence[str], text: str) -> bool:
     return any(text in line for line in lines)
 
 
+@pytest.mark.slow
 def test_a_log_in_si_units(tmp_path: Path) -> None:
     log = log_of(tmp_path, NAMES, columns())
     assert log.name == "a"
@@ -100,6 +101,7 @@ SLOW_TIME = 4.0 * np.arange(500)
 TWO_CLOCKS = [1e3 * M["time"], 1e3 * M["position"], SLOW_TIME, np.cos(SLOW_TIME)]
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("first", "others"),
     [("force", ["force_p", "force_i", "friction_force"]), ("Force", ["Force_d"]), ("iq", ["iq filtered"])],
@@ -140,6 +142,7 @@ def test_everything_that_is_open_is_told_at_once(tmp_path: Path) -> None:
     assert not open_questions(tmp_path, NAMES[:3], columns()[:3], "position", "force").options
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(
     ("wanted", "measured", "force", "scale"), [("qg", "qm", "vir", "N/V"), ("xd", "xm", "iq", "N/A")]
@@ -185,6 +188,7 @@ def test_a_torque_is_no_time_whatever_its_letter(
     assert log["force"] == pytest.approx(M["force"])
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
     "names",
     [
@@ -201,6 +205,7 @@ def test_a_unit_tells_the_role_of_the_only_channel_that_has_it(tmp_path: Path, n
     assert [gap.key for gap in error.gaps] == ["position"]
 
 
+@pytest.mark.slow
 def test_units_and_scales_of_options(tmp_path: Path) -> None:
     """Units that are not those of the role are kept where that is allowed."""
     names = ["time [s]", "position", "velocity [mm/s]", "current [mA]"]
@@ -263,6 +268,7 @@ def test_unit_spellings(text: str, si: str, factor: float) -> None:
         assert unit_factor(large, "m") is unit_factor(large, "s") is unit_factor(large, "rad") is None
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.integers(8, 24), st.integers(0, 2**24), st.integers(1, 20))
 def test_a_counter_that_overflows_is_unwrapped(bits: int, start: int, turns: int) -> None:
@@ -368,6 +374,7 @@ def test_jitter_is_interpolated_and_told(tmp_path: Path) -> None:
     assert log.sample_time == pytest.approx(period, rel=1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(
     st.floats(3, 40) | st.floats(1.4, 3),
@@ -429,6 +436,7 @@ def test_values_that_are_held_or_interpolated_are_told(tmp_path: Path) -> None:
     assert is_among(log_of(tmp_path, NAMES, changed(3, slower)).warnings, "straight lines of 4 samples")
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("velocity", "words"),
     [
@@ -539,6 +547,7 @@ def test_mapping_is_kept_and_overridden(tmp_path: Path) -> None:
     assert second.scales == first.scales
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(
     st.dictionaries(st.sampled_from(list(ROLES)), st.text(st.characters(codec="utf-8"), min_size=1)),
@@ -610,6 +619,7 @@ def test_emps() -> None:
     assert [line.split(":")[0] for line in log.warnings] == ["time", "reference", "position"]  # without units
 
 
+@pytest.mark.slow
 def test_ku_leuven() -> None:
     path = record("kuleuven_lsb250/exp1.mat")
     with pytest.raises(InputError, match='"enc1" and "enc2"'):
@@ -620,6 +630,7 @@ def test_ku_leuven() -> None:
     assert np.abs(log["force"]).max() == pytest.approx(0.5, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_tokyo_bench() -> None:
     path = record("utokyo_motorbench/MultisineTypeA.mat")
     options = from_options(["position=theta_mx", "force=iq_adx"], ["theta_mx=rad", "iq_adx=A"])

@@ -41,6 +41,7 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     return folder, json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     folder, document = mapped
     assert {Path(file).name for file in document["files"]} == {f"a.{form}" for form in ("png", "svg", "pdf", "html")}
@@ -55,6 +56,7 @@ def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     assert json.loads(done.stdout)["outcomes"] == document["outcomes"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_cell_is_run_again_alone(mapped: tuple[Path, dict]) -> None:
     folder, _ = mapped
@@ -80,6 +82,7 @@ def test_files_of_the_user_are_not_overwritten(tmp_path: Path) -> None:
 OF_ANOTHER_STUDY = (("--metric", "loudness"), ("--rtol", "1e-4"), ("--samples", "8"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [*OF_ANOTHER_STUDY, ("--set", "controller.alpha=0.2")])
 def test_a_store_takes_nothing_that_makes_another_study(mapped: tuple[Path, dict], options: tuple[str, ...]) -> None:
     done = friso_inside(mapped[0], "map", "a.zarr", *options)
@@ -87,7 +90,6 @@ def test_a_store_takes_nothing_that_makes_another_study(mapped: tuple[Path, dict
     assert rows_of(done.stderr)
 
 
-@pytest.mark.first
 @posix
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     """Interrupted on a terminal in the middle of its bar; resumed by the store alone."""
@@ -120,6 +122,7 @@ def _interruptible() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("numbers", [("5", "0"), ("0",), ("a", "b"), ("-1", "0")])
 def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str, ...]) -> None:
     done = friso_inside(mapped[0], "simulate", "--cell", "a.zarr", "--out", "new", "--", *numbers)
@@ -163,6 +166,7 @@ def test_a_damaged_block_is_noticed_and_run_again(mapped: tuple[Path, dict], tmp
     assert (done.returncode, "--overwrite" in done.stderr) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_figure_beside_a_store_that_it_has_not_made_stays(
     mapped: tuple[Path, dict], tmp_path: Path, undrawn: None
 ) -> None:
@@ -182,6 +186,7 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(
     assert (tmp_path / "b.html").read_text() == "mine, under a name that was friso's"
 
 
+@pytest.mark.slow
 def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
@@ -203,6 +208,7 @@ def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     assert not [*tmp_path.glob(".*")]
 
 
+@pytest.mark.slow
 def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
     mapped: tuple[Path, dict], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
@@ -229,6 +235,7 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
     assert {file.name for file in tmp_path.iterdir()} == {"a.zarr", "a.png", "figures"}
 
 
+@pytest.mark.slow
 def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     made = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--metric", "peaks", "--out", "a.zarr")
     assert friso_inside(tmp_path, *made).returncode == 0
@@ -241,6 +248,7 @@ def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict],
     assert (tmp_path / "a.svg").read_bytes() != first
 
 
+@pytest.mark.slow
 def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     """Asked of the stage or of the store."""
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")

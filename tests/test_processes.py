@@ -25,6 +25,7 @@ AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:
 pytestmark = pytest.mark.xdist_group("rig")
 
 
+@pytest.mark.slow
 def test_processes_of_its_own_give_the_same_and_open_no_port(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -48,6 +49,7 @@ def test_processes_of_its_own_give_the_same_and_open_no_port(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_costs_nothing_that_is_done(rig: Stage, tmp_path: Path) -> None:
     study, path, done_by_then = Request(rig, AXES).study(rtol=1e-9), tmp_path / "a.zarr", []
 
@@ -74,6 +76,7 @@ with processes(1) as crew:
 """
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("kill", [False, True])
 def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> None:

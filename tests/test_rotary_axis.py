@@ -119,6 +119,7 @@ def test_prefixes() -> None:
     assert with_unit(1.7e-6, "m") == "1.70 µm"
 
 
+@pytest.mark.slow
 def test_time_responses(folder: Path) -> None:
     documents = []
     for name in ("linear", "rotary"):
@@ -144,7 +145,8 @@ WRITTEN = (("check", "rotary"), ("map", "linear"), ("map", "rotary"))
 """Commands and kinds of axis whose pages and figures are drawn as well."""
 
 
-@pytest.mark.parametrize("command", ["check", "bode", pytest.param("boundary", marks=pytest.mark.thorough), "map"])
+@pytest.mark.cases(slow=2)
+@pytest.mark.parametrize("command", ["bode", "map", "check", "boundary"])
 def test_commands(folder: Path, command: str) -> None:
     documents = []
     for name, static in (("linear", "friction.static=2 N..3 N"), ("rotary", "friction.static=2 N*m..3 N*m")):

@@ -119,6 +119,7 @@ def test_unit_factor_converts_arrays() -> None:
         Quantity("m", positive, "1 mm").factor("kg")
 
 
+@pytest.mark.cases(first=10)
 @pytest.mark.parametrize("path", [*EXAMPLES, TEMPLATE], ids=lambda path: path.stem)
 def test_round_trip(path: Path, tmp_path: Path) -> None:
     stage = load(path)

@@ -22,6 +22,7 @@ MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.ma
 pytestmark = pytest.mark.xdist_group("rig")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_cells_equal_runs_alone(rig: Stage) -> None:
     """Any cell, checked alone as a stage of its own, gives the same numbers bit for bit, and the verdict."""
@@ -39,6 +40,7 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
         assert cell.steps.item() == case.solver.steps
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_defaulted_tuned_mass_follows_a_swept_mass(rig: Stage) -> None:
     light = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
@@ -62,6 +64,7 @@ def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
     assert below.outcome.values.tolist() == ["swings", "invalid"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     """Total mass at a fixed ratio, and F_s = max(F_s, F_c), which leaves no cell invalid."""
@@ -79,6 +82,7 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     assert study_of(runs).cell_stage((0, 1)).friction.static == 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     ranges = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "10 um..1 mm:log"}
@@ -121,6 +125,7 @@ def test_only_the_metrics_asked_for_are_kept(rig: Stage) -> None:
     assert set(runs.data_vars) == {"peaks", "outcome", "status"}
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     shape=st.lists(st.integers(1, 15), min_size=1, max_size=4),
@@ -197,6 +202,7 @@ def test_what_makes_no_study_is_refused(rig: Stage, asked: dict) -> None:
         sweep(rig, **{**asked, **({"samples": friso.Samples(*asked["samples"])} if "samples" in asked else {})})
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> None:
     """Asked for by name; the motion plays no part, and a cell that nothing attracts has no number."""
@@ -217,6 +223,7 @@ def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> N
     assert "multiplier" not in sweep(locked, {"controller.crossover": ["8 Hz"]})
 
 
+@pytest.mark.slow
 def test_measures_are_those_of_an_asymmetric_cycle_where_that_attracts() -> None:
     """The symmetric cycle repels at both crossovers; the other one is 0.876 mm large at the lower, by simulations at
     1e-7 and 1e-9, and gone at the higher."""

@@ -85,6 +85,7 @@ def ran(folder: Path, *command: Any) -> str:
     return done.stdout
 
 
+@pytest.mark.cases(first=3)
 @needs_compiler
 @pytest.mark.parametrize(("control", "machine"), PAIRS)
 def test_c_reproduces_the_run(tmp_path: Path, control: str, machine: str) -> None:
@@ -101,6 +102,7 @@ def block_of(parcel: Parcel) -> structured_text.Unit:
     return structured_text.parsed(TARGETS["st"].files(parcel)["FB_axis.st"])
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(("control", "machine"), PAIRS)
 def test_structured_text_reproduces_the_run(control: str, machine: str) -> None:
     """The program of the test, executed by an interpreter, passes; and TwinCAT's file holds the text of both."""
@@ -118,12 +120,14 @@ def test_structured_text_reproduces_the_run(control: str, machine: str) -> None:
         assert files[f"{name}.st"].startswith(f"{declaration}\n{body}")
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(("control", "machine"), PAIRS)
 def test_difference_equations_reproduce_the_run(tmp_path: Path, control: str, machine: str) -> None:
     folder = written(tmp_path / "d", "difference", parcel_of(control, machine))
     assert f"{SHORT} samples" in ran(folder, sys.executable, "axis_test.py")
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_settings_against_friction_leave_friso(settings: dict[str, Any]) -> None:
     """Dead zones, gains at standstill, pushes, dither and the rest are in the code, which is compared with the run."""
@@ -145,6 +149,7 @@ def test_windows_in_a_position_loop_leave_friso() -> None:
     assert np.abs(outputs_in_text(parcel, rows)[:, 0] - np.array(rows)[1:, -1]).max() <= parcel.tolerance
 
 
+@pytest.mark.slow
 def test_every_kind_of_stage_leaves_friso() -> None:
     """Every controller that the tests know, and every example, is written and reproduces its run in structured text."""
     from variants import VARIANTS
@@ -163,6 +168,7 @@ def test_every_kind_of_stage_leaves_friso() -> None:
     assert count > 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", CONTROLLERS)
 def test_a_hundred_thousand_samples(tmp_path: Path, control: str) -> None:
     """Over a hundred thousand samples, all targets stay within the bounds that they state for a few thousand."""
@@ -352,6 +358,7 @@ def test_bumpless_transfer_reset_and_enable() -> None:
     assert block.run(own, Enable=False, Manual=0.5)["output"] == 0.5
 
 
+@pytest.mark.slow
 def test_files_are_identical_from_the_same_input() -> None:
     """Neither the order of sets nor the time of day is in the files."""
     code = (
@@ -401,6 +408,7 @@ def test_only_a_sure_verdict_leaves_without_a_warning(check: Any, warns: bool) -
     assert ("WARNING" in verdict_line(check)) == warns
 
 
+@pytest.mark.slow
 def test_a_hunting_stage_says_so_on_the_screen_and_in_every_file(tmp_path: Path) -> None:
     stage = EXAMPLES / "thesis_rig.toml"
     words = ("--set", "joint.locked=true", "--name", "axis", "--out", "out")
@@ -413,6 +421,7 @@ def test_a_hunting_stage_says_so_on_the_screen_and_in_every_file(tmp_path: Path)
                 assert "WARNING: the stage hunts" in path.read_text("utf-8"), path
 
 
+@pytest.mark.slow
 def test_what_is_written_stands_in_the_header(tmp_path: Path) -> None:
     stage = EXAMPLES / "twincat_cascade.toml"
     done = friso_inside(
@@ -567,6 +576,7 @@ def swing_of(deviation: np.ndarray) -> tuple[float, float]:
     return float(np.ptp(last)), float(np.diff(fine).mean())
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_machine_and_controller_in_c_hunt_as_friso_s(tmp_path: Path) -> None:
     """Amplitude and period of a hunting machine, both in C, are those of friso's run as built to 1e-3."""

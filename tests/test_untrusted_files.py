@@ -42,6 +42,7 @@ def test_devices_and_pipes_are_refused_at_once(place: str, tmp_path: Path) -> No
             read(file)
 
 
+@pytest.mark.slow
 @posix
 def test_a_file_whose_name_is_no_text_is_answered(tmp_path: Path) -> None:
     """A name so long that no suffix fits is answered as well."""
@@ -69,6 +70,7 @@ def test_a_stage_is_not_saved_over_a_file_that_appears_meanwhile(
     assert ([*tmp_path.iterdir()], place.read_text()) == ([place], "mine")
 
 
+@pytest.mark.cases(first=1)
 @posix
 @pytest.mark.parametrize("arguments", [[], ["schema"]])
 @pytest.mark.parametrize(("way", "status"), [(">/dev/full", 1), ("<&- >&- 2>&-", 0)])

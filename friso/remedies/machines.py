@@ -248,16 +248,13 @@ def _joined(fleets: Sequence[Fleet], stages: Sequence[Stage]) -> Fleet:
     ratios, shifts = dict[str, np.ndarray](), dict[str, np.ndarray]()
     spreads, from_file = dict[str, float](), dict[str, None]()
     for fleet, stage in zip(fleets, stages, strict=True):
-        known, flat = {*ratios, *shifts}, stage.flat()
-        masses = any(key.startswith("masses.") for key in known)
-
-        def new(key: str, known: set[str] = known, flat: dict[str, Any] = flat, masses: bool = masses) -> bool:
-            return key in flat and key not in known and not (masses and key.startswith("masses."))
-
-        ratios |= {key: values for key, values in fleet.ratios.items() if new(key)}
-        shifts |= {key: values for key, values in fleet.shifts.items() if new(key)}
-        spreads |= {key: spread for key, spread in fleet.spreads.items() if new(key)}
-        from_file |= dict.fromkeys(key for key in fleet.from_file if new(key))
+        new = {*stage.flat()} - {*ratios, *shifts}
+        if any(key.startswith("masses.") for key in (*ratios, *shifts)):
+            new = {key for key in new if not key.startswith("masses.")}
+        ratios |= {key: values for key, values in fleet.ratios.items() if key in new}
+        shifts |= {key: values for key, values in fleet.shifts.items() if key in new}
+        spreads |= {key: spread for key, spread in fleet.spreads.items() if key in new}
+        from_file |= dict.fromkeys(key for key in fleet.from_file if key in new)
     return replace(fleets[0], ratios=ratios, shifts=shifts, spreads=spreads, from_file=(*from_file,))
 
 

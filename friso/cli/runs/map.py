@@ -15,8 +15,7 @@ from friso.progress import Progress
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
     """Run or resume a study."""
     from friso.axis import speak_of
-    from friso.interface.output_folder import output_folder
-    from friso.questions.map.study import write_beside
+    from friso.interface.output_folder import output_folder, write
 
     (source,) = about
     store, elsewhere = shown.out or Path(f"{source.stem}_map.zarr"), None
@@ -28,13 +27,13 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     speak_of(answer.axis_kind)
     place = answer.store or source
 
-    def write(progress: Progress) -> list[Path]:
+    def written(progress: Progress) -> list[Path]:
         """Write figure and page, and return their paths.
 
         The files go beside the store, or into a folder given by --out.
         """
         if elsewhere is not None:
             return elsewhere.write(answer.files(), progress)
-        return write_beside(answer.files_beside(), shown.overwrite, progress)
+        return write(answer.files_beside(), shown.overwrite, progress)
 
-    show(answer, shown, write, f"the runs are in {place}, but no figure was written")
+    show(answer, shown, written, f"the runs are in {place}, but no figure was written")

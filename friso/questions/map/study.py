@@ -10,24 +10,19 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.errors import InputError, StoreError
 from friso.interface.inputs import axes_of, wrong
-from friso.interface.output_folder import check_file, check_store_folder, refuse_place, write
+from friso.interface.output_folder import check_file, check_store_folder, refuse_place
 from friso.platform.system import shell_word
-from friso.progress import Progress
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues, Samples
 from friso.studies.execute import Crew
 from friso.studies.metric import METRICS, metrics, with_usual
 from friso.studies.study import Request, Study, study_of
-
-if TYPE_CHECKING:
-    from friso.shown.files import Content
 
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
 
@@ -182,14 +177,6 @@ def refuse_overwriting(study: Study, store: Path, overwrite: bool, beside: str =
         refuse_other(store, study)
     for view in _views(store) if beside else ():
         check_file("--out", view, overwrite, [store], example=beside)
-
-
-def write_beside(files: Mapping[Path, Content], overwrite: bool, progress: Progress) -> list[Path]:
-    """Write figure and page of a store, and return their paths.
-
-    Files that are there are replaced only with `overwrite`. Raises OSError if a file cannot be written.
-    """
-    return write(files, overwrite, progress)
 
 
 def _views(store: Path) -> list[Path]:
