@@ -345,22 +345,8 @@ def test_bode_with_sampling_and_delay(whole: Stage) -> None:
     assert fast.limits["free"].highest_stable < slow.limits["free"].highest_stable
 
 
-def test_rig_hunting(whole: Stage) -> None:
-    sizes = {
-        "RELATIVE_CROSSOVERS": np.array([1.0, 3.0]),
-        "SHOWN_CROSSOVERS": (0, 1),
-        "RELEASE_DISTANCES": (0.02,),
-        "rails": lambda machine: rails(machine)[:2],
-    }
-    with patched({rig_hunting: sizes}):
-        outcome = rig_hunting.EXPERIMENT.run(whole, 1, silent)
-    assert all(sentences(outcome))
 
 
-def test_compare(whole: Stage) -> None:
-    comparison = compare({"cascade": whole}, 20, 1)
-    assert comparison.as_built
-    assert not any(result.failed for result in comparison.results)
 
 
 @pytest.mark.thorough

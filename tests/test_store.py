@@ -537,14 +537,6 @@ def test_what_a_store_states_is_such_as_friso_states(stored: Path, name: str, ch
         read_store(stored)["peaks"].load()
 
 
-@pytest.mark.slow
-@posix
-def test_what_lies_deeper_than_files_of_a_store_is_not_looked_at(stored: Path, rig: Stage, tmp_path: Path) -> None:
-    """However deep: a path, or a function that calls itself, has an end."""
-    (stored / "a" / "b").mkdir(parents=True)
-    (stored / "a" / "b" / "c").symlink_to(tmp_path)
-    sweep(rig, AXES, store=stored)
-    assert unfinished(stored) == []
 
 
 def test_a_store_of_another_version_says_so(stored: Path) -> None:
@@ -610,15 +602,6 @@ def test_what_is_no_store_is_not_replaced_even_when_told(stored: Path, rig: Stag
         assert (foreign / "data").exists()
 
 
-def test_leftovers_of_a_killed_run_are_removed(rig: Stage, tmp_path: Path) -> None:
-    left, being_made = (tmp_path / f".a.zarr.{digit * 32}" for digit in "ab")
-    for draft in (left, being_made):
-        draft.mkdir()
-        (draft / "zarr.json").write_text("{}")
-    study = study_on(rig)
-    with FileLock(being_made / LOCK), Store.opened(tmp_path / "a.zarr", study):
-        assert not left.exists()
-        assert being_made.exists()
 
 
 @pytest.mark.cases(first=1)

@@ -89,9 +89,6 @@ def test_sources_compile_without_a_warning(folder: Path, tmp_path: Path) -> None
             assert done.returncode == 0, done.stderr
 
 
-def test_archives_are_identical_from_the_same_input(folder: Path) -> None:
-    for name, content in TARGETS["fmu"].files(parcel()).items():
-        assert (folder / name).read_bytes() == (content if isinstance(content, bytes) else content.encode())
 
 
 @runs_here
@@ -186,16 +183,6 @@ def test_two_coupled_fmus_hunt_as_friso_s_machine(tmp_path: Path, version: str) 
     np.testing.assert_allclose(swing_of(np.array(measured) - reference), theirs, rtol=1e-3)
 
 
-def test_without_a_compiler_sources_are_written_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A compiler that refuses everything, as the empty shell of macOS does, is none."""
-    monkeypatch.setattr(fmu, "COMPILERS", (sys.executable,))
-    for name in ("_binary", "_compiler"):
-        monkeypatch.setattr(fmu, name, getattr(fmu, name).__wrapped__)
-    assert "Not compiled" in TARGETS["fmu"].remark()
-    model = fmu._models(parcel())[0]
-    names = zipfile.ZipFile(fmu.BytesIO(fmu._archive(parcel(), model, "3"))).namelist()
-    assert not any(name.startswith("binaries") for name in names)
-    assert {"sources/axis.c", "sources/fmi3.c", "sources/buildDescription.xml", "modelDescription.xml"} <= {*names}
 
 
 @pytest.mark.parametrize(("system", "processor", "names"), [
