@@ -14,7 +14,6 @@ import plain
 import pytest
 import sympy as sp
 from emps import emps_log
-from patched import patched
 from scipy.integrate import solve_ivp
 from variants import cascade, gains, limit, lugre, release, stage, step, there_and_back
 
@@ -32,13 +31,8 @@ from friso.hunting import hunting as hunting_of
 from friso.identification.experiments.moves import identify_moves
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
-from friso.progress import silent
-from friso.remedies.comparison import compare
 from friso.stage import Stage
 from friso.studies.sweep import sweep
-from friso_thesis.questions.rig.words import sentences
-from friso_thesis.studies.rig.experiments import hunting as rig_hunting
-from friso_thesis.studies.rig.moves_on_rails import rails
 
 KV, KP, T_V, MASS = 60.0, 50.0, 0.03, 1.7
 
@@ -343,10 +337,6 @@ def test_bode_with_sampling_and_delay(whole: Stage) -> None:
     slow = friso.bode(whole.replace({"drive.delay": None, "drive.sample_time": None}))
     fast = friso.bode(whole)
     assert fast.limits["free"].highest_stable < slow.limits["free"].highest_stable
-
-
-
-
 
 
 @pytest.mark.thorough

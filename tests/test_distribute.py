@@ -153,10 +153,7 @@ def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
     def close(done: int, total: int, what: str) -> None:
         scheduler.close()
 
-    with (
-        pytest.raises(RuntimeError, match="lost a block"),
-        connected(scheduler.scheduler_address) as crew,
-    ):
+    with pytest.raises(RuntimeError, match="lost a block"), connected(scheduler.scheduler_address) as crew:
         run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, close)
 
 

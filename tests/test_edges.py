@@ -3,12 +3,10 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import friso
 from friso.errors import InputError
-from friso.stage import Stage, loads, numeric_keys
+from friso.stage import loads
 from friso.stage.plausible import implausible_values
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -77,35 +75,3 @@ def test_frictions_in_a_wrong_unit_are_not_blamed_on_the_mass() -> None:
     for heavy in ({"friction.static": "40 kN"}, {"friction.static": "40 kN", "friction.coulomb": "35 kN"}):
         doubts = implausible_values(axis.replace(heavy))
         assert [doubt.partition(" ")[0] for doubt in doubts] == [*heavy]
-
-
-NUMBERS = st.one_of(
-    st.integers(0, 10**80), st.floats(allow_nan=True), st.sampled_from([10**60, 10**70, 10**308, 10**400, True])
-)
-
-
-KEYS = sorted(numeric_keys(loads(RIG).flat()))
-
-
-@pytest.mark.slow
-@given(key=st.sampled_from(KEYS), number=NUMBERS, unit=st.sampled_from(["", "m", "N"]))
-@settings(max_examples=200)
-def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, unit: str) -> None:
-    field = numeric_keys(loads(RIG).flat())[key]
-    try:
-        stage = loads(RIG).replace({key: f"{number!r} {unit or field.unit}" if field.unit else number})
-    except InputError:
-        return
-    again = loads(stage.to_toml())
-    assert again == stage
-    assert again.flat() == stage.flat()
-
-
-@pytest.mark.slow
-@given(text=st.text(st.characters(), max_size=20))
-def test_any_text_can_be_saved_and_read_again(text: str) -> None:
-    try:
-        stage: Stage = loads(RIG).replace({"name": text, "source": text})
-    except InputError:
-        return
-    assert loads(stage.to_toml()) == stage

@@ -69,8 +69,6 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
 THESIS = mechanism()
 
 
-
-
 def together(many: list[Mechanism]) -> Mechanism:
     """Many mechanisms as one of arrays."""
 
@@ -130,10 +128,6 @@ def test_a_plain_beam_is_what_exudyn_makes_of_it() -> None:
 
 
 # ---- closed forms
-
-
-
-
 
 
 @MANY

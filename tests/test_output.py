@@ -20,14 +20,7 @@ from systems import posix
 from friso.cli.app import command_line
 from friso.errors import InputError
 from friso.interface import output_folder
-from friso.interface.output_folder import (
-    DRAFTS,
-    UNFINISHED,
-    OutputFolder,
-    check_store_folder,
-    write,
-    write_file,
-)
+from friso.interface.output_folder import DRAFTS, UNFINISHED, OutputFolder, check_store_folder, write, write_file
 from friso.shown.files import Content
 from friso.stage import load
 

@@ -59,12 +59,7 @@ CONTROL = {
     "inertia": 1e-4,
     "vel_limit": 10.0,
 }
-MOTOR = {
-    "torque_constant": 0.04,
-    "current_lim": 20.0,
-    "torque_lim": float("inf"),
-    "current_control_bandwidth": 1000.0,
-}
+MOTOR = {"torque_constant": 0.04, "current_lim": 20.0, "torque_lim": float("inf"), "current_control_bandwidth": 1000.0}
 
 
 def ini(folder: Path, gains: dict[str, Any], unit: str = "mm", joint: str = "TYPE = LINEAR") -> Path:

@@ -19,7 +19,6 @@ import numpy as np
 import pytest
 import xarray as xr
 import zarr
-from filelock import FileLock
 from patience import wait_until
 from refusals import refused
 from systems import posix
@@ -30,7 +29,6 @@ from friso.stage import Stage
 from friso.studies.execute import local_crew
 from friso.studies.settings import StudySettings
 from friso.studies.store import Store, _sum_at, read_store
-from friso.studies.store_files import LOCK
 from friso.studies.study import Request, Study, study_of
 from friso.studies.sweep import run_in_store, sweep
 
@@ -263,10 +261,7 @@ def test_a_store_is_there_whole_or_not_at_all(rig: Stage, tmp_path: Path, monkey
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(zarr, "create_group", fails)
-    with (
-        refused(),
-        Store.opened(tmp_path / "a.zarr", study_on(rig)),
-    ):
+    with refused(), Store.opened(tmp_path / "a.zarr", study_on(rig)):
         pass
     assert list(tmp_path.iterdir()) == []
 
@@ -537,8 +532,6 @@ def test_what_a_store_states_is_such_as_friso_states(stored: Path, name: str, ch
         read_store(stored)["peaks"].load()
 
 
-
-
 def test_a_store_of_another_version_says_so(stored: Path) -> None:
     change_file(stored / ".friso/zarr.json", {"attributes": {"format": 4}})
     with pytest.raises(StoreError, match=r"another friso[\s\S]*run again"):
@@ -600,8 +593,6 @@ def test_what_is_no_store_is_not_replaced_even_when_told(stored: Path, rig: Stag
         with pytest.raises(StoreError), Store.opened(foreign, other, overwrite=True):
             pass
         assert (foreign / "data").exists()
-
-
 
 
 @pytest.mark.cases(first=1)

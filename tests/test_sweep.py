@@ -127,10 +127,7 @@ def test_only_the_metrics_asked_for_are_kept(rig: Stage) -> None:
 
 @pytest.mark.slow
 @settings(max_examples=40)
-@given(
-    shape=st.lists(st.integers(1, 15), min_size=1, max_size=4),
-    target=st.integers(1, 300),
-)
+@given(shape=st.lists(st.integers(1, 15), min_size=1, max_size=4), target=st.integers(1, 300))
 def test_blocks_cover_every_cell_once(shape: list[int], target: int) -> None:
     stage = friso.load(EXAMPLES / "thesis_rig.toml")
     keys = ("controller.crossover", "controller.alpha", "controller.beta", "friction.static")

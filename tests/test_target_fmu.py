@@ -89,8 +89,6 @@ def test_sources_compile_without_a_warning(folder: Path, tmp_path: Path) -> None
             assert done.returncode == 0, done.stderr
 
 
-
-
 @runs_here
 @pytest.mark.parametrize("version", "23")
 def test_a_state_is_kept_and_set_back(folder: Path, version: str) -> None:
@@ -181,8 +179,6 @@ def test_two_coupled_fmus_hunt_as_friso_s_machine(tmp_path: Path, version: str) 
     theirs = swing_of(long.vector.true_position - reference)
     assert theirs[0] > 1e-5
     np.testing.assert_allclose(swing_of(np.array(measured) - reference), theirs, rtol=1e-3)
-
-
 
 
 @pytest.mark.parametrize(("system", "processor", "names"), [

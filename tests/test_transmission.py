@@ -125,15 +125,7 @@ def by_hand(stage: Stage, times: np.ndarray, law: Law, numbers_held: int) -> np.
         z_rate, on_load = bristles(flat, "friction", v, z)
         big_z_rate, on_motor = bristles(flat, "motor_friction", big_v, big_z)
         pull, own_rates = law(y[:4], own)
-        return [
-            v,
-            (force - on_load) / load,
-            big_v,
-            (pull - force - on_motor) / motor,
-            z_rate,
-            big_z_rate,
-            *own_rates,
-        ]
+        return [v, (force - on_load) / load, big_v, (pull - force - on_motor) / motor, z_rate, big_z_rate, *own_rates]
 
     begin, span = np.zeros(6 + numbers_held), (0, times[-1])
     answer = solve_ivp(rates, span, begin, "Radau", times, rtol=1e-9, atol=1e-13, max_step=times[-1] / 500)
