@@ -29,7 +29,6 @@ from target_stages import CONTROLLERS, EXAMPLES, MACHINES, stage_of
 import friso
 from friso.drives.program import Program
 from friso.drives.target import TARGETS, CodeTarget, Parcel
-from friso.drives.targets.difference import biquads
 from friso.errors import InputError
 from friso.frequency.loops import controller_over_period, samples_controller
 from friso.frequency.parts import RATED, STAGE
@@ -328,8 +327,9 @@ def test_the_system_of_python_control(control: str) -> None:
 
 @pytest.mark.parametrize("control", ["van_dijk_notch", "adrc", "transfer_function"])
 def test_biquads_have_the_response_of_the_state_space(control: str) -> None:
-    linear = parcel_of(control, "rigid_lugre").linear
-    sections = biquads(linear)
+    parcel = parcel_of(control, "rigid_lugre")
+    linear, document = parcel.linear, json.loads(TARGETS["difference"].files(parcel)["axis.json"])
+    sections = {name: np.array(rows) for name, rows in document["biquads"].items()}
     assert {"reference_position", "position"} <= sections.keys()
     z = np.exp(1j * np.array([0.01, 0.3, 2.0]))[:, None, None] ** -np.arange(3)
     for name, rows in sections.items():
