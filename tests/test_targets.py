@@ -388,20 +388,20 @@ def check_of(verdict: str, **more: Any) -> Any:
     )
 
 
+WARNS = {"settles": False, "transient": False} | dict.fromkeys(
+    ("hunts", "bistable", "undecided", "none", "failed"), True
+)
+RIGID = friso.load(EXAMPLES / "ball_screw_axis.toml").replace({"friction": None})
+
+
 @pytest.mark.parametrize(
     ("check", "warns"),
     [
-        (check_of("settles"), False),
-        (check_of("transient"), False),
-        (check_of("hunts"), True),
-        (check_of("bistable"), True),
-        (check_of("undecided"), True),
-        (check_of("none"), True),
-        (check_of("failed"), True),
+        *((check_of(verdict), warns) for verdict, warns in WARNS.items()),
         (check_of("settles", certain=False, reason="too much work"), True),
         (check_of("settles", failure="the run stopped"), True),
         (check_of("settles", stage=SimpleNamespace(states_friction=False, unknown_keys=())), True),
-        (check_of("settles", stage=friso.load(EXAMPLES / "ball_screw_axis.toml").replace({"friction": None})), False),
+        (check_of("settles", stage=RIGID), False),
     ],
 )
 def test_only_a_sure_verdict_leaves_without_a_warning(check: Any, warns: bool) -> None:
