@@ -35,7 +35,6 @@ from friso.hunting import (
     verdict,
 )
 from friso.hunting.attractors import starts
-from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.rest import bent
@@ -569,17 +568,6 @@ def test_slow_travels_bend_bristles_one_after_the_other_until_they_yield() -> No
     assert drawn == pytest.approx([*most[:-1], 0.4e-3])
     back = bent(stages, there, np.array([np.inf]), np.array([-0.1e-3]))[0, bristles]
     assert back == pytest.approx(np.maximum(most - 0.1e-3, -most))
-
-
-def test_swings_that_repeat_themselves() -> None:
-    """A symmetric swing repeats after one turn, mirrored; a leaning one after two; a long-short one after four."""
-    rows = [[1.0, -1.0] * 16, [1.2, -0.9] * 16, [1.0, -0.5, 0.6, -0.4] * 8]
-    times = np.tile(np.cumsum([1.0] * 32), (3, 1))
-    repeats = recurrence(np.array(rows), times, np.ones(3, bool))
-    assert repeats.swings.tolist() == [1, 2, 4]
-    assert repeats.time.tolist() == [1.0, 2.0, 4.0]
-    noisy = recurrence(np.random.default_rng(1).normal(size=(1, 32)), times[:1], np.ones(1, bool))
-    assert noisy.swings.tolist() == [0]
 
 
 @pytest.mark.slow
