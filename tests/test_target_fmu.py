@@ -19,7 +19,6 @@ from test_targets import COMPILERS, STRICT, TRAPS, machined, needs_compiler, swi
 import friso
 from friso.drives.target import TARGETS, Parcel
 from friso.drives.targets import fmu
-from friso.errors import InputError
 from friso.questions.export.parcel import packed
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, which runs FMUs, is not installed")
@@ -205,12 +204,6 @@ def test_an_fmu_keeps_its_clock() -> None:
     for model in fmu._models(parcel()):
         assert "drive.sample_time" not in {one.name for one in model.variables}
     assert "drive.sample_time" in {str(one) for one in parcel().program.parameters}
-
-
-@pytest.mark.parametrize("name", ["model", "fmi2", "fmi3", "math"])
-def test_names_of_the_interface_are_refused(name: str) -> None:
-    with pytest.raises(InputError, match=f'"{name}", a word of FMI'):
-        TARGETS["fmu"].check_names(name, parcel().program)
 
 
 @pytest.mark.parametrize(("changes", "answers", "powers"), [
