@@ -1,8 +1,9 @@
 """Seed faults into friso, and tell which of them the tests catch: `python -m benchmarks.faults FOLDER`.
 
-FOLDER is one of `python -m benchmarks.tiers FOLDER --measure`: it says which tests execute a line, and how long each
-takes; only these are run, the quick ones first, until one fails. A fault is one changed operator, comparison, condition
-or number in a line that some test executes, drawn with a seed. Tests run in a copy of this checkout, in one process.
+`--measure` runs every test but the thorough ones and writes to FOLDER which lines each executes (by the package
+pytest-cov) and how long it takes. Of a fault, only the tests that execute its line are run, the quick ones first, until
+one fails. A fault is one changed operator, comparison, condition or number in a line that some test executes, drawn
+with a seed. Tests run in a copy of this checkout, in one process.
 """
 
 from __future__ import annotations
@@ -18,15 +19,18 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("friso", "friso_thesis")
+FOLDER_VARIABLE = "FRISO_TIMES_DIR"
 FEW = 20
 """Lines that fewer tests execute may be what a fixture or a cache computes once: the whole files of these tests run."""
 
@@ -120,6 +124,33 @@ def _changes(tree: ast.Module) -> Iterator[tuple[ast.expr, ast.expr]]:
 
 def _swapped(operator: Any) -> Any:
     return SWAPPED[type(operator)]()
+
+
+def _cpu() -> float:
+    """Return the CPU time of this process and of its ended children [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None]:
+    """Write what a test takes, in the run of `measure`, whose plugin this module is."""
+    begin = _cpu()
+    yield
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "main")
+    with (Path(os.environ[FOLDER_VARIABLE]) / f"{worker}.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps({"test": item.nodeid, "cpu": _cpu() - begin}) + "\n")
+
+
+def measure(folder: Path) -> None:
+    """Run the tests and write to a new folder how long each takes and which lines it executes."""
+    folder.mkdir(parents=True)
+    (folder / "coveragerc").write_text(f"[run]\nparallel = true\ndata_file = {folder / 'coverage'}\n", "utf-8")
+    covered = [f"--cov={package}" for package in PACKAGES]
+    options = ["--cov-context=test", "--cov-report=", f"--cov-config={folder / 'coveragerc'}"]
+    plugin = ["-p", "benchmarks.faults", "-m", "not thorough", "--max-worker-restart=0"]
+    command = [sys.executable, "-m", "pytest", *plugin, *covered, *options]
+    subprocess.run(command, cwd=ROOT, env={**os.environ, FOLDER_VARIABLE: str(folder)}, check=True)
 
 
 def executing(coverage: Path) -> dict[str, dict[int, set[str]]]:
@@ -218,9 +249,10 @@ def chosen(fault: Fault, tests: dict[str, dict[int, set[str]]], cost: dict[str, 
 
 
 def main() -> None:
-    """Seed the faults one by one, and print which test catches each."""
+    """Measure the tests if asked to, seed the faults one by one, and print which test catches each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--measure", action="store_true", help="fill the folder first")
     parser.add_argument("--checkout", type=Path, default=ROOT)
     parser.add_argument("--faults", type=Path, help="file with the faults; made if there is none")
     parser.add_argument("--only", type=Path, help="file with the names of tests, such as those of the first tier")
@@ -228,6 +260,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--budget", type=float, default=240.0, help="seconds of tests a fault, by their times")
     arguments = parser.parse_args()
+    if arguments.measure:
+        measure(arguments.folder.absolute())
     tests = executing(arguments.folder / "coverage")
     cost = seconds_of_tests(arguments.folder)
     if arguments.faults and arguments.faults.exists():

@@ -31,8 +31,7 @@ from friso.equations.rail import friction_factors
 from friso.errors import InputError
 from friso.hunting import check
 from friso.identification.method import Identification, identify
-from friso.stage import Stage, load
-from friso.stage.files import save
+from friso.stage import Stage, load, save
 from friso_thesis.studies.rig.experiments.frf import plant_log
 from friso_thesis.studies.rig.experiments.presliding import presliding_log
 from friso_thesis.studies.rig.experiments.stiction import slow_legs

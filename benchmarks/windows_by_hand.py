@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from friso.equations import motion
-from friso.stage.lists import element_keys
+from friso.stage import element_keys
 
 WINDOWS = ("error_deadband", "integral_deadband", "standstill_window", "freeze_window")
 ERROR, INTEGRAL, GAINS, FREEZE = range(len(WINDOWS))

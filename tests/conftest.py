@@ -7,6 +7,7 @@ import shutil
 import signal
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from threading import TIMEOUT_MAX
@@ -50,16 +51,18 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give tests their marks: those of tests/tiers.txt, and thorough to what a fixture `thorough_...` computes."""
-    from benchmarks.tiers import FOLDER_VARIABLE, TIERS  # behind the path of this checkout
-
-    rows = (line.split(" ", 2) for line in TIERS.read_text(encoding="utf-8").splitlines())
-    marks = {} if FOLDER_VARIABLE in os.environ else {name: mark for mark, _, name in rows}
+    """Mark the cases of a test that are not among the first `cases(first=, slow=)`, and whole studies, which use a
+    fixture `thorough_...`."""
+    seen = Counter[str]()
     for item in items:
         if any(name.startswith("thorough_") for name in getattr(item, "fixturenames", ())):
             item.add_marker("thorough")
-        if (mark := marks.get(item.nodeid)) and not item.get_closest_marker("first"):
-            item.add_marker(mark)
+        if cases := item.get_closest_marker("cases"):
+            function = item.nodeid.partition("[")[0]
+            number = seen[function] = seen[function] + 1
+            first, slow = cases.kwargs.get("first", 0), cases.kwargs.get("slow", sys.maxsize)
+            if number > first:
+                item.add_marker("slow" if number - first <= slow else "thorough")
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -66,6 +66,7 @@ def by_radau(bandwidth: float, times: np.ndarray) -> np.ndarray:
     return np.append(np.concatenate(positions), x[0])
 
 
+@pytest.mark.slow
 def test_the_trace_is_that_of_the_observer() -> None:
     times = np.linspace(0, 2, 101)
     run = simulate(rigid(3.0, "10 s"), sample_time=0.02)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from refusals import refused
 
 import friso
 from friso.axis import KINDS
@@ -123,20 +121,6 @@ def test_without_an_actuator_each_gain_in_amperes_says_what_it_needs(tables: dic
     assert sum("[actuator] motor_constant" in text for text in said) == len(amperes)
 
 
-@pytest.mark.parametrize("constant", ["50", "50 N", "0 N/A", 50, None])
-def test_a_wrong_constant_is_the_one_mistake(constant: Any) -> None:
-    actuator = {} if constant is None else {"motor_constant": constant}
-    with refused("actuator.motor_constant", friso.StageError) as caught:
-        Stage(**{**LINEAR, "actuator": actuator})
-    assert not caught.value.also
-
-
-@pytest.mark.parametrize("text", ["2 A/rpm", "2 A*s", "2 A^2*s/m", "2 V*s/m", "2 A/m"])
-def test_amperes_of_another_kind_are_refused(text: str) -> None:
-    with refused("controller.kd"):
-        Stage(**LINEAR).replace({"controller.kd": text})
-
-
 def test_amperes_stand_wherever_a_value_of_the_stage_is_given() -> None:
     stage = Stage(**LINEAR)
     swept = read_axis(stage, "controller.kp", ["50 A/mm", "100 A/mm"], free=False)
@@ -152,16 +136,6 @@ def test_the_constant_of_the_file_is_that_of_export() -> None:
     with pytest.raises(friso.InputError, match="50 N/A"):
         gains_of(stage, {"motor_constant": "40 N/A"})
     assert gains_of(stage, {"motor_constant": "50 N/A"}).conversions == gains_of(stage, {}).conversions
-
-
-def test_gains_to_type_in_name_the_log_to_record_next(tmp_path: Path) -> None:
-    """The file of a stage leads on; a stage without a file, or with changed keys, has no name to lead on with."""
-    file = tmp_path / "axis.toml"
-    file.write_text(Path(friso.example("thesis_rig")).read_text())
-    gains = friso.export(file)
-    assert gains.next_steps([]) == [f"friso identify NEW_LOG.csv --against {file}"]
-    assert friso.export(file, set={"controller.crossover": "9 Hz"}).next_steps([]) == []
-    assert friso.export(Stage(**LINEAR)).next_steps([]) == []
 
 
 def test_volts_exert_what_the_motor_draws_at_standstill() -> None:
@@ -203,24 +177,6 @@ def test_what_export_prints_in_volts_may_stand_in_the_file() -> None:
                 tried += 1
                 assert stage.replace({keys[0]: f"{number!r} {other}"}).flat()[keys[0]] == pytest.approx(value)
     assert tried == 3 * 4
-
-
-@pytest.mark.parametrize(
-    ("changed", "part"),
-    [
-        ({"controller.kp": "3 A/mm"}, "and no resistance"),
-        ({"actuator.resistance": None, "actuator.supply": None, "actuator.full_pwm": None}, "resistance ="),
-        ({"actuator.supply": None, "actuator.full_pwm": None}, "supply ="),
-        ({"actuator.supply": None}, "what belongs to full_pwm"),
-        ({"controller.kp": "3 PWM/count", "actuator.full_pwm": None}, "full_pwm ="),
-        ({"controller.kp": "3 V/count", "drive.encoder_resolution": None}, "encoder_resolution ="),
-        ({"controller.ki": "3 V/(m*sample)", "drive.sample_time": None}, "sample_time ="),
-    ],
-)
-def test_a_command_that_cannot_be_converted_says_what_it_needs(changed: dict[str, Any], part: str) -> None:
-    with pytest.raises(friso.StageError) as refusal:
-        Stage(**IN_VOLTS).replace(changed)
-    assert part in str(refusal.value)
 
 
 IN_PLAIN_UNITS = {"kp": "2000 N/m", "ki": "8 N/(mm*s)", "kd": "20 N*s/m", "force_limit": "120 N"}

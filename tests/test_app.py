@@ -316,6 +316,7 @@ def test_the_token_is_exchanged_for_a_key_and_for_no_cookie(served: Served) -> N
         assert served.request("POST", "/enter", Authorization=None, Friso_Token=token)[0] == 403
 
 
+@pytest.mark.cases(first=11)
 @pytest.mark.parametrize("path", ["/begin", "/enter", "/nothing", "/ask/machine", "/logs/x.csv"])
 @pytest.mark.parametrize("key", [None, "", "Bearer ", "Bearer wrong", "Bearer \xe4"])
 def test_without_a_key_nothing_is_told_and_nothing_is_done(served: Served, path: str, key: str | None) -> None:
@@ -498,6 +499,7 @@ def log_that_crashes(folder: Path) -> bytes:
     return (folder / "a.mat").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", [log_that_is_elsewhere, log_that_crashes])
 def test_a_hostile_log_is_refused_and_the_server_goes_on(
     served: Served, tmp_path: Path, made: Callable[[Path], bytes]
@@ -660,6 +662,7 @@ def test_few_texts_of_machines_are_kept() -> None:
     assert sum(text() is not None for text in kept) * 4e6 <= 64e6
 
 
+@pytest.mark.cases(first=10)
 @pytest.mark.parametrize("name", [name for name in friso.interface.starting.example_names() if "/" not in name])
 def test_every_example_is_shown(name: str) -> None:
     path = Path(friso.example(name))
@@ -685,6 +688,7 @@ def test_a_run_is_that_of_friso(served: Served) -> None:
     assert np.array_equal(lines[0]["y"], expected.astype(np.float32))
 
 
+@pytest.mark.slow
 def test_the_loops_of_the_limit_cases_come_before_those_of_the_family(served: Served) -> None:
     """The family comes next, and then how fast the controller may be, which takes longer; friso says all of it."""
     answer = friso.bode(RIG)
@@ -735,6 +739,7 @@ def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: py
     assert layout["xaxis"]["type"] == layout["yaxis"]["type"] == "log"
 
 
+@pytest.mark.slow
 def test_a_map_comes_from_coarse_to_fine_and_ends_as_that_of_friso(
     served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -819,6 +824,7 @@ def test_what_is_pinned_stands_behind_what_is_alike(own: str, other: str, alike:
     assert [series.label for series in panel.series] == [*["pinned"] * alike, "a line"]
 
 
+@pytest.mark.slow
 def test_a_cell_of_a_map_and_the_leaf_springs_have_what_is_pinned(served: Served) -> None:
     """A cell shows the error of its run."""
     heavier = {"masses.stage": "1.1 kg"}
@@ -919,6 +925,7 @@ def test_an_answer_is_there_at_once_for_whoever_comes_back_with_what_was_noted()
     assert kept.answer(question, rig, work) is not first
 
 
+@pytest.mark.slow
 def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Served) -> None:
     """Before that, whose sentences say it; the words of a slider do not, and have it as a note."""
     *said, last = served.ask("check", RIG, UNSTABLE)
@@ -938,6 +945,7 @@ def test_a_verdict_that_leaves_out_an_unstable_drive_is_not_certain(served: Serv
     assert served.ask(question, RIG)[-1]["certain"]
 
 
+@pytest.mark.slow
 def test_the_cures_of_a_machine_are_those_of_its_check_and_stop_its_hunting(served: Served) -> None:
     """A machine that does not hunt has none."""
     check = served.ask("check", RIG, {"joint.locked": True})[-1]
@@ -1036,6 +1044,7 @@ list(Workshop().pool.map(import_module, ["dask.array.ma", "dask.array", "dask.ar
 """
 
 
+@pytest.mark.slow
 def test_questions_that_begin_at_once_import_what_they_need() -> None:
     """Two threads that import modules which import one another each found one half done."""
     subprocess.run([sys.executable, "-c", IMPORTED], check=True)

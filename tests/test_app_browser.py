@@ -204,7 +204,6 @@ def browsed(opened: Browsed) -> Browsed:
     return opened
 
 
-@pytest.mark.first
 def test_the_verdict_of_the_locked_rig_changes_at_its_edge(browsed: Browsed) -> None:
     """9.75 Hz, where the cycle stops attracting; undo takes it back."""
     page = browsed.page
@@ -221,6 +220,7 @@ def test_the_verdict_of_the_locked_rig_changes_at_its_edge(browsed: Browsed) -> 
     page.wait_for_function(f"() => document.querySelector('{FIELD}').value === '9.7 Hz'")
 
 
+@pytest.mark.slow
 def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browsed: Browsed) -> None:
     page = browsed.page
 
@@ -234,6 +234,7 @@ def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browse
         page.click("#tab-bode")
 
 
+@pytest.mark.slow
 def test_what_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None:
     """Old pictures and verdicts are marked if the new ones take longer than a moment, as with a kernel to compile."""
     page, runs, verdicts = browsed.page, [], []
@@ -270,6 +271,7 @@ document.body.append(place);
 """Script that makes a place for pictures, below the visible part of the page but for the first."""
 
 
+@pytest.mark.slow
 def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
     """Plots below the visible part are drawn later, when the machine may have changed."""
     other = browsed.page.evaluate(
@@ -289,6 +291,7 @@ def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(b
     assert other == [True, True]
 
 
+@pytest.mark.slow
 def test_plots_that_come_in_parts_stay_in_order_and_go_once_it_is_known_that_they_do(browsed: Browsed) -> None:
     shown = browsed.page.evaluate(
         """async () => {
@@ -309,6 +312,7 @@ def test_plots_that_come_in_parts_stay_in_order_and_go_once_it_is_known_that_the
     assert shown == ["one four", "one four two", "one two three", "one"]
 
 
+@pytest.mark.thorough
 def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) -> None:
     """Progress does not replace it; the whole answer says what is true of the machine."""
     page = browsed.page
@@ -334,6 +338,7 @@ def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) ->
     page.wait_for_function("() => !document.getElementById('answer').innerText.includes('The loop is unstable')")
 
 
+@pytest.mark.slow
 def test_the_pictures_of_an_answer_that_is_there_are_not_asked_for_again(browsed: Browsed) -> None:
     """Another check would take away the probability of hunting, which took minutes."""
     page, asked = browsed.page, []
@@ -344,6 +349,7 @@ def test_the_pictures_of_an_answer_that_is_there_are_not_asked_for_again(browsed
     assert not [address for address in asked if "ask/check" in address]
 
 
+@pytest.mark.slow
 def test_what_is_being_typed_stays_when_an_answer_comes(browsed: Browsed) -> None:
     """What was selected to be typed over stays selected, and a refusal is said meanwhile."""
     page, machine = browsed.page, re.compile("ask/machine")
@@ -366,6 +372,7 @@ def test_what_is_being_typed_stays_when_an_answer_comes(browsed: Browsed) -> Non
     assert browsed.changes()["controller.crossover"] == "10.5 Hz"
 
 
+@pytest.mark.slow
 def test_the_first_click_after_typing_counts(browsed: Browsed) -> None:
     """Parts that are redrawn while the pointer is pressed are redrawn after the click; the focus stays."""
     page = browsed.page
@@ -395,6 +402,7 @@ def test_the_first_click_after_typing_counts(browsed: Browsed) -> None:
     assert page.input_value(FIELD) == "10 Hz"
 
 
+@pytest.mark.slow
 def test_tabs_keep_the_focus_and_a_click_on_one_counts_while_a_value_is_handed_over(browsed: Browsed) -> None:
     """The answer stands above the tabs, and would move them from under the pointer: none comes to another machine."""
     page = browsed.page
@@ -419,6 +427,7 @@ def test_tabs_keep_the_focus_and_a_click_on_one_counts_while_a_value_is_handed_o
     page.wait_for_selector("#tab-logs[aria-selected=true]")
 
 
+@pytest.mark.slow
 def test_arrows_home_and_end_lead_along_the_tabs_of_which_tab_reaches_one(browsed: Browsed) -> None:
     page, tabs = browsed.page, "#pictures-bar [role=tab]"
     names = page.eval_on_selector_all(tabs, "all => all.map(tab => tab.id)")
@@ -434,6 +443,7 @@ def test_arrows_home_and_end_lead_along_the_tabs_of_which_tab_reaches_one(browse
     assert stops == [names[1]]
 
 
+@pytest.mark.slow
 def test_machines_are_closed_by_keys_and_the_last_one_stays(browsed: Browsed) -> None:
     """The tabs own nothing but tabs, with which axe and screen readers agree; the one that follows has the focus."""
     page = browsed.page
@@ -455,6 +465,7 @@ def test_machines_are_closed_by_keys_and_the_last_one_stays(browsed: Browsed) ->
     assert page.locator("#machines [role=tab]").count() == 1
 
 
+@pytest.mark.slow
 def test_an_answer_that_comes_before_its_picture_is_kept_as_an_earlier_one(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/run", lambda route: held.append(route))
@@ -464,6 +475,7 @@ def test_an_answer_that_comes_before_its_picture_is_kept_as_an_earlier_one(brows
     held.pop().continue_()
 
 
+@pytest.mark.slow
 def test_earlier_answers_are_named_by_what_changed_and_lead_back_to_their_machine(browsed: Browsed) -> None:
     """They are one stop of the tab key; the machine returns with the keys of that time alone, in its own tab."""
     page, places = browsed.page, "#history button"
@@ -488,6 +500,7 @@ def test_earlier_answers_are_named_by_what_changed_and_lead_back_to_their_machin
     assert browsed.changes() == {"controller.crossover": "11 Hz"}
 
 
+@pytest.mark.slow
 def test_no_single_key_acts_on_the_page_and_a_pinned_machine_stays_as_a_ghost(browsed: Browsed) -> None:
     """Who speaks to the computer would set single keys off; WCAG 2.2, 2.1.4."""
     page, pinned = browsed.page, "async () => Boolean((await import('/state.js')).pinned())"
@@ -502,6 +515,7 @@ def test_no_single_key_acts_on_the_page_and_a_pinned_machine_stays_as_a_ghost(br
     page.wait_for_function(f"() => !({ghost})")
 
 
+@pytest.mark.slow
 def test_a_server_that_is_gone_is_said_so_and_nothing_is_lost(browsed: Browsed) -> None:
     page, wrong = browsed.page, len(browsed.wrong)
     page.context.set_offline(True)
@@ -514,6 +528,7 @@ def test_a_server_that_is_gone_is_said_so_and_nothing_is_lost(browsed: Browsed) 
     del browsed.wrong[wrong:]
 
 
+@pytest.mark.slow
 def test_what_was_typed_for_one_machine_is_not_set_in_another(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
     (tmp_path / "another.toml").write_text(friso.load(RIG).replace({"controller.crossover": "15 Hz"}).to_toml())
@@ -529,6 +544,7 @@ def test_what_was_typed_for_one_machine_is_not_set_in_another(browsed: Browsed, 
     assert browsed.changes() == {}
 
 
+@pytest.mark.slow
 def test_the_picture_follows_a_slider_which_goes_on_after_a_wrong_value(browsed: Browsed) -> None:
     """A corrected value does not take the slider from under the hand, and one pull is one step."""
     page, drawn = browsed.page, "document.querySelector('.plot').data.find((line) => line.name === 'Free (as given)')"
@@ -565,6 +581,7 @@ def test_the_picture_follows_a_slider_which_goes_on_after_a_wrong_value(browsed:
     page.wait_for_function(f"() => document.querySelector('{FIELD}').value === '8 Hz'")
 
 
+@pytest.mark.thorough
 def test_an_uncertain_value_has_no_slider_and_its_warning_stays(browsed: Browsed) -> None:
     page, row = browsed.page, '[data-path="masses.stage"]'
     page.click("[data-part=stage]")
@@ -581,6 +598,7 @@ def test_an_uncertain_value_has_no_slider_and_its_warning_stays(browsed: Browsed
     page.click("[data-part=controller]")
 
 
+@pytest.mark.slow
 def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
     browsed.set({"joint.locked": True, "controller.crossover": "9.7 Hz"})
@@ -597,6 +615,7 @@ def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Brows
     browsed.says(friso.simulate(tmp_path / "out.toml").sentences()[0])
 
 
+@pytest.mark.slow
 def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_there(browsed: Browsed) -> None:
     page = browsed.page
     page.click("#tab-map")
@@ -613,6 +632,7 @@ def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_th
     assert float(page.input_value(FIELD).split()[0]) > 15
 
 
+@pytest.mark.slow
 def test_an_answer_that_comes_once_another_machine_is_shown_is_not_taken_for_it(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/machine", lambda route: route.continue_() if held else held.append(route))
@@ -624,6 +644,7 @@ def test_an_answer_that_comes_once_another_machine_is_shown_is_not_taken_for_it(
     assert page.locator(FIELD).count() == 0
 
 
+@pytest.mark.slow
 def test_what_stops_it_says_of_which_machine_and_gives_no_other_one_its_command(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/tune", lambda route: held.append(route))
@@ -644,6 +665,7 @@ def test_what_stops_it_says_of_which_machine_and_gives_no_other_one_its_command(
     page.wait_for_selector("#machine-1 >> text=isolator_and_gains")
 
 
+@pytest.mark.slow
 def test_a_picture_that_is_waited_for_says_so(browsed: Browsed) -> None:
     page = browsed.page
     page.route("**/ask/boundary", lambda _: None)
@@ -654,6 +676,7 @@ def test_a_picture_that_is_waited_for_says_so(browsed: Browsed) -> None:
     page.wait_for_selector("#picture progress", state="detached")  # once its words are there, too
 
 
+@pytest.mark.slow
 def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, tmp_path: Path) -> None:
     """The refused file's text can be corrected on the page."""
     page = browsed.page
@@ -675,6 +698,7 @@ def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, t
     page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
+@pytest.mark.slow
 def test_where_the_server_fails_it_can_be_asked_again(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
     answer = json.dumps({"kind": "failed", "key": "", "text": "out of memory"}).encode()
@@ -689,6 +713,7 @@ def test_where_the_server_fails_it_can_be_asked_again(browsed: Browsed, tmp_path
     page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
+@pytest.mark.slow
 def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browsed: Browsed) -> None:
     page, slider = browsed.page, '[data-path="controller.crossover"] input[type=range]'
     page.click("#tab-bode")
@@ -706,6 +731,7 @@ def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browse
     page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
+@pytest.mark.slow
 def test_of_a_log_that_says_nothing_roles_units_and_scales_are_told(browsed: Browsed, tmp_path: Path) -> None:
     """The page then asks for what the command line is given; a refusal names the dropped file."""
     page = browsed.page
@@ -734,6 +760,7 @@ def test_of_a_log_that_says_nothing_roles_units_and_scales_are_told(browsed: Bro
     assert gone.value.status == 204  # the server keeps it no longer
 
 
+@pytest.mark.slow
 def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -> None:
     """Control characters and overrides of the reading direction are written out, as friso writes them out elsewhere."""
     page = browsed.page
@@ -747,6 +774,7 @@ def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -
     assert escaped(shown) == shown
 
 
+@pytest.mark.slow
 def test_a_log_that_is_refused_can_be_removed(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
     browsed.no_logs()
@@ -763,6 +791,7 @@ def test_a_log_that_is_refused_can_be_removed(browsed: Browsed, tmp_path: Path) 
     assert page.locator("#picture .files, #role-position").count() == 0
 
 
+@pytest.mark.slow
 def test_out_holds_the_machine_that_is_shown_or_waits_for_it(browsed: Browsed, tmp_path: Path) -> None:
     """No stage file is offered as long as the server has not read the last input."""
     page, held, button = browsed.page, [], "#dialog button:text-is('Stage file')"
@@ -784,6 +813,7 @@ def test_out_holds_the_machine_that_is_shown_or_waits_for_it(browsed: Browsed, t
         page.keyboard.press("Escape")
 
 
+@pytest.mark.slow
 def test_the_drawing_of_another_machine_switches_nothing(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/machine", lambda route: held.append(route))
@@ -798,6 +828,7 @@ def test_the_drawing_of_another_machine_switches_nothing(browsed: Browsed) -> No
     assert browsed.changes() == {"joint.locked": True}
 
 
+@pytest.mark.slow
 def test_no_progress_stays_of_what_was_abandoned(browsed: Browsed) -> None:
     page = browsed.page
     page.wait_for_selector("#answer .rest .note")
@@ -814,6 +845,7 @@ def test_no_progress_stays_of_what_was_abandoned(browsed: Browsed) -> None:
     page.wait_for_function("() => !document.querySelector('progress')")
 
 
+@pytest.mark.slow
 def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:
     page = browsed.page
     page.evaluate("""() => {
@@ -840,6 +872,7 @@ FILL = """() => {
 KEPT = "JSON.parse(localStorage.getItem(`friso-machines-${sessionStorage.friso}`)).machines[0]"
 
 
+@pytest.mark.slow
 def test_a_browser_whose_storage_is_full_is_said_so(browsed: Browsed) -> None:
     """Data of other tabs are removed first; if that is not enough, the message stays."""
     page = browsed.page
@@ -871,6 +904,7 @@ def test_a_browser_whose_storage_is_full_is_said_so(browsed: Browsed) -> None:
     assert page.evaluate(f"{KEPT}.step") == 3
 
 
+@pytest.mark.slow
 def test_of_very_many_changes_the_last_can_be_undone(browsed: Browsed) -> None:
     page = browsed.page
     steps = page.evaluate("""async () => {
@@ -881,6 +915,7 @@ def test_of_very_many_changes_the_last_can_be_undone(browsed: Browsed) -> None:
     assert steps == [200, 199, {"controller.crossover": "10.49 Hz"}]
 
 
+@pytest.mark.slow
 def test_a_tab_that_is_opened_from_another_keeps_its_own(browsed: Browsed) -> None:
     """A copied tab begins with the mark by which the first tab keeps its data."""
     page = browsed.page
@@ -901,6 +936,7 @@ def test_a_tab_that_is_opened_from_another_keeps_its_own(browsed: Browsed) -> No
         other.close()
 
 
+@pytest.mark.slow
 def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> None:
     page = browsed.page
     link = """changes => {
@@ -922,6 +958,7 @@ def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> Non
     page.wait_for_selector("[data-part=controller]")
 
 
+@pytest.mark.slow
 def test_a_link_that_is_clicked_on_another_site_is_opened(browsed: Browsed) -> None:
     """The link opens in a new tab, unknown to the server: the browser is let in, and its machine is shown."""
     page = browsed.page
@@ -939,6 +976,7 @@ def test_a_link_that_is_clicked_on_another_site_is_opened(browsed: Browsed) -> N
         other.close()
 
 
+@pytest.mark.slow
 def test_a_browser_that_has_not_opened_the_address_is_told_to(browsed: Browsed) -> None:
     """With the address the browser is let in, and so is the page that was open; the token leaves the address."""
     context = browsed.page.context.browser.new_context()
@@ -958,6 +996,7 @@ def test_a_browser_that_has_not_opened_the_address_is_told_to(browsed: Browsed) 
         context.close()
 
 
+@pytest.mark.slow
 def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: Browsed) -> None:
     page, asked = browsed.page, []
     page.reload()
@@ -974,6 +1013,7 @@ def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: B
     assert asked == []
 
 
+@pytest.mark.slow
 def test_out_gives_the_lines_of_the_picture_that_is_shown(browsed: Browsed) -> None:
     """For a picture without an answer, and for logs, the lines are those of the answer above."""
     page = browsed.page
@@ -990,6 +1030,7 @@ def test_out_gives_the_lines_of_the_picture_that_is_shown(browsed: Browsed) -> N
         page.keyboard.press("Escape")
 
 
+@pytest.mark.slow
 def test_what_takes_too_long_is_overtaken_without_being_asked_again(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/cell", lambda route: route.continue_() if held else held.append(route))
@@ -1023,6 +1064,7 @@ PAGES = {
 """Pages of commands, and the figures on each."""
 
 
+@pytest.mark.cases(slow=2)
 @pytest.mark.parametrize("command", PAGES)
 def test_the_figures_of_a_page_are_drawn_for_its_width_and_axe_finds_no_violation(
     browsed: Browsed, tmp_path: Path, command: str
@@ -1056,6 +1098,7 @@ def lines_of(page: Any) -> list[str]:
     return page.evaluate("[...document.querySelector('#picture .plot').data].map((line) => line.name)")
 
 
+@pytest.mark.slow
 def test_a_pasted_table_has_a_name_of_its_own(browsed: Browsed) -> None:
     """Saved as thesis_rig.toml it would stand for the file that was opened."""
     page = browsed.page
@@ -1072,6 +1115,7 @@ def test_a_pasted_table_has_a_name_of_its_own(browsed: Browsed) -> None:
     page.keyboard.press("Escape")
 
 
+@pytest.mark.slow
 def test_conclusions_whose_verdicts_changed_go_and_so_does_what_is_of_another_machine(browsed: Browsed) -> None:
     page = browsed.page
     browsed.answered("The free joint stops the hunting.")
@@ -1085,6 +1129,7 @@ def test_conclusions_whose_verdicts_changed_go_and_so_does_what_is_of_another_ma
     assert page.locator("#answer .case").first.is_hidden()
 
 
+@pytest.mark.slow
 def test_a_cure_is_one_button_and_can_be_taken_back(browsed: Browsed) -> None:
     page = browsed.page
     browsed.change({"joint.locked": True})
@@ -1097,6 +1142,7 @@ def test_a_cure_is_one_button_and_can_be_taken_back(browsed: Browsed) -> None:
     assert browsed.changes() == {"joint.locked": True}
 
 
+@pytest.mark.slow
 def test_the_machine_is_dragged_on_its_map_which_stays(browsed: Browsed) -> None:
     page = browsed.page
     page.click("#tab-map")
@@ -1118,6 +1164,7 @@ def test_the_machine_is_dragged_on_its_map_which_stays(browsed: Browsed) -> None
     assert float(browsed.changes()["controller.crossover"].split()[0]) > 8
 
 
+@pytest.mark.slow
 def test_the_map_is_refined_once_the_check_has_ended(browsed: Browsed) -> None:
     """It takes no time from the check, and shows something before."""
     page, checks, maps = browsed.page, [], []
@@ -1136,6 +1183,7 @@ def test_the_map_is_refined_once_the_check_has_ended(browsed: Browsed) -> None:
     assert len(maps) <= 2
 
 
+@pytest.mark.slow
 def test_a_slider_that_is_let_go_keeps_its_verdict(browsed: Browsed) -> None:
     page, asked = browsed.page, []
     page.wait_for_selector("#answer .rest .note")
@@ -1150,6 +1198,7 @@ def test_a_slider_that_is_let_go_keeps_its_verdict(browsed: Browsed) -> None:
     assert asked.count("verdict") == 1
 
 
+@pytest.mark.slow
 def test_a_text_that_is_called_shape_stays_one_beside_arrays(browsed: Browsed) -> None:
     """A hatching has one."""
     read = browsed.page.evaluate(
@@ -1163,18 +1212,21 @@ def test_a_text_that_is_called_shape_stays_one_beside_arrays(browsed: Browsed) -
     assert read == {"fillpattern": {"shape": "/"}, "x": [0, 1, 2]}
 
 
+@pytest.mark.slow
 def test_tracks_of_sliders_have_the_colours_of_verdicts(browsed: Browsed) -> None:
     page = browsed.page
     track = f"document.querySelector('{ROW} input[type=range]').style.getPropertyValue('--track')"
     page.wait_for_function(f"() => {track}.includes('#d55e00') && {track}.includes('#009e73')")
 
 
+@pytest.mark.slow
 def test_a_run_shows_the_error_first_with_the_joint_locked_and_free(browsed: Browsed) -> None:
     page = browsed.page
     page.wait_for_function("() => document.querySelector('.plot')?.layout?.yaxis.title.text.startsWith('Error')")
     assert {"Locked", "Free (as given)"} <= {*lines_of(page)[:2]}
 
 
+@pytest.mark.slow
 def test_a_logged_run_lies_over_the_simulated_one(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
     browsed.no_logs()
@@ -1187,6 +1239,7 @@ def test_a_logged_run_lies_over_the_simulated_one(browsed: Browsed, tmp_path: Pa
     browsed.no_logs()
 
 
+@pytest.mark.slow
 def test_on_a_narrow_page_verdict_and_a_small_picture_stay_above_the_sliders(browsed: Browsed) -> None:
     page = browsed.page
     page.wait_for_selector("#verdict strong")
@@ -1201,6 +1254,7 @@ def test_on_a_narrow_page_verdict_and_a_small_picture_stay_above_the_sliders(bro
     assert page.locator("#small").is_visible()
 
 
+@pytest.mark.slow
 def test_bare_numbers_take_the_unit_that_is_shown(browsed: Browsed) -> None:
     page = browsed.page
     browsed.type("controller.crossover", "9")
@@ -1216,6 +1270,7 @@ def test_bare_numbers_take_the_unit_that_is_shown(browsed: Browsed) -> None:
     assert page.input_value("#within") == "2 um"
 
 
+@pytest.mark.slow
 def test_a_server_that_ends_is_said_so_and_its_restart_is_found_again(browsed: Browsed) -> None:
     """The page asks nothing, and opens no other address."""
     command = [sys.executable, "-c", SERVER, "app", str(RIG), "--no-browser", "--port"]
@@ -1240,6 +1295,7 @@ def test_a_server_that_ends_is_said_so_and_its_restart_is_found_again(browsed: B
             context.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
     browsed.page.emulate_media(color_scheme=scheme)
@@ -1250,7 +1306,6 @@ def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
         assert violations(browsed.page) == []
 
 
-@pytest.mark.first
 def test_nothing_went_wrong_and_nothing_left_this_machine(opened: Browsed) -> None:
     """Check the errors and requests of the whole file; this test runs last."""
     assert (opened.wrong, opened.outside) == ([], [])

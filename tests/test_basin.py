@@ -18,9 +18,9 @@ from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner, standing
 from friso.hunting import (
     SEARCH_LIMITS,
-    AttractionEnd,
     Cycle,
     Ensemble,
+    HuntingDoubt,
     Kick,
     MoveShare,
     Target,
@@ -31,10 +31,6 @@ from friso.hunting import (
     pushes_that_hunt,
 )
 from friso.hunting.basin import ends_in, evenly
-from friso.hunting.cycle.ensemble import done
-from friso.hunting.cycle.rest import pushed
-from friso.hunting.doubt import HuntingDoubt
-from friso.hunting.edge_search import EdgeSearch
 from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import own_motion
 from friso.stage import Stage
@@ -84,7 +80,7 @@ def hunts(chosen: Stage) -> bool:
     return bool(swing > 0.5)
 
 
-@pytest.mark.inner
+@pytest.mark.slow
 @RIGID
 def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
     """A verdict is uncertain at the very end of a window of kicks, and certain a hundredth beside it."""
@@ -119,6 +115,7 @@ def test_displacements_that_start_hunting() -> None:
     assert bands.smallest == bands.windows[0][0]
 
 
+@pytest.mark.cases(first=3)
 @RIGID
 @pytest.mark.parametrize("edge", range(5))
 def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
@@ -129,20 +126,6 @@ def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
     assert not hunts(released(place / inwards))
 
 
-@pytest.mark.inner
-@RIGID
-def test_mirrored_releases_start_hunting_as_well() -> None:
-    several = np.geomspace(1e-3, 0.1, 32)
-    flat = rigid(8).flat()
-    one, other = (
-        ends_in({**flat, "motion.displacement": sign * several}, 32, target())[0].tolist() for sign in (1, -1)
-    )
-    assert one == other
-    assert True in one
-    assert False in one
-
-
-@pytest.mark.inner
 @RIGID
 def test_pushes_that_start_hunting() -> None:
     """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
@@ -153,23 +136,16 @@ def test_pushes_that_start_hunting() -> None:
     stages = Ensemble.held(chosen.flat(), 4)
     starts = np.zeros((4, 5))
     starts[:, stages.kernel.states.index("velocity")] = velocities
-    assert np.array_equal(starts, pushed(stages, velocities))
     duration = LONG * cycle().period
     results = stages.run(starts, np.full(4, duration), 1e-7, interval=duration / 20000)
-    assert done(results).all()
     swing = np.ptp(results.samples[:, -600:, stages.kernel.position], axis=1) / 2
     assert swing[:2] == pytest.approx(cycle().amplitude, rel=0.05)
     assert np.all(swing[2:] < 0.05 * cycle().amplitude)
 
 
-def test_nothing_that_starts_hunting() -> None:
-    assert Kick((), (1e-5, 1e-1)).smallest is None
-
-
 MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
 
 
-@pytest.mark.inner
 @RIGID
 def test_share_of_moves_is_reproducible() -> None:
     """Equal draws give equal numbers."""
@@ -201,7 +177,7 @@ def test_a_run_that_goes_on_where_its_reference_stands_is_the_whole_run(kind: st
     assert np.max(np.abs(on - ends(flat, first + rest))[:, : scales.shape[1]] / scales) < 1e-5
 
 
-@pytest.mark.inner
+@pytest.mark.slow
 @RIGID
 def test_moves_by_single_runs() -> None:
     """The count equals that of single runs of the draws; eight of them, hunting and resting, are simulated."""
@@ -236,6 +212,7 @@ def test_motions_without_acceleration_have_no_share() -> None:
     assert moves_that_hunt(MOVING.replace({"motion.acceleration": "0 m/s^2"}), target()) is None
 
 
+@pytest.mark.slow
 @given(drawn=st.integers(1, 500), data=st.data())
 def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
     """At its lower end, so many hits or more have a probability of 2.5 %, at its upper end, so many or fewer.
@@ -280,6 +257,7 @@ def test_faster_gains_are_those_of_the_tuned_controller_at_a_higher_crossover() 
         assert float(scaled[f"controller.{name}"]) == pytest.approx(wanted[f"controller.{name}"], rel=1e-12)
 
 
+@pytest.mark.cases(slow=1)
 @pytest.mark.parametrize(
     "chosen", [pytest.param(rigid(8), marks=RIGID), pytest.param(equal_gains(8), marks=GAINS)], ids=["tuned", "gains"]
 )
@@ -299,16 +277,6 @@ def at(chosen: Stage, factor: float) -> Stage:
     return chosen.replace({key: f"{float(scaled[key])!r} {unit}" for key, unit in texts.items()})
 
 
-@pytest.mark.inner
-@RIGID
-def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search up to the edge, within its error, then contains no bandwidth at all."""
-    monkeypatch.setattr(EdgeSearch, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
-    edge = find_margin(rigid(38), attracting=False)
-    assert edge is not None
-    assert edge.factor == pytest.approx(0.9999 * SEARCH_LIMITS.lowest_bandwidth)
-
-
 @RIGID
 @pytest.mark.thorough
 def test_margin_from_above_is_that_from_below() -> None:
@@ -319,21 +287,15 @@ def test_margin_from_above_is_that_from_below() -> None:
     assert below.crossover == pytest.approx(above.crossover, rel=1e-5)
 
 
+@pytest.mark.cases(first=1)
 @RIGID
-@pytest.mark.parametrize(("crossover", "attracting"), [(0.9, True), (110, False)])
+@pytest.mark.parametrize(("crossover", "attracting"), [(110, False), (0.9, True)])
 def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: bool) -> None:
     """The edge at 9.77 Hz is too far off to be looked for."""
     assert not SEARCH_LIMITS.lowest_bandwidth < 9.77 / crossover < SEARCH_LIMITS.highest_bandwidth
     assert find_margin(rigid(crossover), attracting) is None
 
 
-@pytest.mark.inner
-def test_edges_are_sought_finer_than_they_are_checked() -> None:
-    """The checks above at 2 % mean something only while edges are found to 1 %."""
-    assert BasinSettings().kick_edge_share <= 0.01
-
-
-@pytest.mark.inner
 def test_a_stage_that_rests_just_below_break_away_is_not_shaken_loose_by_rounding() -> None:
     """Behind a backlash the motor stands on its flank with 99.94 % of the static friction once the error is gone: for
     ever, at tolerances of 1e-7 to 1e-9; at 1e-6 the stage broke away again."""

@@ -100,6 +100,7 @@ def _strict(text: str) -> dict[str, Any]:
     return json.loads(text, parse_constant=refuse)
 
 
+@pytest.mark.slow
 def test_minus_signs_reach_a_terminal_without_them(tmp_path: Path) -> None:
     (tmp_path / "rigid.toml").write_text(RIGID)
     command, environ = (
@@ -119,6 +120,7 @@ def keys(text: str) -> set[str]:
     return {*text.split()}
 
 
+@pytest.mark.thorough
 def test_the_document_tells_margins_and_limits_of_the_rig(written: tuple[dict, Path]) -> None:
     document, _ = written
     assert document.keys() == keys(
@@ -169,6 +171,7 @@ def test_the_highest_stable_crossover_is_that_of_the_joint_as_given(rig: Stage) 
         assert (document["worst"]["at"]["limiter"] is None) == locked
 
 
+@pytest.mark.slow
 def test_series_adds_the_thesis_formula_beside(rig: Stage) -> None:
     loops = bode(rig, (1.0, 100.0), series=True)
     assert {"stuck-touched-series", "sliding-touched-series"} <= bode_document(loops)["cases"].keys()
@@ -215,6 +218,7 @@ def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode, sna
     snapshots.check("bode", "gains", "\n".join(texts))
 
 
+@pytest.mark.slow
 def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> None:
     document = bode_document(rigid)
     assert document["cases"].keys() == {"given"}
@@ -239,6 +243,7 @@ def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> N
         assert plotly_renderer.fragment(figure)
 
 
+@pytest.mark.slow
 def test_an_unstable_loop_is_a_plain_statement(unstable: Bode, snapshots: Snapshots) -> None:
     case = bode_document(unstable)["cases"]["sliding"]
     assert case["stable"] is False
@@ -282,6 +287,7 @@ def _but(response: Bode, **other: Any) -> Bode:
     return changed
 
 
+@pytest.mark.slow
 def test_friction_that_rises_is_not_blamed(response: Bode) -> None:
     assert all(item.falling for item in response.unstable)
     risen = _but(response, unstable=(Unstable(1e-2, 1.0, False, True, falling=False, gains=""),))
@@ -289,6 +295,7 @@ def test_friction_that_rises_is_not_blamed(response: Bode) -> None:
     assert any("Stribeck" in sentence for sentence in sentences(response))
 
 
+@pytest.mark.slow
 def test_the_state_that_is_lost_first_is_named(rig: Stage) -> None:
     """Tuned for too light a mass, the loop of a sliding cart is too slow for its integral action."""
     texts = details(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
@@ -308,6 +315,7 @@ def test_what_the_stage_file_lacks_is_named(response: Bode, rig: Stage, snapshot
 # ---------------------------------------------------------------- figures and page
 
 
+@pytest.mark.thorough
 def test_files_and_page(written: tuple[dict, Path]) -> None:
     _, folder = written
     pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
@@ -358,6 +366,7 @@ def test_loops_at_prescribed_speeds(response: Bode) -> None:
     assert [line.y[-1] for line in phase.series] == pytest.approx([-180] * 7, abs=2)
 
 
+@pytest.mark.slow
 def test_nyquist_has_equal_scales_the_point_and_the_circle(response: Bode) -> None:
     figure = _figures(response)["bode_nyquist"]
     (panel,) = figure.panels
@@ -455,6 +464,7 @@ REFUSED = (
 )
 
 
+@pytest.mark.cases(first=11)
 @pytest.mark.parametrize(
     "options",
     [
@@ -471,6 +481,7 @@ def test_options_that_are_refused(options: dict[str, Any]) -> None:
         command(RIG, **options)
 
 
+@pytest.mark.slow
 def test_half_the_sampling_frequency_itself_is_shown(capsys: pytest.CaptureFixture) -> None:
     command(RIG, set=['drive.sample_time="1 ms"'], frequencies="1 Hz..500 Hz", as_json=True)
     assert _strict(capsys.readouterr().out)["stage"] == "Thesis rig"

@@ -67,6 +67,7 @@ def single(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
     return json.loads(done.stdout), folder / "edge"
 
 
+@pytest.mark.slow
 def test_the_locked_rig_flips_at_9_75_hz(single: tuple[dict, Path]) -> None:
     document, folder = single
     (flip,) = (point for point in document["points"] if (point["kind"], point["cycle"]) == ("flip", "symmetric"))
@@ -113,6 +114,7 @@ def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 def test_a_range_without_a_boundary_says_so(tmp_path: Path, snapshots: Snapshots) -> None:
     done = boundary(tmp_path, *LOCKED, "--x", "controller.crossover=4 Hz..6 Hz", "--details")
     assert done.returncode == 0
@@ -159,6 +161,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(
     assert (np.split(np.abs(result.multiplier), 2)[1] > 1).all()
 
 
+@pytest.mark.cases(first=8)
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -321,7 +324,6 @@ def test_where_curves_end_is_told(two: Plane) -> None:
     assert marks == {LOST: 2}
 
 
-@pytest.mark.inner
 def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane) -> None:
     """Hunting ends on a curve or between two stages, along the first key or else the second.
 

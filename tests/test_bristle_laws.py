@@ -5,7 +5,6 @@ import plain
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from variants import (
     FULL,
     HOLD,
@@ -25,12 +24,10 @@ import friso
 from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.equations.driven import Driven
-from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.members import member
 from friso.frequency.parts import plant
-from friso.hunting import Ensemble, find_cycles
 from friso.identification.output_error.parameters import fit_parameters
 from friso.stage.tables import friction_law
 from friso.virtual_rig.run import failures, run
@@ -49,26 +46,6 @@ HUNTING = {name: stage(release("1 mm", "1 s"), friction=law, controller=van_dijk
 def compiled() -> None:
     forms = [structure(item.flat()) for item in HUNTING.values()]
     kernels([*map(KernelRequest, forms), *(KernelRequest(form, True) for form in forms)])
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_cycles_against_simulation_and_scipy(law: str) -> None:
-    """Amplitude by a long run at two tolerances, and half a period by Radau on the law written by hand."""
-    hunting = HUNTING[law]
-    stages = Ensemble.held(hunting.flat(), 1)
-    cycles = find_cycles(stages)
-    assert cycles.closed[0], cycles.reasons[0]
-    period, amplitude = float(cycles.period[0]), float(cycles.amplitude[0])
-    assert abs(cycles.multiplier[0]) < 1
-    for rtol in (1e-7, 1e-9):
-        long = friso.simulate(hunting.replace({"motion.duration": "300 s"}), rtol, 1.0)
-        late = long.turning_deviation.values[long.turning_time.values > 300 - 2 * period]
-        assert np.ptp(late) / 2 == pytest.approx(amplitude, rel=2e-6)
-    names = stages.kernel.states
-    rates = plain.rates({**hunting.flat(), "motion.kind": "hold"}, names)
-    scale, start = stages.scales[0], cycles.states[0]
-    half = solve_ivp(rates, (0, period / 2), start, "Radau", rtol=1e-7, atol=1e-9 * scale)
-    assert np.max(np.abs(half.y[:, -1] + start) / scale) < 1e-4
 
 
 def drift(friction: str, periods: int) -> float:
@@ -98,6 +75,7 @@ def test_up_to_break_away_it_is_a_spring_and_a_damper() -> None:
     assert beyond.imag > 1.2 * table.stiffness.values[0, 0].imag
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_small_motions(law: str) -> None:
     """Stuck on the bristles; sliding on the Stribeck curve."""
@@ -162,15 +140,6 @@ def test_the_drive_as_built(friction: str) -> None:
 def test_harmonic_balance_refuses_kinks_of_its_own() -> None:
     with pytest.raises(InputError, match="kinks of its own"):
         OneStateLaw.of(HUNTING["elasto_plastic"].flat())
-
-
-def test_bristles_that_would_not_slip_are_refused() -> None:
-    with pytest.raises(InputError, match="less than Coulomb friction"):
-        HUNTING["elasto_plastic"].replace({"friction.breakaway_deflection": "10 um"})
-
-
-def test_imposed_motion_takes_every_law() -> None:
-    assert {imposed_form(item.flat()).friction for item in HUNTING.values()} == {*LAWS}
 
 
 def test_what_of_them_is_fitted() -> None:

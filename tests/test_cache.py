@@ -114,6 +114,7 @@ def entry(folder: Path) -> Path:
     return only
 
 
+@pytest.mark.slow
 @posix
 def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path: Path) -> None:
     kernels = tmp_path / "cache" / "kernels"
@@ -129,6 +130,7 @@ def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path:
     assert mode(kernels) == 0o700  # mended
 
 
+@pytest.mark.cases(slow=1)
 @pytest.mark.parametrize("damage", ["truncate", "alter", "name", "remove"])
 @pytest.mark.parametrize("pattern", ["*.kernel", "*.request"])
 def test_a_damaged_file_is_made_again(copied: Path, pattern: str, damage: str) -> None:
@@ -149,18 +151,21 @@ def test_a_damaged_file_is_made_again(copied: Path, pattern: str, damage: str) -
     assert not built(copied)
 
 
+@pytest.mark.slow
 def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:
     processes = [start(tmp_path) for _ in range(4)]
     assert sorted(finished(process)[0] for process in processes) == [False, False, False, True]
     assert not built(tmp_path)
 
 
+@pytest.mark.slow
 def test_different_kernels_do_not_mix(tmp_path: Path) -> None:
     processes = [start(tmp_path, name, STAND_IN_ENDS_WITH=end) for name, end in (("one", ""), ("two", " + 0.0"))]
     assert [finished(process)[0] for process in processes] == [True, True]
     assert len(entries(tmp_path)) == 2
 
 
+@pytest.mark.slow
 def test_a_comment_compiles_nothing(whole: Path, copied: Path) -> None:
     """Another request, of which the same code is made, takes the machine code that is there."""
     (before,) = entries(copied)
@@ -170,6 +175,7 @@ def test_a_comment_compiles_nothing(whole: Path, copied: Path) -> None:
     assert not built(copied, "another")
 
 
+@pytest.mark.slow
 def test_what_has_not_been_used_for_long_is_deleted_when_something_is_built(copied: Path) -> None:
     """And requests for it with it; an entry that was built long ago and is in use stays."""
     (old,) = entries(copied)
@@ -185,6 +191,7 @@ def test_what_has_not_been_used_for_long_is_deleted_when_something_is_built(copi
     assert len(entries(copied)) == 2
 
 
+@pytest.mark.slow
 def test_there_is_an_end_to_what_is_kept(copied: Path) -> None:
     """Entries unused for longest go first; entries used today stay."""
     first, folder = entry(copied), copied / "kernels"
@@ -200,6 +207,7 @@ def test_there_is_an_end_to_what_is_kept(copied: Path) -> None:
     assert entries(copied) == [first]
 
 
+@pytest.mark.slow
 def test_an_entry_that_is_being_written_is_left_alone(copied: Path) -> None:
     old = entry(copied)
     aged(BuildSettings().kept_time + SECONDS_OF_A_DAY, old)
@@ -246,6 +254,7 @@ def test_a_builder_builds_again_unless_it_has_ended(tmp_path: Path, monkeypatch:
     assert processes[0] == processes[1] != processes[2]
 
 
+@pytest.mark.slow
 def test_what_killed_processes_left_is_deleted(copied: Path) -> None:
     drafts = [copied / "kernels" / f"{name}.kernel.x{PARTIAL}" for name in ("old", "new")]
     for draft in drafts:
@@ -284,6 +293,7 @@ def test_where_the_disk_is_full_kernels_are_compiled_and_not_kept(caplog: pytest
         building.built_entries([cache.CodeRequest("full", "what needs room", "full_builder", b"always")])
 
 
+@pytest.mark.slow
 @posix
 def test_a_helper_that_has_ended_leaves_no_zombie() -> None:
     helper = HelperProcess("friso.engine.builder", ".", paths=sys.path)
@@ -292,6 +302,7 @@ def test_a_helper_that_has_ended_leaves_no_zombie() -> None:
     helper.end()
 
 
+@pytest.mark.slow
 def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:
     file = tmp_path / "no folder"
     file.write_text("")
@@ -363,6 +374,7 @@ def test_folders_that_are_missing_are_made_private(tmp_path: Path) -> None:
     assert mode(tmp_path / "a") == mode(tmp_path / "a" / "b") == 0o700
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("permissions", [0o770, 0o707, 0o777])
 def test_a_folder_on_the_way_that_others_may_write_to_is_left_alone(copied: Path, permissions: int) -> None:
@@ -374,6 +386,7 @@ def test_a_folder_on_the_way_that_others_may_write_to_is_left_alone(copied: Path
     assert mode(copied) == permissions
 
 
+@pytest.mark.slow
 @posix
 def test_a_link_is_not_followed(copied: Path, tmp_path: Path) -> None:
     (tmp_path / "linked").symlink_to(copied)
@@ -385,6 +398,7 @@ def test_a_link_is_not_followed(copied: Path, tmp_path: Path) -> None:
         assert "is a symbolic link" in log
 
 
+@pytest.mark.slow
 @posix
 def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = copied / "kernels"
@@ -395,6 +409,7 @@ def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pyt
     assert mode(folder) == 0o755
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("pattern", ["*.kernel", "*.request"])
 def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:

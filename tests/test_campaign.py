@@ -29,6 +29,7 @@ CASES = {
 }
 
 
+@pytest.mark.cases(first=1, slow=11)
 @pytest.mark.parametrize(
     "name", [name for name in campaign.NAMES if name not in (*commands.COMMANDS, "computed-stages")]
 )

@@ -68,6 +68,7 @@ def test_slow_gains_are_those_of_the_pid_that_it_is() -> None:
     assert slow_gains(rigid(PI).flat()) == pytest.approx(slow_gains(rigid(AS_PID).flat()))
 
 
+@pytest.mark.slow
 def test_trace_against_radau() -> None:
     """A move with feedforward, force limit and both integrals, friction and all."""
     more = "velocity_feedforward = 0.9\n" + limit("4 N")
@@ -110,6 +111,7 @@ def hunting() -> Hunting:
     return hunting_of(rigid(PI))
 
 
+@pytest.mark.slow
 def test_hunting_is_that_of_the_pid_that_it_is(hunting: Hunting) -> None:
     (cycle,), (same,) = hunting.attracting, hunting_of(rigid(AS_PID)).attracting
     assert cycle.amplitude == pytest.approx(same.amplitude, rel=1e-5)
@@ -118,6 +120,7 @@ def test_hunting_is_that_of_the_pid_that_it_is(hunting: Hunting) -> None:
     assert cycle.growth == pytest.approx(cycle.multiplier, rel=1e-2, abs=1e-3)
 
 
+@pytest.mark.thorough
 def test_verdict_against_radau(hunting: Hunting) -> None:
     """Stuck at the cycle's amplitude without force, it comes back to it."""
     names = ("position", "velocity", "bristle_deflection", "velocity_integral")
@@ -365,6 +368,7 @@ def whole() -> Stage:
     return friso.load(DRIVE).replace({**coarse, "controller": keys})
 
 
+@pytest.mark.slow
 def test_bode_with_sampling_and_delay(whole: Stage) -> None:
     slow = friso.bode(whole.replace({"drive.delay": None, "drive.sample_time": None}))
     fast = friso.bode(whole)
@@ -404,6 +408,7 @@ def test_identify_in_its_own_loop(whole: Stage) -> None:
     assert estimates["friction.coulomb"] == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_emps_is_a_cascade(tmp_path: Path) -> None:
     """From its record the cascade predicts the same forces as the PD of equal gains, also sampled."""
     axis = friso.load(DRIVE.with_name("emps_axis.toml")).replace(

@@ -27,7 +27,6 @@ def checked(rig: Stage) -> CheckAnswer:
     return friso.check(rig)
 
 
-@pytest.mark.first
 @pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer, rig: Stage, rtol: float) -> None:
@@ -44,7 +43,6 @@ def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer, rig:
     assert cases["given"].solver == free.solver
 
 
-@pytest.mark.first
 def test_the_readme_shows_what_its_first_line_prints(rig: Stage, checked: CheckAnswer) -> None:
     """Numbers agree as far as processors do, as the limiter scatters. What a stage file notes is repeated."""
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
@@ -56,6 +54,7 @@ def test_the_readme_shows_what_its_first_line_prints(rig: Stage, checked: CheckA
     assert "The controller is a placeholder." in answer.sentences()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_verdicts_are_mentioned_before_kicks_and_other_bandwidths(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:
     seen: list[str] = []
@@ -64,6 +63,7 @@ def test_verdicts_are_mentioned_before_kicks_and_other_bandwidths(rig: Stage, ca
     assert any("Locked: hunts" in text and "Free (as given): does not hunt" in text for text in seen)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_measures_agree_with_the_trace(rig: Stage) -> None:
     """The statistics gathered in the kernel against the samples of the dense output."""
@@ -83,6 +83,7 @@ def test_measures_agree_with_the_trace(rig: Stage) -> None:
                 assert settled == pytest.approx(last - 5.06, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_locked_without_stiffness_has_no_free_case(rig: Stage) -> None:
     held = {"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None}
@@ -103,6 +104,7 @@ motion = {{ kind = "step", size = "1 mm", duration = "20 s" }}
 """
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(("kp", "kd"), [(1000.0, 15.0), (40.0, 3.0), (300.0, 2.0)])
 def test_settling_time_of_a_damped_spring(kp: float, kd: float) -> None:
     """Closed form: the last time at which the free oscillation leaves the band, between or beyond its extrema. Its
@@ -134,6 +136,7 @@ def test_a_stage_stuck_off_its_reference_does_not_hunt(rtol: float, displacement
     assert case.settling_time[1e-5] is None
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_run_too_short_for_the_peak_count_hunts_all_the_same(rig: Stage) -> None:
     """The cycle attracts, and the move ends in it, however short the run."""
@@ -142,7 +145,6 @@ def test_a_run_too_short_for_the_peak_count_hunts_all_the_same(rig: Stage) -> No
     assert (case.verdict, case.peaks) == ("hunts", 0)
 
 
-@pytest.mark.first
 def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
     """references.md, section 2: the locked rig's multiplier passes -1 near 9.7 Hz."""
     locked, free = checked["locked"].judgement, checked["free"].judgement
@@ -154,6 +156,7 @@ def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
     assert locked.displacement.smallest == pytest.approx(0.2e-3, rel=0.02)
 
 
+@pytest.mark.cases(slow=2)
 @pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.parametrize(
     ("crossover", "locked", "verdict"),
@@ -176,6 +179,7 @@ def test_without_a_joint_there_is_one_case_and_without_integral_action_a_reason(
     assert "no integral action" in case.judgement.hunting.reason
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("share", [0.99, 0.999, 0.9999])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6])
 def test_a_short_touch_of_the_limiter_is_not_missed(rig: Stage, share: float, rtol: float) -> None:
@@ -198,6 +202,7 @@ def test_a_sweep_over_the_duration_leaves_its_cells_alone(rig: Stage) -> None:
     assert runs.steps.values[1] == alone.steps[0]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.parametrize(
     ("limit", "duration", "at"), [("2.5 N", "500 ms", 2.5), ("2.5 N", "20 s", 2.5), ("6 N", "20 s", None)]
@@ -212,6 +217,7 @@ def test_a_force_limit_that_keeps_a_stage_off_its_reference_is_named(
     assert (why in answer.sentences()[0]) == (at is not None)
 
 
+@pytest.mark.slow
 def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved() -> None:
     """Released at 15 um the stage creeps home, and sentence and table tell the time; at 2 mm it breaks away."""
     settled = VARIANTS["rigid"].replace({"controller.crossover": "12 Hz", "motion.duration": "5 s"})

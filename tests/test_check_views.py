@@ -90,6 +90,7 @@ def test_figures_of_a_stage_with_a_joint():
     assert [item.label for item in shown_cases({"given": fake_case()})] == ["As given"]
 
 
+@pytest.mark.cases(first=1, slow=4)
 @pytest.mark.parametrize("kind", ["there_and_back", "step", "ramp", "release", "hold"])
 @pytest.mark.parametrize("hunting", [False, True])
 def test_every_motion_gives_figures_that_can_be_drawn(kind, hunting):
@@ -134,6 +135,7 @@ def test_a_cart_that_rests_is_a_point():
     assert check_figures({"given": case})[0].panels[0].x.limits == (2.0, 4.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0, 1000, 2400, 4000])
 def test_nan_of_a_failed_run_breaks_nothing(start):
     case = fake_case(hunting=True, stage=fake_stage(locked=True))
@@ -222,6 +224,7 @@ def page() -> str:
         return check_html(both_joints())
 
 
+@pytest.mark.slow
 def test_report_says_the_verdict_first_and_opens_offline(page):
     parsed = Page(page)
     text = " ".join(" ".join(parsed.words).split())
@@ -242,6 +245,7 @@ def test_report_says_the_verdict_first_and_opens_offline(page):
         assert base64.b64decode(address.removeprefix("data:image/png;base64,")).startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_names_and_files_cannot_inject_markup():
     evil = '</script><script>alert("x")</script><img src=x onerror=alert(1)>'
     page = check_html(both_joints(evil))
@@ -404,6 +408,7 @@ def test_sentence_and_table_agree_on_steady_sliding(lasts: bool | None, sticks: 
     assert words in stick_slip_sentences(speeds, 1e-3)[0] or lasts is None
 
 
+@pytest.mark.cases(first=10)
 @pytest.mark.parametrize(
     ("judgement", "name", "words"),
     [
@@ -599,6 +604,7 @@ def test_no_bandwidth_is_advised_at_which_the_loop_is_unstable() -> None:
     assert "crossover 3.33 Hz" not in sentence(hunts(lower=lower), unstable_bandwidths=(below,))
 
 
+@pytest.mark.slow
 @given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))
 @example(1.00499 / 8, 5.085e-3)
 def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:

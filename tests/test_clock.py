@@ -171,6 +171,7 @@ class Twin:
         return (by @ [*x, demand, floor])[:3]
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("ramp", ["30 ms", "30.37 ms"], ids=["corner on a sample", "corner between samples"])
 @pytest.mark.parametrize("delay", DELAYS)
 def test_drive_is_that_of_plain_python(delay: float, ramp: str) -> None:
@@ -421,6 +422,7 @@ WINDUP = {"controller.anti_windup_time": 5 * TIME}
 LIMITED = {how: {**WINDUP, "controller.anti_windup": how} for how in ("none", "back_calculation")}
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
 @pytest.mark.parametrize("feature", ["plain", *DRIVES, *LIMITED])
 def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:

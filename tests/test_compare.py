@@ -36,10 +36,9 @@ from friso.remedies.loops import linear_flat, linear_loops
 from friso.remedies.machines import draw_common, draw_fleet
 from friso.shares import quantile_interval, share
 from friso.shown.drawing import matplotlib_renderer
-from friso.stage import Stage, load
+from friso.stage import Stage, element_keys, load
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
-from friso.stage.lists import element_keys
 from friso.stage.tables import motor_mass
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
@@ -243,6 +242,7 @@ def flat_of(stage: Stage, machines: Machines) -> dict[str, Any]:
     return linear_flat(stage, stage.flat({**as_tuned(stage.flat()), **machines.keys}))
 
 
+@pytest.mark.slow
 def test_margins_of_many_are_those_of_each(built: Stage, machines: Machines) -> None:
     stage = built.variants()["free"]
     loops = linear_loops(stage, flat_of(stage, machines), 1000)
@@ -262,6 +262,7 @@ FORCES = (
 """Keys in newtons per something: a motor of less force does to the loop what a plant does that has more of all."""
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("controller", [{}, {"controller": GAINS}], ids=["tuned", "gains"])
 def test_the_motor_is_part_of_the_loop(built: Stage, controller: dict[str, Any]) -> None:
     stage = built.replace(controller).variants()["free"]
@@ -332,6 +333,7 @@ def test_there_and_back_the_longer_time_of_both_ends_counts() -> None:
     assert settling_of_traces([back], TIME, never_there, 0.5)[0] == 0
 
 
+@pytest.mark.slow
 def test_intervals_hold() -> None:
     """The slowest have ranks by the binomial distribution; fewer than 72 bound no twentieth from above."""
     rng = np.random.default_rng(5)
@@ -355,6 +357,7 @@ def test_failed_runs_count_either_way() -> None:
     assert share(flags, done).high == share(np.arange(100) < 20, np.ones(100, bool)).high
 
 
+@pytest.mark.slow
 def test_the_isolator_and_bandwidth_stop_what_swings(comparison: Comparison) -> None:
     locked, faster, free = comparison.results
     assert locked.swinging.low > 0.4
@@ -393,12 +396,14 @@ def test_a_drive_without_a_clock_gets_one_beside_one_with(built: Stage) -> None:
 SHORT = {"motion.return_at": "0.3 s", "motion.duration": "0.8 s"}
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_does_not_swing(comparison: Comparison) -> None:
     result = with_measures(comparison.results[0], outcome="failed", settling=np.inf)
     assert (result.failed, result.swinging.low, result.swinging.high) == (COUNT, 0, 1)
     assert np.isnan(result.swinging.probability)
 
 
+@pytest.mark.slow
 def test_words_follow_the_numbers(comparison: Comparison, snapshots: Snapshots) -> None:
     locked, faster, free = comparison.results
     late = np.where(np.arange(COUNT) < 3, np.inf, 2.0)
@@ -492,6 +497,7 @@ def found(comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> Comparison
     return by_hand
 
 
+@pytest.mark.slow
 def test_command_writes_page_and_figures(
     tmp_path: Path, found: Comparison, monkeypatch: pytest.MonkeyPatch, snapshots: Snapshots
 ) -> None:
@@ -510,6 +516,7 @@ def test_command_writes_page_and_figures(
     snapshots.check("compare", "run", friso_inside(tmp_path, "compare", EXAMPLE, "--details").stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [0, 1, 2])
 def test_ctrl_c_while_figures_are_drawn_waits_for_the_files(
     tmp_path: Path, found: Comparison, monkeypatch: pytest.MonkeyPatch, times: int
@@ -537,6 +544,7 @@ def test_ctrl_c_while_figures_are_drawn_waits_for_the_files(
     assert {item.name for item in tmp_path.rglob("*.*")} == WRITTEN or times != 1
 
 
+@pytest.mark.cases(first=6)
 @pytest.mark.parametrize(
     ("option", "value"),
     [

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from plain import under_conditions
-from variants import CONDITIONS, VARIANTS
+from variants import VARIANTS
 
 import friso
 from friso.equations.rail import friction_factors
-from friso.errors import StageError
 from friso.frequency.members import level
 from friso.stage import Stage
 from friso.virtual_rig.run import as_built_keys
@@ -15,7 +14,6 @@ from friso.virtual_rig.run import as_built_keys
 RAIL = {"rail": {"seed": 3, "static_deviation": 0.2, "coulomb_deviation": 0.1, "correlation_length": "5 mm"}}
 PLACE = "conditions.place"
 LEVELS = ("static", "coulomb")
-GMS = VARIANTS["rigid, GMS"].as_written()["friction"]
 
 
 @pytest.fixture(scope="module")
@@ -48,19 +46,3 @@ def test_the_place_on_the_rail_decides_and_may_be_swept() -> None:
 def test_a_drive_as_built_moves_along_the_rail_whatever_the_place() -> None:
     stage = VARIANTS["rigid"].replace({**RAIL, PLACE: "12 mm", "conditions.load": 2.0})
     assert [as_built_keys(stage)[f"conditions.{name}_factor"] for name in LEVELS] == [2.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    ("changes", "key"),
-    [
-        ({PLACE: "12 mm"}, PLACE),
-        ({"conditions.cold": 1.5}, "conditions.cold, conditions.warm_up_time"),
-        ({"friction": None, "conditions.load": 2.0}, "friction.model"),
-        ({"friction": GMS, **CONDITIONS}, "conditions.load_per_acceleration"),
-        ({"rail": {**RAIL["rail"], "coulomb_deviation": 0.9}, "friction.coulomb": "2.9 N", PLACE: "3 mm"}, PLACE),
-    ],
-)
-def test_conditions_that_cannot_be(changes: dict[str, object], key: str) -> None:
-    with pytest.raises(StageError) as caught:
-        VARIANTS["rigid"].replace(changes)
-    assert caught.value.key == key

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from friso.axis import KINDS
-from friso.errors import StageError
 from friso.identification.estimate import Estimate
 from friso.identification.stage_file import CHOSEN, with_unknown
 from friso.interface.inputs import correlations_of
@@ -57,26 +56,6 @@ def test_drawn_machines_have_ratios_of_their_contact() -> None:
         spread = (ends[1] / ends[0]) ** 0.5
         assert ratios.max() > spread * ratios.min()
         assert abs(np.corrcoef(np.log(ratios), np.log(keys[f"friction.{lower}"]))[0, 1]) < 0.2
-
-
-@pytest.mark.parametrize(
-    ("guess", "word"),
-    [
-        ("recirculating bal", "recirculating ball"),
-        ("recirculating ball, size 26", "25"),
-        ("recirculating ball, size 25, strong preload", "heavy"),
-        ("ball screw, size 25", "size"),
-        ("recirculating ball, size 25, 0 carriages", "number of carriages"),
-        ("ball screw", "Coulomb"),
-        ("strain-wave gear", "one of"),
-    ],
-)
-def test_a_guess_that_is_not_understood_names_what_is(guess: str, word: str) -> None:
-    with pytest.raises(StageError) as caught:
-        Stage(**GUESSED | {"friction": {"guess": guess}})
-    assert word in caught.value.expected
-    assert caught.value.key.startswith("friction.")
-    assert caught.value.example
 
 
 @pytest.mark.parametrize("kind", ["linear", "rotary"])

@@ -3,7 +3,7 @@ the thesis's peak count against scipy."""
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any
 
@@ -32,12 +32,11 @@ from friso.hunting.criteria import (
     counted_peaks,
     distinct_peaks,
     end_of_traces,
-    lasts,
     outcomes,
     peaks_in_traces,
     verdicts,
 )
-from friso.hunting.measures import measure_runs, measuring_options, scan_turning_points
+from friso.hunting.measures import measure_runs, measuring_options
 from friso.questions.simulate.words import conclusion
 from friso.stage import Stage
 from friso_thesis.studies.rig.moves_on_rails import turning_points
@@ -45,7 +44,6 @@ from friso_thesis.studies.rig.moves_on_rails import turning_points
 STEP, DURATION = 1 / 128, 20.0
 TIME = np.arange(0, DURATION + STEP / 2, STEP)
 
-flags = st.lists(st.booleans(), min_size=1, max_size=30)
 lengths = st.floats(1e-8, 1e-1)
 
 
@@ -73,13 +71,7 @@ def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool, bool]
     assert (word == "transient") == (sure and not attracts and not rests)
 
 
-@given(st.lists(st.tuples(*[st.booleans()] * 5), min_size=1, max_size=30))
-def test_verdicts_of_a_batch_are_those_of_each(several: list[tuple[bool, bool, bool, bool, bool]]) -> None:
-    columns = np.array(several).T
-    together = verdicts(*columns)
-    assert together.tolist() == [verdicts(*columns[:, [k]])[0] for k in range(len(several))]
-
-
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.xdist_group("rig")
 def test_check_is_the_batch_of_one(rig: Stage) -> None:
@@ -107,6 +99,7 @@ ends = st.tuples(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(ends, min_size=1, max_size=20), st.floats(1e-7, 1e-3), st.floats(0.0, 5.0))
 def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: float) -> None:
     """The definitions of `friso.hunting.criteria.run_outcome` are tested; a batch equals its single runs."""
@@ -124,6 +117,7 @@ def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: flo
         assert outcomes(one(end, k), band, hold)[0] == words[k]
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.floats(0.3, 5.0), st.floats(1e-5, 1e-2), st.floats(-1e-3, 1e-3), st.floats(0.5, 50.0), st.floats(1e-7, 1e-2))
 def test_outcomes_of_traces(frequency: float, size: float, offset: float, decay: float, band: float) -> None:
@@ -142,12 +136,6 @@ def test_outcomes_of_traces(frequency: float, size: float, offset: float, decay:
         assert words[1] != "swings"
     alone = [outcomes(end_of_traces(TIME, row[None], band), band)[0] for row in runs]
     assert alone == words.tolist()
-
-
-@given(lengths, lengths, st.floats(1e-8, 1e-1))
-def test_a_wider_band_makes_no_swing(swing: float, earlier: float, band: float) -> None:
-    wide, narrow = lasts(np.array([swing]), earlier, 2 * band), lasts(np.array([swing]), earlier, band)
-    assert not (wide & ~narrow).any()
 
 
 def test_a_run_that_failed_has_failed_whatever_it_did() -> None:
@@ -212,6 +200,7 @@ def sampled_peaks(values: np.ndarray) -> list[float]:
 waves = st.lists(st.tuples(st.floats(0.1, 4.0), st.floats(1e-5, 1e-3), st.floats(0, 6.28)), min_size=1, max_size=4)
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(waves, st.floats(-1e-3, 1e-3))
 def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float, float]], offset: float) -> None:
@@ -245,53 +234,12 @@ def test_where_a_trace_ends_is_no_peak() -> None:
     assert counts[24:].tolist() == [0] * 6
 
 
-@given(st.lists(st.tuples(st.floats(0.01, 1.0), st.integers(-500, 500)), min_size=2, max_size=60))
-def test_distinct_peaks_are_fewer(gaps: list[tuple[float, int]]) -> None:
-    """A distinct peak is late, tall and apart as well; without small ripple both rules say the same."""
-    values = 1e-6 * np.array([[value for _, value in gaps]])
-    times = 9.0 + np.cumsum([[gap for gap, _ in gaps]], axis=1)
-    count = np.array([len(gaps)])
-    plain, distinct = counted_peaks(times, values, count)[0], distinct_peaks(times, values, count)[0]
-    for marks in (plain, distinct):
-        assert (times[0, marks] >= COUNTED_AFTER).all()
-        assert (values[0, marks] > COUNTED_ABOVE).all()
-        assert (np.diff(times[0, marks]) >= LEAST_PEAK_SEPARATION - 1e-12).all()
-    assert bool(plain.any()) >= bool(distinct.any())
-    if (np.abs(np.diff(values[0])) >= 1e-6).all():
-        assert plain.tolist() == distinct.tolist()
-
-
 def test_ripple_is_counted_by_the_thesis_and_is_not_distinct() -> None:
     """A stage that breaks away on its way back springs forward by half a micrometre first."""
     times = np.array([[10.5, 11.5, 11.501, 12.5]])
     values = np.array([[1e-3, 5e-4, 5e-4 + 5e-7, -1e-3]])
     assert counted_peaks(times, values, np.array([4])).sum() == 2
     assert distinct_peaks(times, values, np.array([4])).sum() == 1
-
-
-@given(st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(-1e-3, 1e-3)), min_size=2, max_size=40))
-def test_a_batch_of_turning_points_is_all_of_its_runs(gaps: list[tuple[float, float]]) -> None:
-    times = 5.0 + np.cumsum([gap for gap, _ in gaps])
-    values = np.array([value for _, value in gaps])
-    room = len(times) + 3
-    pad = np.zeros((3, room))
-    both = np.array([values, -values, values[::-1]])
-    pad[:, : len(times)] = both
-    at = np.tile(np.pad(times, (0, 3)), (3, 1))
-    swing, ended, counts = np.ptp(both, axis=1), np.full(3, 1.1 * times[-1]), np.full(3, len(times))
-    together = scan_turning_points(at, pad, counts, swing, ended)
-    for k in range(3):
-        alone = scan_turning_points(at[[k]], pad[[k]], counts[[k]], swing[[k]], ended[[k]])
-        for item in fields(together):
-            whole, single = getattr(together, item.name)[k], getattr(alone, item.name)[0]
-            assert np.array_equal(whole, single, equal_nan=item.name in ("period", "earlier"))
-    assert together.earlier[0] == together.earlier[1]  # a mirror image swings as far
-
-
-def test_an_end_is_made_of_arrays_of_one_length() -> None:
-    end = end_of_traces(TIME, np.zeros((3, len(TIME))), REST_BAND)
-    assert {getattr(end, item.name).shape for item in fields(End)} == {(3,)}
-    assert outcomes(replace(end, completed=np.array([True, False, True]))).tolist() == ["rests", "failed", "rests"]
 
 
 @pytest.mark.parametrize(

@@ -186,6 +186,7 @@ def _figures(designed: Design) -> dict[str, Figure]:
 # ---------------------------------------------------------------- files and document
 
 
+@pytest.mark.slow
 def test_all_files_are_written_and_the_stages_load(
     designed: Design, spec: Path, folder: Path, quick: None, capsys: pytest.CaptureFixture
 ) -> None:
@@ -199,6 +200,7 @@ def test_all_files_are_written_and_the_stages_load(
     assert "next: friso check" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_document_has_the_agreed_keys(
     spec: Path, folder: Path, quick: None, designed: Design, capsys: pytest.CaptureFixture
 ) -> None:
@@ -236,6 +238,7 @@ def test_the_document_has_the_agreed_keys(
     assert moves["settling_median_s"] <= np.median(settling) * 1.05 < moves["settling_95_s"] <= settling[-1]
 
 
+@pytest.mark.slow
 def test_what_is_not_finite_is_null(designed: Design) -> None:
     never = replace(designed.verification.free, settling=np.full(64, np.nan), words=np.full(64, "swings"))
     nowhere = replace(designed.without, edges=np.zeros(designed.without.population.count), unknown=1)
@@ -249,6 +252,7 @@ def test_what_is_not_finite_is_null(designed: Design) -> None:
 # ---------------------------------------------------------------- words
 
 
+@pytest.mark.slow
 def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snapshots) -> None:
     folder, text = written
     snapshots.check("design", "run", text)
@@ -258,6 +262,7 @@ def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snaps
     assert max(map(len, sentences)) <= shutil.get_terminal_size().columns
 
 
+@pytest.mark.slow
 def test_an_isolator_that_is_not_needed_is_weighed(designed: Design, snapshots: Snapshots) -> None:
     (_, first), *_ = verdicts(designed)
     step = isolator_step(designed)
@@ -266,6 +271,7 @@ def test_an_isolator_that_is_not_needed_is_weighed(designed: Design, snapshots: 
     snapshots.check("design", "isolator not needed", "\n".join([first, *text]))
 
 
+@pytest.mark.slow
 def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapshots) -> None:
     needed = replace(designed, without=replace(designed.without, edges=np.full(len(designed.without.edges), 60.0)))
     (_, first), *_ = verdicts(needed)
@@ -275,6 +281,7 @@ def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapsh
     snapshots.check("design", "isolator needed", "\n".join([first, step.title, *step.sentences]))
 
 
+@pytest.mark.slow
 def test_the_joint_is_held_below_the_static_friction(designed: Design) -> None:
     text = " ".join(joint_step(designed).sentences)
     allowed = 1 / (1.1 * 1.1)  # [N]: friction over the safety factor and the stiffness error
@@ -285,6 +292,7 @@ def test_the_joint_is_held_below_the_static_friction(designed: Design) -> None:
     assert "were stopped" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("edges", "stated"),
     [((0.0, 0.0), ("1.20 Hz", "144 Hz")), ((0.0, np.inf), ("144 Hz",)), ((0.0, 7.62), ("7.62 Hz",))],
@@ -294,6 +302,7 @@ def test_edges_in_words(designed: Design, edges: tuple[float, float], stated: tu
     assert lacking(text, *stated) == []
 
 
+@pytest.mark.slow
 def test_leaves_and_what_binds_them(designed: Design) -> None:
     excess = np.array([0.985, 0.2, 0.1, 0.6, 0.99])
     tight = replace(designed.fitted.choice, excess=excess)
@@ -313,6 +322,7 @@ def test_leaves_and_what_binds_them(designed: Design) -> None:
     assert [name for name, *_ in rows if name in spared] == []
 
 
+@pytest.mark.slow
 def test_the_window_of_the_crossover(designed: Design) -> None:
     above, below = upper(designed), lower(designed)
     assert [item.value for item in above] == sorted(item.value for item in above)
@@ -324,6 +334,7 @@ def test_the_window_of_the_crossover(designed: Design) -> None:
         assert f"{hertz(bound.value)} ({bound.reason})" in text
 
 
+@pytest.mark.slow
 def test_damping_that_is_worth_adding_or_not(designed: Design, snapshots: Snapshots) -> None:
     texts = []
     for margins in ([0.3, 0.58, 0.6], [0.57, 0.59, 0.6]):
@@ -341,6 +352,7 @@ def restless(count: int) -> np.ndarray:
     return words
 
 
+@pytest.mark.slow
 def test_moves_that_swing_or_take_too_long(designed: Design, snapshots: Snapshots) -> None:
     swing = (np.arange(64) < 2) * np.arange(64) * 1e-3
     free = replace(designed.verification.free, words=restless(2), settling=some(2, 2.0), swing=swing)
@@ -353,6 +365,7 @@ def test_moves_that_swing_or_take_too_long(designed: Design, snapshots: Snapshot
     assert "4 moves" in " ".join(moves_step(verified(designed, free=lost)).sentences)
 
 
+@pytest.mark.slow
 def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapshots) -> None:
     locked = replace(designed.verification.locked, words=restless(20), settling=some(20, 3.0))
     other = verified(designed, locked=locked)
@@ -367,6 +380,7 @@ def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapsh
 # ---------------------------------------------------------------- figures and page
 
 
+@pytest.mark.slow
 def test_the_page_stands_alone_and_shows_all(designed: Design, folder: Path) -> None:
     page = Page((folder / "design.html").read_text(encoding="utf-8"))
     assert all(address.startswith("data:") for address in page.loads)
@@ -381,6 +395,7 @@ def test_the_page_stands_alone_and_shows_all(designed: Design, folder: Path) -> 
     assert sorted(named) == sorted(FIGURES)
 
 
+@pytest.mark.slow
 def test_front_with_chosen_and_failed_points(designed: Design) -> None:
     broken = replace(designed.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
     other = replace(designed, confirmed=(broken, *designed.confirmed[1:]))
@@ -392,6 +407,7 @@ def test_front_with_chosen_and_failed_points(designed: Design) -> None:
     assert [limit.values for limit in panel.limits] == [(10 * designed.controller.crossover,), (480.0,)]
 
 
+@pytest.mark.slow
 def test_map_with_the_chosen_point_and_cells_of_all_kinds(designed: Design) -> None:
     share = np.zeros_like(designed.map.share)
     share[0, 0], share[1, 1] = 0.5, np.nan
@@ -406,6 +422,7 @@ def test_map_with_the_chosen_point_and_cells_of_all_kinds(designed: Design) -> N
     assert [line.label.split(":")[0] for line in panel.series] == ["edge of hunting at 1 mm", "the machine's limit"]
 
 
+@pytest.mark.slow
 def test_window_with_edges_beyond_the_search(designed: Design) -> None:
     endless = replace(designed.without, edges=np.where(np.arange(len(designed.without.edges)) == 0, np.inf, 5.0))
     (panel,) = _figures(replace(designed, without=endless))["design_window"].panels
@@ -416,6 +433,7 @@ def test_window_with_edges_beyond_the_search(designed: Design) -> None:
     assert panel.series[0].x == pytest.approx([designed.controller.crossover] * 2)
 
 
+@pytest.mark.slow
 def test_settling_ends_where_moves_do_not_rest(designed: Design) -> None:
     free = replace(designed.verification.free, words=restless(16), settling=some(16, 0.2))
     figure = _figures(verified(designed, free=free, locked=replace(free, settling=some(64, 0.0))))["design_settling"]
@@ -463,6 +481,7 @@ def test_relaxations_are_rounded_to_be_enough(value: float, larger: bool, expect
     assert outwards(value, larger) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["design.toml", "worst.toml", "."])
 def test_files_of_no_design_are_not_overwritten(finished: list[str], folder: Path, tmp_path: Path, name: str) -> None:
     """Nor is the stage that is read, and a folder may be no file."""
@@ -475,6 +494,7 @@ def test_files_of_no_design_are_not_overwritten(finished: list[str], folder: Pat
         command(folder / "design.toml", SPEC, out=folder)
 
 
+@pytest.mark.slow
 def test_overrides_are_of_the_stage(finished: list[str], folder: Path, quick: None, spec: Path, caplog: Any) -> None:
     command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder, overwrite=True)
     assert finished[-1] == "Another"
@@ -506,6 +526,7 @@ def test_exit_status(
     assert not Path("out").exists()
 
 
+@pytest.mark.slow
 def test_a_specification_that_is_not_met_is_told(
     spec: Path, folder: Path, quick: None, designed: Design, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
@@ -525,6 +546,7 @@ def test_a_specification_that_is_not_met_is_told(
     assert "position.settling_time" in shown.err
 
 
+@pytest.mark.cases(slow=1)
 @pytest.mark.parametrize("during", ["hunting_map", "verification"])
 def test_ctrl_c_keeps_the_leaves_and_the_crossover(
     rig: Stage, spec: Path, small: None, tmp_path: Path, during: str, monkeypatch: pytest.MonkeyPatch

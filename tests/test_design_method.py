@@ -71,6 +71,7 @@ def guided(base: Stage) -> Stage:
 # --- leaf springs -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> None:
     """No candidate is beaten in both objectives, all meet the requirements, no random geometry is 10 % better."""
     stiffness, frequency = (
@@ -92,6 +93,7 @@ def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> No
     assert not np.any(tried_.frequency[allowed] > better * 1.1)
 
 
+@pytest.mark.slow
 def test_better_than_the_thesis_in_both(task: LeafTask, candidates: list[Candidate]) -> None:
     """At the thesis's own specification the method beats 70 x 45 x 0.35 mm in stiffness and parasitic frequency."""
     thesis = Geometry(70e-3, 45e-3, 60e-3, Sheet(2.0, 0.35e-3, "stainless 1.4310"))
@@ -133,6 +135,7 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_geometry_at_which_beams_fail_is_marked(
     task: LeafTask, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -201,6 +204,7 @@ def test_where_there_is_no_design_it_is_said_whether_an_isolator_is_needed(
 # --- hunting and the controller ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_edges_are_those_that_check_finds(base: Stage) -> None:
     """Two machines without isolator, against the margin of `friso check`; the lower edge to half a step."""
     static, coulomb = np.array([3.0, 2.0]), np.array([1.0, 0.8])
@@ -217,6 +221,7 @@ def test_edges_are_those_that_check_finds(base: Stage) -> None:
     assert edges.highest == edges.edges.max()
 
 
+@pytest.mark.slow
 def test_corners_hunt_as_long_as_anything_attracts() -> None:
     """The symmetric cycle of this stage repels from 11.97 Hz on; beside it one that is not attracts up to 13.03 Hz, as
     simulations at 1e-7 and 1e-9 show."""
@@ -290,6 +295,7 @@ def rightmost(stage: Stage, leaves_: Evaluation) -> float:
     return max(result)
 
 
+@pytest.mark.slow
 def test_the_crossover_is_comfortable_and_damping_helps(guided: Stage) -> None:
     stage = guided.replace({"controller.crossover": "40 Hz"})
     ranges = limits(stage.flat()).comfortable

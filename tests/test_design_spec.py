@@ -50,34 +50,6 @@ def test_the_example_is_read() -> None:
     assert (low[0], high[0]) == pytest.approx((7e-3, 70e-3))
 
 
-@pytest.mark.parametrize(
-    ("table", "keys", "words"),
-    [
-        ("friction", {"static": "3 N .. 1 N"}, "reversed range"),
-        ("friction", {"static": "1 .. 3 N"}, "its unit is missing"),
-        ("friction", {"static": "0 N .. 3 N"}, 'of which "0 N"'),
-        ("friction", {"coulomb": "1 N"}, "one of the two"),
-        ("friction", {"gap": None, "coulomb": "3 N .. 4 N"}, "below the static friction"),
-        ("machine", {"parasitic_frequencies": ["480 Hz"]}, "both"),
-        ("machine", {"crossover_limit": None}, "neither"),
-        ("leaves", {"materials": ["stainles"]}, "did you mean stainless 1.4310"),
-        ("leaves", {"materials": []}, "an empty list"),
-        ("leaves", {"thickness": ["80 mm"]}, "thinner than the length"),
-        ("leaves", {"thickness": "0.21 mm .. 0.24 mm"}, "a usual gauge"),
-        ("leaves", {"leaves": 2.5}, "a whole number"),
-        ("leaves", {"lenght": "3 mm"}, "did you mean length"),
-        ("masses", {"cart": "1 kg +/- 150 %"}, "below 100 %"),
-        ("safety", {"buckling": 0.5}, "1 or greater"),
-        ("position", {"window": "0 um"}, "greater than 0"),
-    ],
-)
-def test_what_is_refused(table: str, keys: dict[str, Any], words: str) -> None:
-    with pytest.raises(friso.InputError) as caught:
-        changed(table, **keys)
-    assert words in str(caught.value)
-    assert caught.value.key.startswith(table)
-
-
 DAHL = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
 LOCKED = {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
 

@@ -40,6 +40,7 @@ def cluster() -> Iterator[LocalCluster]:
         yield cluster
 
 
+@pytest.mark.slow
 def test_the_same_bits_as_in_one_process(rig: Stage, cluster: LocalCluster, caplog: pytest.LogCaptureFixture) -> None:
     """Each worker compiles a kernel once; a scheduler without TLS is said to let everybody in."""
 
@@ -67,6 +68,7 @@ def authority(folder: Path) -> dict[str, str]:
     return {"tls_ca_file": certificate} | roles
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates")
 def test_a_scheduler_with_tls_is_reached_by_dask_s_configuration_alone(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
@@ -174,6 +176,7 @@ def test_a_scheduler_that_does_not_answer_or_has_no_workers() -> None:
         pass
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
     scheduler = LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0")
 
@@ -187,6 +190,7 @@ def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
         run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, close)
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None:
     def interrupt(done: int, total: int, what: str) -> None:
         raise KeyboardInterrupt

@@ -64,6 +64,7 @@ def test_the_readme_is_short_and_has_the_two_lines() -> None:
     assert set(SET_UP) <= set(lines)
 
 
+@pytest.mark.cases(first=70)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_examples_that_are_named_are_there(page: Path) -> None:
     """The wheel contains all of them."""
@@ -71,6 +72,7 @@ def test_examples_that_are_named_are_there(page: Path) -> None:
     assert [name for name in names if not (ROOT / name).exists()] == []
 
 
+@pytest.mark.cases(first=65)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page: Path) -> None:
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -110,6 +112,7 @@ def test_a_picture_of_the_docs_is_made_as_it_is_there(name: str) -> None:
 STORIES = {"robot_wrist": friso.bode, "telescope": friso.check, "ball_screw_table": friso.check}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STORIES)
 def test_a_story_says_what_the_command_answers(name: str) -> None:
     """Every number of the answer stands in the story."""
@@ -212,6 +215,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_the_wheel_works_outside_the_repository(built: Path, tmp_path: Path) -> None:
     """The wheel contains all files that are not Python: templates, materials, examples."""
     (wheel,) = built.glob("*.whl")
@@ -235,6 +239,7 @@ def test_the_wheel_works_outside_the_repository(built: Path, tmp_path: Path) -> 
     assert "Thesis rig" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_sdist_holds_what_the_wheel_is_built_from(built: Path) -> None:
     (archive,) = built.glob("*.tar.gz")
     listed = subprocess.run(["tar", "tzf", str(archive)], capture_output=True, text=True, check=True).stdout

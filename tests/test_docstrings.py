@@ -97,6 +97,7 @@ def test_every_public_function_has_a_docstring() -> None:
     assert [function.place for function in FUNCTIONS if not function.text] == []
 
 
+@pytest.mark.slow
 def test_errors_that_a_function_raises_itself_are_told() -> None:
     assert [
         function.place for function in FUNCTIONS if function.raises & set(ERRORS) and "Raises" not in function.text
@@ -142,6 +143,7 @@ def whole(body: list[ast.stmt], place: str) -> Iterator[tuple[str, str]]:
             yield from whole(node.body, f"{place}: {node.name}")
 
 
+@pytest.mark.slow
 def test_a_docstring_begins_with_a_line_of_its_own() -> None:
     """A first sentence that runs over the line says too much at once, and tools show the line alone."""
     texts = [

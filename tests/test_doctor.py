@@ -91,6 +91,7 @@ def test_a_user_without_a_home_is_answered(monkeypatch: pytest.MonkeyPatch) -> N
     assert all(finding.works for finding in doctor.checks())
 
 
+@pytest.mark.slow
 def test_a_wrong_result_and_what_cannot_be_loaded_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -116,6 +116,7 @@ def test_ranges_and_shares_in_sentences():
 values = st.one_of(st.floats(-1e6, 1e6), st.just(np.nan))
 
 
+@pytest.mark.slow
 @given(arrays(float, st.integers(1, 900), elements=values), st.integers(1, 12), st.booleans())
 def test_thinning_keeps_order_ends_extremes_and_gaps(y, buckets, loop):
     x = np.cos(np.arange(len(y))) if loop else np.arange(len(y), dtype=float)
@@ -155,6 +156,7 @@ def test_a_loop_that_rests_keeps_its_shape():
 # ---------------------------------------------------------------- renderers
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("figure", [small_figure(), *check_figures(both_joints(samples=20001))], ids=lambda f: f.name)
 def test_both_renderers_draw_the_same_arrays(figure):
     on_paper, on_page = mpl_arrays(figure), plotly_arrays(figure)
@@ -162,6 +164,7 @@ def test_both_renderers_draw_the_same_arrays(figure):
     assert same(on_paper, on_page)
 
 
+@pytest.mark.slow
 def test_both_renderers_write_the_same_labels_and_ranges():
     """No axis has an offset text."""
     far = np.linspace(0, 1, 50)
@@ -188,6 +191,7 @@ def test_colour_bar_and_units_of_a_map():
     assert [p.x for p in drawable(once).panels] == [p.x for p in once.panels]
 
 
+@pytest.mark.slow
 def test_figures_drawn_in_threads_are_those_drawn_alone():
     kinds = [("png", True), ("svg", False), ("svg", True), ("png", False)]
     alone = [matplotlib_renderer.image(small_figure(), *kind) for kind in kinds]
@@ -249,6 +253,7 @@ def test_a_page_carries_what_plotly_draws_in_four_bytes_a_number():
             assert np.array_equal(numbers.reshape(shape), np.asarray(trace[name], "<f4"), equal_nan=True)
 
 
+@pytest.mark.slow
 def test_fonts_of_a_pdf_hold_letters_alone():
     """The letters' places are in the file, so the PDF needs no table of them.
 

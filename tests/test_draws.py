@@ -63,6 +63,7 @@ def test_all_stages_far_from_the_edge_share_their_fate(rig: Stage, crossover: st
     assert outcome.separations(drawn.keys) == {}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_verdicts_are_those_of_single_stages(rig: Stage) -> None:
     """The slow twin: friso check on each of the stages that were drawn."""
@@ -76,6 +77,7 @@ def test_verdicts_are_those_of_single_stages(rig: Stage) -> None:
     assert len(set(alone)) > 1
 
 
+@pytest.mark.slow
 def test_cases_and_seeds(rig: Stage) -> None:
     """The free joint settles where the locked one hunts; "given" is the free one; the same seed, the same verdicts."""
     stage = rig.replace({CROSSOVER: "8 Hz +/- 1 %"})
@@ -299,6 +301,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     return int(left.value.code or 0)
 
 
+@pytest.mark.slow
 def test_check_draws(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -340,6 +343,7 @@ def test_check_draws_refused(
     assert rows_of(shown.err)
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_stages_judged_so_far(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     """Named so, with the verdicts that there are; before the first group of stages there is nothing to keep."""
     stage, sample = rig, Sample({"masses.stage": np.linspace(0.4, 0.6, 10)}, 10, 0, {})

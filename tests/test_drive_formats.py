@@ -309,16 +309,6 @@ def test_notes_about_an_odrive_are_read_with_their_comments(tmp_path: Path) -> N
     assert flat["controller.velocity_integral_time"] == pytest.approx(0.2)
 
 
-def test_a_file_of_another_kind_names_its_numbers_and_the_way_by_hand(tmp_path: Path) -> None:
-    path = tmp_path / "other.txt"
-    path.write_text("loopKp: 3.5\nposition 7\n", "utf-8")
-    with pytest.raises(InputError, match="another kind") as refused:
-        stage_from(path, None, {})
-    assert "loopKp = 3.5" in refused.value.actual
-    assert "position = 7" not in refused.value.actual
-    assert "kp = P F/L" in refused.value.expected
-
-
 @pytest.mark.parametrize("kind", TEXTS)
 @given(data=st.data())
 def test_no_damage_to_a_file_raises_anything_but_one_message(

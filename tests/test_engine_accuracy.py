@@ -139,6 +139,7 @@ def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, time
 TOUCHES = stage(step(), friction=lugre(2), joint=TOUCHING, parasitic=PARASITIC, controller=van_dijk())
 
 
+@pytest.mark.cases(slow=3)
 @pytest.mark.parametrize(
     ("chosen", "changes"),
     [
@@ -176,6 +177,7 @@ def test_runs_against_radau(chosen: Stage, changes: dict[str, Any]) -> None:
     assert np.max(np.abs(ours - theirs) / scales) < 1e-6 * sensitive
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bias", [5.0, -5.0])
 def test_a_reference_that_stands_still_is_no_measure_of_length(bias: float) -> None:
     """Constant forces that nothing carries set the stage in motion: tolerances follow from the friction, whatever the
@@ -214,6 +216,7 @@ def test_turning_points_against_a_tighter_run() -> None:
     assert rough.turn_values[0, :count] == pytest.approx(fine.turn_values[0, :count], abs=2e-8)
 
 
+@pytest.mark.slow
 def test_a_long_step_does_not_pass_over_the_stribeck_peak():
     """Under a limited force a release is nearly a parabola, and steps are long; friction's peak before the stage comes
     to rest is narrow beside what such a step changes the velocity by (seed 1, number 18 of `benchmarks.truth`)."""

@@ -73,6 +73,7 @@ def reference(native: Kernel, flat: Flat) -> Results:
     return results
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(("threads", "chunk"), [(1, 4096), (2, 4096), (5, 4096), (2, 1), (1, 7), (3, 32)])
 def test_any_number_of_threads_and_chunks(
     native: Kernel, flat: Flat, reference: Results, threads: int, chunk: int
@@ -109,10 +110,6 @@ def test_half_as_many_lanes_or_twice_as_many(native: Kernel, flat: Flat, referen
     other = kernel(structure(VARIANTS["rigid"].flat()), lanes=count)
     assert other.layout.lanes == count
     assert_identical(run(other, flat, BASE), reference)
-
-
-def test_again(native: Kernel, flat: Flat, reference: Results) -> None:
-    assert_identical(run(native, flat, BASE), reference)
 
 
 def test_a_run_out_of_steps_harms_no_other(native: Kernel, flat: Flat, reference: Results) -> None:
@@ -155,20 +152,6 @@ def test_runs_of_different_length(native: Kernel, flat: Flat) -> None:
     assert_identical(
         run(native, flat | {"motion.duration": lengths}, RunOptions(1e-5, interval=5e-3, chunk=7)), together
     )
-
-
-@pytest.mark.parametrize(
-    ("status", "remedy"),
-    [
-        (Status.BUDGET, "loosen rtol"),
-        (Status.UNDERFLOW, "check the controller's gains"),
-        (Status.DIVERGED, "check the controller's gains"),
-        (Status.FULL, "shorten the motion"),
-        (Status.NOT_RUN, "interrupted"),
-    ],
-)
-def test_the_text_of_a_failure_names_the_remedy(status: Status, remedy: str) -> None:
-    assert remedy in status.text
 
 
 def test_many_turning_points_get_room() -> None:

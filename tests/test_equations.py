@@ -2,9 +2,7 @@
 
 import zlib
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
-from inspect import get_annotations
 from types import ModuleType
 from typing import Any
 
@@ -17,11 +15,8 @@ from variants import VARIANTS, plain_module
 from friso.equations import motion
 from friso.equations.component import TIME
 from friso.equations.model import REFERENCE, Model, assemble
-from friso.equations.structure import TransmissionForm, structure
+from friso.equations.structure import structure
 from friso.frequency.system import sine
-from friso.stage import Stage
-from friso.stage.controllers import AgainstFriction, FrictionSettings
-from friso.stage.filters import FilterForm
 
 Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]
 
@@ -84,6 +79,7 @@ def points(name: str, twin: ModuleType, count: int) -> list[tuple[float, Point]]
     return rows
 
 
+@pytest.mark.cases(first=13)
 def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleType) -> None:
     by_hand = plain.rates(VARIANTS[name].flat(), twin.STATE_NAMES)
     values = parameters(name)
@@ -99,6 +95,7 @@ def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleT
         assert np.all(seen.min(axis=0) == 0), "a side of a kink was never looked at"
 
 
+@pytest.mark.cases(first=35)
 def test_every_state_and_kink_matters(name: str) -> None:
     """No state or kink is dead: each is in the right-hand side, changes states, or decides on a mode."""
     used = set().union(*(sp.sympify(f).free_symbols for f in model(name).rhs))
@@ -109,6 +106,7 @@ def test_every_state_and_kink_matters(name: str) -> None:
     assert set(model(name).symbols) - {sp.Symbol("position", real=True)} <= used
 
 
+@pytest.mark.cases(first=5, slow=21)
 def test_jacobian_against_differences(name: str, twin: ModuleType) -> None:
     """SymPy's derivatives against central differences of the equations written by hand."""
     m, flat = model(name), VARIANTS[name].flat()
@@ -130,34 +128,6 @@ def test_jacobian_against_differences(name: str, twin: ModuleType) -> None:
             assert np.all(np.abs(difference - exact[:, j]) <= 1e-7 * np.abs(exact[:, j]) + 4 * rounding)
             compared += 1
     assert compared > 20 * len(m.states)
-
-
-def test_what_is_compiled_is_named_by_all_that_differs(rig: Stage) -> None:
-    """Progress names kernels, so the titles of two kernels must differ."""
-    plain = structure(rig.flat())
-    control = plain.controller
-    assert control is not None
-    filters = tuple(FilterForm(kind, "forward", ()) for kind in ("notch", "low_pass"))
-    forms = [
-        plain,
-        *(replace(plain, joint=joint) for joint in ("rigid", "locked")),
-        replace(plain, joint="rigid", masses=("stage",)),
-        replace(plain, parasitic=False),
-        replace(plain, friction="gms"),
-        *(replace(plain, biased=bodies) for bodies in (("cart",), ("cart", "stage"))),
-        replace(plain, load_follows=True),
-        *(replace(plain, transmission=TransmissionForm(plays, "none", (), "load", "load")) for plays in (True, False)),
-        replace(plain, controller=None),
-        *(replace(plain, controller=replace(control, anti_windup=name)) for name in ("none", "clamp")),
-        replace(plain, controller=replace(control, integral=not control.integral)),
-        *(replace(plain, controller=replace(control, filters=filters[:count])) for count in (1, 2)),
-        *(
-            replace(plain, controller=replace(control, settings=FrictionSettings((name,))))
-            for name in get_annotations(AgainstFriction)
-            if name != "kind"
-        ),
-    ]
-    assert len({form.title for form in forms}) == len(forms)
 
 
 def test_a_move_with_a_cruise_is_a_trapezoid_of_velocity() -> None:

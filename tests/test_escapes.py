@@ -33,6 +33,7 @@ def steers(text: str) -> list[str]:
     return [c for c in text if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") and c not in "\n\t"]
 
 
+@pytest.mark.slow
 @given(st.text(st.characters()))
 def test_no_text_steers(text: str) -> None:
     for character in steers(escaped(text)):

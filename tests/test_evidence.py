@@ -17,6 +17,7 @@ FEW = 20
 """Machines below which a share is hardly one."""
 
 
+@pytest.mark.slow
 def test_the_equations_are_those_on_file() -> None:
     changed = differ(equations().numbers)
     assert not changed, f"the equations have changed ({changed}): run python -m benchmarks.evidence --equations"
@@ -31,6 +32,7 @@ def test_every_finding_names_the_code_it_rests_on() -> None:
     assert [name for name, entry in findings_on_file().items() if not entry.rests_on] == []
 
 
+@pytest.mark.slow
 def test_a_finding_older_than_its_code_is_dated_where_it_stands() -> None:
     """If criteria, methods or experiments have changed since, every document states the day of the finding.
 
@@ -55,6 +57,7 @@ def test_a_digest_holds_what_is_computed_and_not_its_words() -> None:
     assert code_digest([]) == ""
 
 
+@pytest.mark.slow
 def test_a_finding_of_an_earlier_revision_is_outdated(monkeypatch: pytest.MonkeyPatch) -> None:
     later = command.Equations(equations().revision + 1, equations().since, equations().numbers)
     monkeypatch.setattr(command.evidence, "equations", lambda: later)

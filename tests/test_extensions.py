@@ -181,6 +181,7 @@ def test_an_experiment_of_the_rig_of_its_own_is_run_and_shown(
     assert "push Push without moving" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_a_metric_of_its_own_is_swept_drawn_and_told(
     extended: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -45,6 +45,7 @@ print(friso.sweep(friso.example("thesis_rig"), axes, out=sys.argv[1]).data["outc
 """Imports all of friso, and fills a store, where no package of an extra can be imported."""
 
 
+@pytest.mark.slow
 def test_no_module_and_no_store_needs_an_extra(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WITHOUT, str(tmp_path / "store")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

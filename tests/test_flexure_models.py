@@ -162,6 +162,7 @@ def test_similar_mechanisms(springs: Mechanism, factor: float) -> None:
     assert closed_forms.modes(large)[0] == pytest.approx(closed_forms.modes(springs)[0] / factor, rel=1e-6)
 
 
+@pytest.mark.slow
 @MANY
 @given(springs=mechanisms(), force=st.floats(0.1, 10), density=st.floats(0.1, 10))
 def test_units_of_force_and_mass(springs: Mechanism, force: float, density: float) -> None:
@@ -493,6 +494,7 @@ class Pushed:
         return np.array([x, 0, stroke, 0, 0, 0]), turn
 
 
+@pytest.mark.slow
 def test_a_stage_that_turns_as_it_is_pushed() -> None:
     """Leaves near each other hardly keep the stage from turning: its whole stiffness, as it stands, by virtual work."""
     springs, stroke = mechanism(spacing=0.003), 6e-3

@@ -16,6 +16,7 @@ METAL = st.floats(0.2, 0.35)
 WIDTH = 0.03
 
 
+@pytest.mark.slow
 @FEW
 @given(ratio=SLENDER, poisson=POISSON)
 def test_stiffening_is_that_of_the_plate(ratio: float, poisson: float) -> None:
@@ -29,6 +30,7 @@ def test_one_function_across_is_exact(ratio: float, poisson: float) -> None:
     assert expected == pytest.approx(ritz(ratio, 1.0, poisson, along=10, across=2).stiffening, rel=1e-6)
 
 
+@pytest.mark.slow
 @FEW
 @given(ratio=SLENDER, poisson=METAL)
 def test_share_that_converges(ratio: float, poisson: float) -> None:
@@ -37,6 +39,7 @@ def test_share_that_converges(ratio: float, poisson: float) -> None:
     assert (ritz(ratio, 1.0, poisson).stiffening - 1) / expected == pytest.approx(plate.CONVERGED_STIFFENING, abs=0.025)
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(ratio=SLENDER, poisson=METAL)
 def test_stress_at_mid_width(ratio: float, poisson: float) -> None:

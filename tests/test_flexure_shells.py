@@ -139,6 +139,7 @@ def errors(name: str, model: LeafModel, mesh: shells.Mesh = shells.MESH) -> dict
     return {key: results[key] / value - 1 for key, value in expected.items() if key in results}
 
 
+@pytest.mark.cases(slow=5)
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_both_models_agree_with_shells(name: str) -> None:
     for model in MODELS.values():

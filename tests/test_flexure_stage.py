@@ -8,7 +8,6 @@ import pytest
 from refusals import refused
 
 import friso
-from friso.errors import InputError
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import parasitic_mode
@@ -34,12 +33,6 @@ def text_with(table: str = LEAVES + 'material = "stainless 1.4310"') -> str:
 @pytest.fixture(scope="module")
 def stage() -> Stage:
     return loads(text_with())
-
-
-def refusal(table: str) -> InputError:
-    with refused() as caught:
-        loads(text_with(table), origin="rig.toml")
-    return caught.value
 
 
 def test_stiffness_and_parasitic_mode_follow(stage: Stage) -> None:
@@ -229,61 +222,6 @@ def test_swept_by_friso(stage: Stage) -> None:
     assert all("flexure.thickness" in reason for reason in runs.status.values[1:])
     reasons = [why for _, why in violations(stage.flat({"flexure.thickness": np.array([0.35e-3, -1e-3])}))]
     assert reasons[0].startswith("flexure.thickness")
-
-
-@pytest.mark.parametrize(
-    ("name", "near"),
-    [
-        ("stainless", "did you mean stainless 1.4310?"),
-        ("Spring Steel", "did you mean spring steel?"),
-        ("titanum", "did you mean titanium?"),
-        ("unobtainium", ""),
-    ],
-)
-def test_unknown_material(name: str, near: str) -> None:
-    error = refusal(LEAVES + f'material = "{name}"')
-    assert (error.key, error.origin) == ("flexure.material", "rig.toml")
-    assert "unknown" in error.actual
-    assert near in error.actual
-    assert all(material in error.expected for material in materials())
-
-
-def _changed(key: str, value: str) -> str:
-    rows = [row for row in LEAVES.splitlines() if not row.startswith(f"{key} =")]
-    return "\n".join([*rows, f"{key} = {value}" if value else "", 'material = "titanium"'])
-
-
-@pytest.mark.parametrize(
-    ("table", "key", "said"),
-    [
-        (_changed("thickness", '"80 mm"'), "flexure.thickness", "as wide as thick"),
-        (_changed("length", '"0.3 mm"'), "flexure.thickness, flexure.length", "ten times as long as thick"),
-        (_changed("width", '"0.4 mm"'), "flexure.thickness, flexure.width", "three times as wide as thick"),
-        (_changed("spacing", '"0.2 mm"'), "flexure.thickness, flexure.spacing", "farther apart"),
-        (_changed("leaves", "1"), "flexure.leaves", "2 to 20"),
-        (_changed("leaves", "2.5"), "flexure.leaves", "whole number"),
-        (_changed("width", ""), "flexure.width", "nothing"),
-        (_changed("length", "70"), "flexure.length", "m"),
-        (_changed("damping_ratio", "0"), "flexure.damping_ratio", "greater than 0"),
-        (_changed("stress_concentration", "0.5"), "flexure.stress_concentration", "1"),
-        (LEAVES, "flexure.young", "a material, or all numbers of one"),
-        (LEAVES + 'young = "210 GPa"', "flexure.poisson", "a material, or all numbers of one"),
-        (LEAVES + 'material = "titanium"\nyoung = "210 GPa"', "flexure", "together with young"),
-        (LEAVES + 'material = "titanium"\nfatigue = "1 GPa"', "flexure", "together with fatigue"),
-        (LEAVES + NUMBERS.replace("0.3", "0.5"), "flexure.poisson", "below 0.5"),
-        (LEAVES + 'material = "titanium"\ncolour = "red"', "flexure.colour", "unknown"),
-        (
-            LEAVES + 'material = "titanium"\n[parasitic]\nfrequency = "300 Hz"\nmass = "0.25 kg"\ndamping_ratio = 0.01',
-            "[parasitic]",
-            "[flexure]",
-        ),
-    ],
-)
-def test_refused(table: str, key: str, said: str) -> None:
-    error = refusal(table)
-    assert key in error.key
-    assert said in f"{error.actual} {error.expected}"
-    assert error.example
 
 
 @pytest.mark.parametrize(

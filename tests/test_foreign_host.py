@@ -13,6 +13,8 @@ from pages import Page
 
 from friso.interface.output_folder import DRAFTS
 
+pytestmark = pytest.mark.slow
+
 PRELOAD = Path(__file__).parent / "foreign_host"
 
 AXIS = """# an axis of 20 µm/s and more
@@ -78,6 +80,7 @@ def axis(tmp_path: Path) -> Path:
     return with_stage(folder)
 
 
+@pytest.mark.thorough
 @on_both
 def test_commands_write_their_files(host: str, axis: Path) -> None:
     """Files are replaced unless another program holds them; names of devices are refused on Windows alone."""

@@ -85,6 +85,7 @@ def test_mass_lines(rig: Stage, case: str, frequency: float, mass: float) -> Non
 # --- the equations ---
 
 
+@pytest.mark.cases(first=3, slow=16)
 @pytest.mark.parametrize("name", [name for name in VARIANTS if "load-dependent" not in name])
 def test_closed_loop_is_the_jacobian_of_the_whole_model(name: str) -> None:
     """Plant and controller put together against the Jacobian of the assembled equations, bristles and all.
@@ -170,6 +171,7 @@ def test_a_law_that_creeps_bears_no_bias() -> None:
 # --- fast path against slow twin ---
 
 
+@pytest.mark.cases(first=5, slow=27)
 @pytest.mark.parametrize("name", VARIANTS)
 def test_family_at_once_against_one_system_after_the_other(name: str) -> None:
     flat = VARIANTS[name].flat()
@@ -197,6 +199,7 @@ LIGHT = {
 """A stage whose bristles hardly damp: its closed-loop resonances are sharp, and move with the bias force."""
 
 
+@pytest.mark.cases(slow=2)
 @pytest.mark.parametrize("drive", [{}, {"drive.sample_time": "1 ms"}, {"drive.delay": "0.3 ms"}])
 @pytest.mark.parametrize("stage", [{}, LIGHT])
 def test_scan_finds_what_exact_margins_find(rig: Stage, stage: dict, drive: dict) -> None:
@@ -255,6 +258,7 @@ def growing(flat: dict, one: Members) -> int:
     return int((exact_poles.cut.real > aside).sum()) - round(turned / np.pi)
 
 
+@pytest.mark.slow
 @given(stages, st.sampled_from(CASES), st.sampled_from(DRIVES))
 @settings(max_examples=15)
 def test_margins_take_the_loop_to_the_edge(rig: Stage, changes: dict, case: str, drive_keys: dict) -> None:
@@ -358,6 +362,7 @@ def test_sampling_ever_faster_is_continuous(rig: Stage) -> None:
     assert np.log2(np.array(off[:-1]) / off[1:]) == pytest.approx(1, abs=0.1)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("delay", "crossover", "growth"), [("2 ms", 12, 0.910), ("5 ms", 20, 0.366), ("1 ms", 12, -0.271)]
 )
@@ -370,6 +375,7 @@ def test_a_long_delay_and_a_sharp_mode(rig: Stage, delay: str, crossover: float,
     assert loop_margins.abscissa == pytest.approx(growth, abs=0.005)
 
 
+@pytest.mark.slow
 def test_a_delay_is_lag(rig: Stage) -> None:
     """At its delay margin a loop is on the edge of stability, also with the rational approximation."""
     flat, one = rig.flat(), limit_cases(rig.flat())["sliding"]
@@ -381,6 +387,7 @@ def test_a_delay_is_lag(rig: Stage) -> None:
 # --- degenerate loops ---
 
 
+@pytest.mark.cases(first=8, slow=140)
 @pytest.mark.parametrize("name", VARIANTS)
 @pytest.mark.parametrize("drive", DRIVES)
 def test_every_kind_of_stage_with_every_drive(name: str, drive: dict) -> None:
@@ -402,6 +409,7 @@ def by_gains(rig: Stage, **gains: str) -> Stage:
     return Stage(**tables)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     "drive", [DriveTiming(0.0, 2e-4), DriveTiming(0.0, 5e-3), DriveTiming(1e-4, 1e-4), DriveTiming(1e-3, 1.5e-3)]
 )
@@ -422,6 +430,7 @@ def test_slow_poles_are_where_the_loop_is_minus_1(rig: Stage, turn: float, drive
     assert poles(flat, one, drive).abscissa[0] == pytest.approx(exact, rel=3e-6)
 
 
+@pytest.mark.cases(slow=3)
 @pytest.mark.parametrize("drive", DRIVES)
 def test_a_position_that_is_not_controlled_is_on_the_edge(rig: Stage, drive: dict) -> None:
     for locked in (True, False):
@@ -457,6 +466,7 @@ def test_bias_forces_are_those_that_a_stuck_cart_bears(rig: Stage) -> None:
 # --- how fast the controller may be ---
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("locked", [True, False])
 def test_limits_are_where_the_margins_say(rig: Stage, locked: bool) -> None:
     drive = {"drive.sample_time": "50 us", "drive.delay": "100 us", "joint.locked": locked}
@@ -512,33 +522,10 @@ def test_linear_names_what_it_has_and_follows_its_reference(rig: Stage) -> None:
     assert rigid.output_labels == ["stage", "cart"]
 
 
-TUNED = {"crossover": 8.0, "alpha": 0.1, "beta": 2.0, "mass": 1.7}
-
-
-@pytest.mark.parametrize(
-    ("key", "asked"),
-    [
-        ("drive.delay", lambda rig: bode(rig.replace({"drive.sample_time": "50 us", "drive.delay": "6 ms"}))),
-        ("drive.delay", lambda rig: bode(rig.replace({"drive.delay": "1 s"}))),
-        (None, lambda rig: rig.replace({"drive.sample_time": "50 ms", "controller.crossover": "10 Hz"})),
-        ("controller", lambda rig: bode(by_gains(rig, kp="0 N/m"))),
-        ("case", lambda rig: friso.linear(rig, friso.member(bias=5.0))),
-        ("case", lambda rig: friso.linear(rig, family(rig.flat()))),
-        ("case", lambda rig: friso.linear(rig.replace({"joint.locked": True}), friso.member(touched=True))),
-        ("case", lambda rig: friso.linear(rig, case="slidin")),
-        ("part", lambda rig: friso.linear(rig, part="loop")),
-        ("speed", lambda rig: friso.member(speed=-1e-3)),
-        ("bias", lambda rig: friso.member(speed=1e-3, bias=2.0)),
-        (None, lambda rig: friso.tuning(**{**TUNED, "alpha": 2.0})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "alpha": 0.0})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "beta": 0.5})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "crossover": -1.0})),
-        (None, lambda rig: friso.tuning(**{**TUNED, "mass": 0.0})),
-    ],
-)
-def test_what_no_stage_can_be_asked_is_refused(rig: Stage, key: str | None, asked: Callable[[Stage], object]) -> None:
-    with refused(key):
-        asked(rig)
+@pytest.mark.parametrize("case", [friso.member(bias=5.0), family(VARIANTS["rigid"].flat()), friso.member(touched=True)])
+def test_a_case_that_a_stage_cannot_be_in_is_refused(rig: Stage, case: Members) -> None:
+    with refused("case"):
+        friso.linear(rig.replace({"joint.locked": True}), case)
 
 
 GAINS = {"kp": (0.6374e6, "N/m"), "ki": (136.5e6, "N/(m*s)"), "kd": (428.4, "N*s/m")}

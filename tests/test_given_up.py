@@ -19,6 +19,7 @@ from friso.hunting import (
     AttractionEnd,
     BandwidthWindow,
     CheckPart,
+    HuntingDoubt,
     Judgement,
     Kick,
     Margin,
@@ -29,7 +30,6 @@ from friso.hunting import (
     verdict,
 )
 from friso.hunting.attractors import Attractors
-from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.settings import BasinSettings, CheckSettings
@@ -37,8 +37,6 @@ from friso.hunting.verdict import (
     judge,
 )
 from friso.stage import Stage
-
-pytestmark = pytest.mark.inner
 
 STAGE = VARIANTS["rigid"]
 TARGET = Target(1e-3, 1.6, 100.0, 25.0)
@@ -123,6 +121,7 @@ def judged(
         return judge(stage, run_to(settling), 1e-6)
 
 
+@pytest.mark.cases(first=5)
 @pytest.mark.parametrize(
     ("run", "doubt"),
     [
@@ -150,6 +149,7 @@ def test_a_longer_run_that_is_not_completed_gives_no_verdict() -> None:
     assert MORE_WORK in HuntingDoubt.WORK  # sentences name the commands by these words
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(
     ("certain", "changes", "sure"),
     [
@@ -171,6 +171,7 @@ def test_no_edge_is_more_certain_than_the_verdict_or_than_large_motions_are_boun
     assert judgement.windows[0].high is None
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("starts", "certain"),
     [

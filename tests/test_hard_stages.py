@@ -37,6 +37,7 @@ def established(entry: dict[str, Any]) -> tuple[str, ...]:
     return ("hunts",) if entry["own_motion"] == "swings" else ("bistable",)
 
 
+@pytest.mark.cases(first=1, slow=5)
 @pytest.mark.parametrize("kind", groups())
 def test_verdicts_near_the_edge(kind: str) -> None:
     entries = groups()[kind]

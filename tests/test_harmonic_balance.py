@@ -1,7 +1,6 @@
 """Harmonic balance of a loop with friction: where it works, and that for hunting it does not until very late."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import plain
@@ -12,7 +11,6 @@ from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains
 
 from friso.hunting import Ensemble, find_cycles
 from friso.stage import Stage
-from friso_thesis.studies.describing import balance
 from friso_thesis.studies.describing.balance import DEFAULT_FREQUENCIES, receptance, single_harmonic
 from friso_thesis.studies.describing.function import dynamic_stiffness
 from friso_thesis.studies.describing.multi import (
@@ -24,7 +22,6 @@ from friso_thesis.studies.describing.multi import (
     balanced,
     friction_answer,
 )
-from friso_thesis.studies.describing.settings import DescribingSettings
 from friso_thesis.studies.harmonic_balance import harmonic_balance
 
 pytestmark = pytest.mark.xdist_group("describing")
@@ -56,6 +53,7 @@ def near_sine() -> tuple[float, float]:
 # where it works
 
 
+@pytest.mark.slow
 def test_single_harmonic_balance_finds_a_cycle_that_is_there() -> None:
     amplitude, omega = near_sine()
     harmonic = single_harmonic(unstable("1e8 N/m"), *GRID)
@@ -66,60 +64,7 @@ def test_single_harmonic_balance_finds_a_cycle_that_is_there() -> None:
     assert np.all(harmonic.residuals < 1e-9)
 
 
-def test_what_is_not_known_is_no_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Friction that was not found at one grid point leaves four cells open, and the cycle elsewhere is still found."""
-    sizes, rates = np.geomspace(1e-3, 1, 31), np.geomspace(0.1, 100, 31)
-    amplitude, _ = near_sine()
-    spoilt = [sizes[3], rates[3]]
-
-    def partly(flat: dict[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> np.ndarray:
-        there = np.isclose(amplitudes, spoilt[0]) & np.isclose(frequencies, spoilt[1])
-        return np.where(there, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
-
-    monkeypatch.setattr(balance, "dynamic_stiffness", partly)
-    harmonic = single_harmonic(unstable("1e8 N/m"), sizes, rates)
-    assert (harmonic.unknown, harmonic.unsolved) == (4, 0)
-    assert harmonic.amplitudes == pytest.approx([amplitude], rel=2e-3)
-    assert np.isfinite(harmonic.least)
-    monkeypatch.setattr(balance, "dynamic_stiffness", lambda _, amplitudes, *__: np.full(len(amplitudes), np.nan))
-    nothing = single_harmonic(unstable("1e8 N/m"), sizes, rates)
-    assert (nothing.unknown, nothing.amplitudes.size) == (900, 0)
-    assert np.isnan(nothing.least)
-
-
-def test_a_turn_without_a_solution_is_told() -> None:
-    """Newton's method that ends nowhere has found no cycle."""
-    amplitude, omega = near_sine()
-    grid = (amplitude * np.geomspace(0.1, 10, 12), omega / (2 * np.pi) * np.geomspace(0.1, 10, 12))
-    with DescribingSettings(balance_newton_steps=0).in_use():
-        harmonic = single_harmonic(unstable("1e8 N/m"), *grid)
-        assert (harmonic.amplitudes.size, harmonic.unsolved) == (0, 1)
-    cells, axes = np.array([[2, 2], [2, 2]]), (np.arange(9.0), np.arange(9.0))
-    assert balance._near(axes, cells, np.array([[3.9, 2.5], [1.1, 4.1]])).tolist() == [True, False]
-
-
-def test_singular_step_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A spring in the place of friction: nothing depends on the amplitude."""
-    monkeypatch.setattr(balance, "dynamic_stiffness", lambda _, amplitudes, *__: np.full(len(amplitudes), 1e5 + 0j))
-    start = np.log([[1e-3, 1e-4], [5.0, 8.0]])
-    assert np.array_equal(balance._Loop(hunting(8.0), 1e-9).polished(start), start)
-
-
-def test_frequencies_are_close_enough_for_the_loop() -> None:
-    """With the joint locked the loop turns by 143 degrees between two usual frequencies at 224 Hz."""
-    locked = hunting(8.0, LOCKED, PARASITIC)
-
-    def turn(frequencies: np.ndarray) -> float:
-        answer = receptance(locked.flat(), frequencies)[0]
-        return float(np.degrees(np.max(np.abs(np.angle(answer[1:] / answer[:-1])))))
-
-    fine = balance._Loop(locked, 1e-9).refined(DEFAULT_FREQUENCIES)
-    assert turn(DEFAULT_FREQUENCIES) > 140
-    assert turn(fine) < 90
-    assert set(DEFAULT_FREQUENCIES) <= set(fine)
-    assert len(fine) < len(DEFAULT_FREQUENCIES) + 10
-
-
+@pytest.mark.slow
 def test_multi_harmonic_balance_finds_it_too() -> None:
     """With one harmonic it equals single-harmonic balance; with many, the motion comes back to its start."""
     amplitude, omega = near_sine()
@@ -219,6 +164,7 @@ def test_hunting_by_harmonic_balance() -> None:
     assert result["period_error"].values[3:] == pytest.approx([2.69e-3, 4.1e-5], rel=0.02)
 
 
+@pytest.mark.slow
 def test_no_single_harmonic_answer_from_4_to_9_5_hz() -> None:
     for crossover, least in ((4.0, 0.17), (6.0, 0.22), (9.5, 0.30)):
         harmonic = single_harmonic(hunting(crossover), *GRID)
@@ -227,6 +173,7 @@ def test_no_single_harmonic_answer_from_4_to_9_5_hz() -> None:
         assert GRID[1][0] < harmonic.least_frequency < GRID[1][-1]
 
 
+@pytest.mark.slow
 def test_where_the_integrator_can_drive_the_loop_is_a_spring_too() -> None:
     """Why: friction that damps (Im N > 0) needs a frequency at which the loop feeds, and there the loop is a spring, so
     that friction would have to be a negative one, which it is by far too little there."""
@@ -251,6 +198,7 @@ def test_any_linear_mechanics() -> None:
     assert np.abs(result.stage - result.cart).max() > 0
 
 
+@pytest.mark.slow
 def test_intervals_are_fine_enough() -> None:
     flat, motion = hunting(8.0).flat(), one_period(hunting(8.0))
     usual, fine = (balanced(flat, *motion, 201, intervals=item * 201) for item in (32, 128))

@@ -81,6 +81,7 @@ def overlap(one: Estimate, other: Estimate) -> bool:
     return max(one.low, other.low) < min(one.high, other.high)
 
 
+@pytest.mark.slow
 def test_leuven_antiresonance_and_resonance() -> None:
     modes = fit_modes(leuven_response((1, 2), 0), BAND)
     assert (modes.shape.modes, modes.shape.rigid) == (1, True)
@@ -92,6 +93,7 @@ def test_leuven_antiresonance_and_resonance() -> None:
         assert overlap(modes[f"{name} 1 frequency"], two[f"{name} frequency"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("train", "aside"), [(1, 2), (2, 1)])
 def test_leuven_prediction_of_the_other_realisation(train: int, aside: int) -> None:
     """The prediction is as good as the one from the other realisation's own measured response, for both encoders."""
@@ -135,6 +137,7 @@ def test_tokyo_mass_lines() -> None:
     assert lower.high < 55 < 77 < upper.low
 
 
+@pytest.mark.slow
 def test_tokyo_modes() -> None:
     modes = fit_modes(tokyo("theta_mx"))
     assert modes["antiresonance 1 frequency"].value == pytest.approx(55, abs=1)
@@ -144,6 +147,7 @@ def test_tokyo_modes() -> None:
     assert seen.words[-1].startswith("cart sliding")
 
 
+@pytest.mark.slow
 def test_tokyo_second_encoder_counts_the_other_way() -> None:
     fit = fit_two_mass(tokyo("theta_mx"), tokyo("theta_my"))
     assert fit.signs == (1.0, -1.0)

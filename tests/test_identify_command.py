@@ -144,6 +144,7 @@ def test_a_stage_file_may_leave_out_what_the_log_tells(
     assert all(name in str(open_tables.value) for name in ("masses", "controller", "motion"))
 
 
+@pytest.mark.slow
 def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapshots: Snapshots) -> None:
     out, answer = done[0].resolve(), done[1]
     files = {out.parent / item for item in answer["files"]}
@@ -156,6 +157,7 @@ def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapsho
     snapshots.check("identify", "page", Page(page).lines)
 
 
+@pytest.mark.slow
 def test_the_stage_file_has_uncertain_keys_that_hold_the_truth(
     done: tuple[Path, dict[str, Any]], machine: Machine
 ) -> None:
@@ -172,6 +174,7 @@ def test_the_stage_file_has_uncertain_keys_that_hold_the_truth(
     assert len(correlations.keys) >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_friso_check_runs_on_what_was_identified(done: tuple[Path, dict[str, Any]]) -> None:
     answer = friso_inside(done[0], "check", "identified.toml", "--json")
@@ -179,6 +182,7 @@ def test_friso_check_runs_on_what_was_identified(done: tuple[Path, dict[str, Any
     assert json.loads(answer.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("done")
 def test_a_second_run_needs_no_options_again(inputs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """The mapping beside the log is used; if it names a missing channel, it is refused by its name."""
@@ -238,6 +242,7 @@ def refused(folder: Path, words: str, *arguments: object, out: str = "out") -> N
     assert not (folder / out / "identified.toml").exists()
 
 
+@pytest.mark.cases(first=5)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -260,6 +265,7 @@ def test_options_that_do_not_fit_are_refused(arguments: list[str], words: str, f
     refused(folder, words, *arguments)
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(
     ("count", "changes", "words"),
     [
@@ -300,6 +306,7 @@ def test_a_folder_that_cannot_be_written(folder: Path) -> None:
     assert (answer.returncode, "can be written" in answer.stderr) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_placeholder_for_the_controller_is_noted_in_the_file(
     without_stage: Answer, inputs: tuple[Path, Path]
 ) -> None:
@@ -316,6 +323,7 @@ def shown_or_unknown(stage: friso.Stage) -> bool:
     return keys <= {*stage.uncertain(), *stage.unknown_keys}
 
 
+@pytest.mark.slow
 def test_values_that_the_log_does_not_show_are_listed_as_unknown(
     without_stage: Answer, inputs: tuple[Path, Path]
 ) -> None:
@@ -343,6 +351,7 @@ def test_static_friction_that_only_followed_another_is_unknown() -> None:
     assert (interval.low, interval.high) == (pytest.approx(1.3, rel=0.01), pytest.approx(3 * 1.5, rel=0.01))
 
 
+@pytest.mark.slow
 def test_a_wrong_controller_is_told(inputs: tuple[Path, Path]) -> None:
     """A third more crossover makes another controller; the stage file then lists it as unknown."""
     right, wrong = (

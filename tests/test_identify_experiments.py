@@ -112,6 +112,7 @@ def stairs(rig: friso.Stage, stiffness: float, levels: tuple[int, ...]) -> dict[
     return total
 
 
+@pytest.mark.slow
 def test_steps_hold_the_stiffness(rig: friso.Stage) -> None:
     """40 rigs, with force noise, a wandering force and quantisation: about 95 % of the intervals hold it."""
     rng, held, widths = np.random.default_rng(1), 0, []
@@ -241,6 +242,7 @@ def pulled(rig: friso.Stage, velocity: float, rng: np.random.Generator, **change
     )
 
 
+@pytest.mark.slow
 def test_stick_slip_holds_the_static_friction(rig: friso.Stage) -> None:
     """40 rigs, at force rates that lower the break-away by up to a fifth; k_j known to 2 %."""
     rng, held, below, stiff = np.random.default_rng(2), 0, 0, 0
@@ -387,6 +389,7 @@ def ramps(
     return replace(record("ramps", DT, **arrays), segments=tuple(parts))
 
 
+@pytest.mark.slow
 def test_break_away_falls_with_the_rate_as_published() -> None:
     """About 1.42 N at 1 N/s, 1.21 at 10, 1.09 at 20 (Canudas de Wit et al. 1995, read off a figure: 3 %)."""
     rates = [1.0, 1.0, 10.0, 10.0, 20.0, 20.0]
@@ -400,6 +403,7 @@ def test_break_away_falls_with_the_rate_as_published() -> None:
         assert result.static.holds(1.5)
 
 
+@pytest.mark.slow
 def test_break_aways_of_drawn_machines_hold_the_static_friction() -> None:
     """Ten of those on which the benchmark found intervals too high: heavy, with noisy sensors."""
     held = 0
@@ -410,6 +414,7 @@ def test_break_aways_of_drawn_machines_hold_the_static_friction() -> None:
     assert held >= 9
 
 
+@pytest.mark.slow
 def test_ramps_hold_the_static_friction() -> None:
     """30 machines, at slow ramps of several rates: intervals by extrapolation."""
     rng, held, widths = np.random.default_rng(7), 0, []
@@ -447,6 +452,7 @@ def test_ramps_from_rest_are_recognised() -> None:
     assert not together([Course(few), Course(record("rest", DT, position=np.zeros(4000), force=np.zeros(4000)))])
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("crossover", ["6 Hz", "8 Hz"])
 def test_an_integrator_that_winds_up_makes_no_ramps_from_none(rig: friso.Stage, crossover: str) -> None:
     """Long after the move of a stage that hunts, the integrator takes the force through zero while the stage sticks."""
@@ -578,6 +584,7 @@ def exact(speeds: list[float], friction: Callable[[float], float]) -> Log:
     return record("exact", DT, position=position, force=force, reference=position)
 
 
+@pytest.mark.slow
 def test_what_lies_within_the_linearity_of_sensors_is_not_seen() -> None:
     """Forces nearly on a line show no Stribeck effect; intervals of exact forces allow for the linearity."""
     bent = exact([0.08, 0.1, 0.12, 0.14, 0.16, 0.18], lambda v: 1 + 4 * v + 5e-4 * np.exp(-((v / 0.11) ** 2)))
@@ -677,6 +684,7 @@ def test_an_exponent_that_the_forces_refute_is_not_believed() -> None:
     assert f"refute the Stribeck exponent of the stage, {wrong:g}" in curve.warnings[-1]
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("stated", [True, False])
 def test_the_exponent_of_constant_speeds_is_that_which_the_stage_file_states(stated: bool) -> None:
     """The force that is named acts on the body; it is not the one that the motor needs against it."""
@@ -797,6 +805,7 @@ def ramps_there_and_back(speeds: Sequence[float], way: float, sample_time: float
     return record("ramps", sample_time, reference=position, position=read, force=force)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("sample_time", [1e-3, 2e-4])
 def test_the_digits_of_an_encoder_are_no_hunting(sample_time: float) -> None:
     curve = friction_velocity(ramps_there_and_back((3e-3, 5e-3, 9e-3, 15e-3, 29e-3), 0.02, sample_time, 1e-6))

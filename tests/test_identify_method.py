@@ -65,6 +65,7 @@ def test_what_is_systematic_does_not_average_out() -> None:
     assert one.systematic == pytest.approx(0.2)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**31), st.integers(3, 8))
 @settings(max_examples=8)
 def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -> None:
@@ -79,6 +80,7 @@ def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -
     assert np.median(wider) == pytest.approx(1, abs=0.02)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**31), st.integers(2, 6))
 @settings(max_examples=20)
 def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, count: int) -> None:
@@ -237,12 +239,14 @@ def repeated(acceleration: float, rest: int, rng: np.random.Generator) -> Log:
     return record("moves", STEP, position=np.cumsum(velocity) * STEP, force=force + 0.02 * rng.standard_normal(10000))
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize("lines", [range(1, 9), range(1, 100), range(20, 100), range(10, 20)], ids=str)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_multisine_is_an_excitation(lines: range, seed: int) -> None:
     assert recognised(excited(lines, np.random.default_rng(seed)), Path("log.csv"))[0] == "frequency"
 
 
+@pytest.mark.cases(first=6)
 @pytest.mark.parametrize("acceleration", [0.5, 1.0, 5.0])
 @pytest.mark.parametrize("rest", [0, 100, 250, 400])
 def test_a_repeated_move_is_none(acceleration: float, rest: int) -> None:

@@ -93,6 +93,7 @@ def quick(reported: list[tuple[float, str]]) -> Quick:
     return machine.flat, log, identify_moves(log, machine.guess.flat(), True, progress=progress)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_progress_moves_within_every_part_of_a_fit(reported: list[tuple[float, str]]) -> None:
     shares = [share for share, _ in reported]
@@ -103,6 +104,7 @@ def test_progress_moves_within_every_part_of_a_fit(reported: list[tuple[float, s
     assert all(len({*at[label]}) > 2 for label in at if "parameters" in label or "sliding" in label), at
 
 
+@pytest.mark.slow
 def test_intervals_hold_mass_and_friction(quick: Quick) -> None:
     """Slow moves are under the Stribeck effect: a fit without it must not put it into Coulomb friction."""
     truth, _, result = quick
@@ -125,6 +127,7 @@ def test_intervals_hold_mass_and_friction(quick: Quick) -> None:
     assert correlation[names.index("friction.coulomb"), names.index("friction.viscous")] < -0.3
 
 
+@pytest.mark.slow
 def test_the_closed_loop_has_the_last_word_and_leaves_the_noise(quick: Quick) -> None:
     result, machine = quick[2], drawn(3, False)
     assert result.fit.problem.closed
@@ -145,6 +148,7 @@ def test_a_stribeck_curve_of_another_exponent_is_told() -> None:
     assert by_name["friction.stribeck_exponent"].high < 2
 
 
+@pytest.mark.slow
 def test_how_a_log_begins_does_not_count_in_the_loop(quick: Quick) -> None:
     """The initial velocity and bristle deflection of the simulated loop are unknown.
 
@@ -158,6 +162,7 @@ def test_how_a_log_begins_does_not_count_in_the_loop(quick: Quick) -> None:
     assert np.array_equal(*left)
 
 
+@pytest.mark.slow
 def test_a_better_fit_on_a_profile_takes_the_place_of_the_fit(quick: Quick) -> None:
     """A loop fit of a stage that stuck and slipped had infinite variances, and nothing was reported."""
     best = quick[2].fit
@@ -173,6 +178,7 @@ def test_a_better_fit_on_a_profile_takes_the_place_of_the_fit(quick: Quick) -> N
     assert believed(off, core, quick[2].covered, silent).fit.cost < 1.01 * best.cost
 
 
+@pytest.mark.slow
 def test_an_interval_reaches_as_far_up_as_that_of_the_logarithm(quick: Quick) -> None:
     best, covered = quick[2].fit, quick[2].covered
     names = frozenset(parameter.name for parameter in best.problem.parameters)
@@ -184,6 +190,7 @@ def test_an_interval_reaches_as_far_up_as_that_of_the_logarithm(quick: Quick) ->
         assert stiffness.high < stiffness.value * (1 + 1.1 * np.expm1(2 * off))
 
 
+@pytest.mark.slow
 def test_a_loop_that_leaves_more_than_the_noise_is_fitted_once_more(
     quick: Quick, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,6 +210,7 @@ def test_a_loop_that_leaves_more_than_the_noise_is_fitted_once_more(
     assert answer.fit is best
 
 
+@pytest.mark.slow
 def test_pulses_of_force_are_predicted(quick: Quick) -> None:
     """A record of the same machine with pulses beside the controller: predicted with them, not without."""
     truth, log, result = quick
@@ -222,6 +230,7 @@ def test_pulses_of_force_are_predicted(quick: Quick) -> None:
     assert simulated_log(result, without).errors.force > 5 * predicted.errors.force
 
 
+@pytest.mark.slow
 def test_missing_signals_are_named(quick: Quick) -> None:
     _, log, result = quick
     bare = replace(log, signals={role: log[role] for role in ("position", "force")})
@@ -231,6 +240,7 @@ def test_missing_signals_are_named(quick: Quick) -> None:
         identify_moves(replace(log, units={"force": "V"}), result.flat, True)
 
 
+@pytest.mark.slow
 def test_starts_stay_in_their_ranges(quick: Quick) -> None:
     result = quick[2].fit
     low, high = result.problem.bounds
@@ -366,6 +376,7 @@ def sound() -> Log:
     return on_a_coupling(1e4, False)
 
 
+@pytest.mark.slow
 def test_no_effect_is_seen_where_there_is_none(sound: Log) -> None:
     case = fit_case(sound, *rigid(sound))
     assert case.leading is None
@@ -373,6 +384,7 @@ def test_no_effect_is_seen_where_there_is_none(sound: Log) -> None:
     assert not [*DOUBTS["force-digits"].find(RecordCase(sound, inverse_model(sound)))]
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("behind", [False, True], ids=["position of the motor", "position of the load"])
 @pytest.mark.parametrize("rate", [25.0, 40.0])
 def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(rate: float, behind: bool) -> None:
@@ -393,6 +405,7 @@ def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
     assert not spoiled.words  # a cause that has been named makes such a force too
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
 def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, sound: Log) -> None:
     """A mass seems heavier driven than braked; intervals of mass and friction reach over it."""
@@ -407,6 +420,7 @@ def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, 
     assert not [*load_friction.find(replace(fit_case(log, fitted, bandwidth), leading=None))]
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("effect", ["cogging", "friction-by-place", "drifting-delay", "play"])
 def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, sound: Log) -> None:
     """The right effect of those that the model leaves out comes first."""
@@ -441,6 +455,7 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, sound
         assert nameless.fit is not None
 
 
+@pytest.mark.slow
 def test_an_integrated_velocity_shows_a_step_test() -> None:
     """Noise of the velocity adds up in the position, but causes no wrong bandwidth, missing model or backlash."""
     step, force = 1e-3, np.repeat([0.0, 9.0, 0.0, -9.0, 0.0, 7.0, 0.0, -12.0], 1000)
@@ -487,6 +502,7 @@ def test_a_force_in_coarse_digits_is_told(sound: Log) -> None:
     assert doubt.size == pytest.approx(digit)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("late", [1, 3, -2])
 def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(late: int, sound: Log) -> None:
     """A force that acts some samples after it was logged, or before."""
@@ -515,6 +531,7 @@ def test_the_fit_tells_whether_the_force_of_a_log_is_held() -> None:
     assert settled.cost < as_held.cost
 
 
+@pytest.mark.slow
 def test_a_position_is_smoothed_no_more_than_the_fit_bears() -> None:
     """Smoothing blurs break-aways: the exponent of a stage that sticks and slips came out at 1.85 for 2, without any
     noise."""
@@ -579,6 +596,7 @@ PUBLISHED = {"position": 0.0138, "velocity": 0.229, "acceleration": 8.60, "force
 """Relative errors of closed-loop simulation [%]."""
 
 
+@pytest.mark.thorough
 def test_emps_in_closed_loop_and_half_of_it_predicted(identified: IdentifiedMoves, emps: Log) -> None:
     """The stage predicts the second half of the record, simulated on its own."""
     assert identified.fit.problem.closed
@@ -588,6 +606,7 @@ def test_emps_in_closed_loop_and_half_of_it_predicted(identified: IdentifiedMove
         assert 100 * getattr(latter, name) < percent, name
 
 
+@pytest.mark.thorough
 def test_emps_fits_better_than_the_inverse_model(identified: IdentifiedMoves, emps: Log, axis: friso.Stage) -> None:
     inverse = identified.inverse
     flat = axis.flat() | {"masses.cart": inverse.value("mass"), "friction.viscous": inverse.value("viscous")}
@@ -597,6 +616,7 @@ def test_emps_fits_better_than_the_inverse_model(identified: IdentifiedMoves, em
     assert identified.errors.force < errors_of(emps, identified.part, plain, 20.0).force
 
 
+@pytest.mark.thorough
 def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves) -> None:
     by_name = {estimate.name: estimate for estimate in identified.estimates}
     for name in ("friction.static", "friction.stribeck_velocity", *BRISTLES):
@@ -630,7 +650,8 @@ def on_bristles(rate: float, step: float, seconds: float) -> Log:
     return record("on bristles", step, position=position, force=force)
 
 
-@pytest.mark.parametrize(("rate", "step"), [(0.05, 2e-3), (0.1, 4e-3), (0.2, 2e-3), (0.5, 2e-3)])
+@pytest.mark.cases(first=1)
+@pytest.mark.parametrize(("rate", "step"), [(0.5, 2e-3), (0.2, 2e-3), (0.1, 4e-3), (0.05, 2e-3)])
 def test_what_friction_does_at_the_reversals_of_a_sine_is_no_delay_and_no_coupling(rate: float, step: float) -> None:
     """Delays of 4 to 100 ms were named, and a coupling that changed the mass infinitely."""
     case = fit_case(log := on_bristles(rate, step, 20.0), *rigid(log), led=False)

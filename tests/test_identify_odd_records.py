@@ -28,6 +28,7 @@ RECORDS: Mapping[str, tuple[np.ndarray, np.ndarray]] = {
 }
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize("name", RECORDS)
 def test_a_record_is_answered_or_refused_as_every_kind(tmp_path: Path, name: str) -> None:
     path, (force, position) = tmp_path / "record.csv", RECORDS[name]

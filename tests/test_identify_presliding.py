@@ -83,6 +83,7 @@ def kind_of(log: Log) -> str:
     return recognised(log, Path("log.csv"))[0]
 
 
+@pytest.mark.slow
 def test_motion_is_moves_only_if_the_bearing_slides() -> None:
     """Motion of 5 um against bristles of 30 um is not that of sliding; against bristles of 0.1 um it is."""
     before, beyond = (shaken(1e-6, bending, top=5) for bending in (STIFFNESS / STATIC, 1e7))
@@ -91,6 +92,7 @@ def test_motion_is_moves_only_if_the_bearing_slides() -> None:
     assert [kind_of(log) for log in logs] == ["presliding", "presliding", "moves"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "bending", "spring"), [(6e-5, 1.0, 0.0), (3e-5, 3e5, 0.2)])
 def test_a_spring_to_ground_is_no_bristles(size: float, bending: float, spring: float) -> None:
     """A force in proportion to 300 um of travel is that of a spring: no bristles of a bearing bend as far.
@@ -103,6 +105,7 @@ def test_a_spring_to_ground_is_no_bristles(size: float, bending: float, spring: 
     assert kind_of(log) == "moves"
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("travel", [2e-5, 2e-4, 5e-4])
 def test_a_body_that_slides_there_and_back_moves(travel: float) -> None:
     """A controller that holds the friction while the body rests makes the force look like the position."""
@@ -114,6 +117,7 @@ def test_a_body_that_slides_there_and_back_moves(travel: float) -> None:
     assert kind_of(record("there and back", DT, position=position, reference=position, force=force)) == "moves"
 
 
+@pytest.mark.slow
 def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:
     log, truth = shaken(), [STIFFNESS, DAMPING, MASS]
     plain = bristles_from_presliding(log)
@@ -129,6 +133,7 @@ def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:
     assert wrong.mass.holds(MASS)
 
 
+@pytest.mark.slow
 def test_a_held_joint_gives_way_in_series() -> None:
     """The measured position is that of a stage behind a contact of 2e6 N/m; the stage's mass acts on the contact."""
     log, beyond, contact = shaken(), 0.5, 2e6
@@ -143,6 +148,7 @@ def test_a_held_joint_gives_way_in_series() -> None:
     assert soft.stiffness.value == pytest.approx(1 / (1 / STIFFNESS + 1 / contact), rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_mode_of_the_structure_is_told_from_the_mass() -> None:
     """A third of the mass on a spring at 150 Hz, its force added in closed form to sines of up to 37.7 Hz: known, and
     not known."""
@@ -158,6 +164,7 @@ def test_a_mode_of_the_structure_is_told_from_the_mass() -> None:
     assert expected.mass.value == pytest.approx(MASS, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_noise_of_the_sensor_and_slow_motion_widen_the_intervals() -> None:
     bristles = bristles_from_presliding(shaken(noise=2e-9))
     assert bristles.stiffness.holds(STIFFNESS)
@@ -168,6 +175,7 @@ def test_noise_of_the_sensor_and_slow_motion_widen_the_intervals() -> None:
     assert slow.mass.half_width > 0.5 * MASS
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -193,6 +201,7 @@ def test_what_has_no_force_or_no_bristles_is_refused() -> None:
         EXPERIMENT.run(friso.load(EXAMPLE).replace({"friction": {"model": "none"}}), 1, silent)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("size", [3e-6, 1e-5, 2e-5])
 def test_a_slow_loop_of_another_law_is_no_mass(size: float) -> None:
     """A stage on springs and sliders has other loops than the bristles of the model.
@@ -213,7 +222,8 @@ def test_a_slow_loop_of_another_law_is_no_mass(size: float) -> None:
     assert bristles.stiffness.holds(1e5) or not bristles.stiffness.determined
 
 
-@pytest.mark.parametrize("strength", [0.3, 2.0])
+@pytest.mark.cases(first=1)
+@pytest.mark.parametrize("strength", [2.0, 0.3])
 def test_a_rig_that_is_shaken_off_its_bristles_shows_none(strength: float) -> None:
     stage = locked_stage(friso.load(EXAMPLE))
     log = rig_log(excite(stage, 0.02, 1, kind=replace(GENTLE, strength=strength)), 0, "x", None, stage, 1).log
@@ -244,6 +254,7 @@ def test_a_slow_current_loop_is_taken_off() -> None:
     assert bristles.mass.holds(1.7)
 
 
+@pytest.mark.slow
 def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness() -> None:
     """If the deflection is measured, the joint need not be held.
 
@@ -293,6 +304,7 @@ def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
     assert np.median(widths) < 0.02
 
 
+@pytest.mark.slow
 def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that() -> None:
     """However much of the sum is viscous friction."""
     viscous = DAMPING / 3
@@ -307,6 +319,7 @@ def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that
         assert "387.7 to 412.7 N*s/m" in damping.reason
 
 
+@pytest.mark.slow
 def test_the_stage_file_takes_bristles_and_masses() -> None:
     machine = built(3)
     stage = locked_stage(machine.truth)

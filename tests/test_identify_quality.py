@@ -95,6 +95,7 @@ def drawn_estimates() -> Iterator[Estimate]:
         yield Estimate("friction.coulomb", "N", *map(float, numbers), "drawn")
 
 
+@pytest.mark.slow
 def test_what_is_determined_has_an_interval_of_some_width_in_numbers_and_in_print() -> None:
     for estimate in drawn_estimates():
         if not estimate.determined:
@@ -411,6 +412,7 @@ def along_the_way(log: Log) -> dict[str, np.ndarray]:
     return {"force": log["force"] + 8 * np.sin(2 * np.pi * log["position"] / 0.15)}
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -430,6 +432,7 @@ def test_the_cause_of_what_is_left_is_found(change: Callable[[Log], dict[str, np
     assert any(cause.spoils for cause in named) or "56 %" not in words
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
     ("change", "name", "truth", "tolerance"),
     [(late, "mass", MASS, 0.01), (averaged, "mass", MASS, 0.02), (along_the_way, "coulomb", COULOMB, 0.1)],
@@ -622,6 +625,7 @@ def test_rests_do_not_count_for_a_stage_that_follows_the_log() -> None:
     assert 0 < problem.noise_left(2.0) < 2.0
 
 
+@pytest.mark.slow
 def test_a_fit_is_no_surer_than_fits_of_simulated_logs_are_off() -> None:
     """A fit with larger residuals than the fits of simulated logs has wider intervals by the same factor.
 
@@ -646,6 +650,7 @@ def test_a_fit_is_no_surer_than_fits_of_simulated_logs_are_off() -> None:
     assert twice == pytest.approx(2 * more)
 
 
+@pytest.mark.slow
 def test_errors_of_rounding_last_as_long_as_a_force_stays() -> None:
     """Friction at two speeds in digits of 4 N looked alike: viscous friction came out at 1.6 N s/m for 20, +- 0.5."""
     digit = 4.0

@@ -118,6 +118,7 @@ def share_inside(response: FrequencyResponse, truth: Response = rig) -> float:
     return float(np.mean((band.magnitude_low <= size) & (size <= band.magnitude_high)))
 
 
+@pytest.mark.slow
 def test_deviations_hold_the_truth_on_95_percent_of_lines() -> None:
     rng, lines = np.random.default_rng(5), np.arange(2, 60)
     inside: list[tuple[float, float]] = []
@@ -365,6 +366,7 @@ def test_mass_lines_of_both_masses() -> None:
     assert lines[0].high < 8.0 < 13.0 < lines[1].low
 
 
+@pytest.mark.slow
 def test_mass_line_intervals_hold_the_mass() -> None:
     rng, held = np.random.default_rng(21), 0
     frequency = np.arange(20.0, 200.0, 2.0)
@@ -376,6 +378,7 @@ def test_mass_line_intervals_hold_the_mass() -> None:
     assert held >= 88
 
 
+@pytest.mark.slow
 def test_straight_lines_by_slope_and_sign() -> None:
     frequency = np.geomspace(0.1, 100, 200)
     s = 2j * np.pi * frequency
@@ -388,6 +391,7 @@ def test_straight_lines_by_slope_and_sign() -> None:
         assert line.sign == (-1.0 if slope == 2 else 1.0)
 
 
+@pytest.mark.slow
 def test_modes_and_their_intervals() -> None:
     rng, held = np.random.default_rng(23), {"resonance": 0, "antiresonance": 0}
     antiresonance = np.sqrt(2400 / 0.5) / (2 * np.pi)
@@ -399,6 +403,7 @@ def test_modes_and_their_intervals() -> None:
     assert min(held.values()) >= 35
 
 
+@pytest.mark.slow
 def test_the_number_of_modes_is_found_and_said() -> None:
     def three(frequency: np.ndarray) -> np.ndarray:
         s = 2j * np.pi * frequency
@@ -415,6 +420,7 @@ def test_the_number_of_modes_is_found_and_said() -> None:
     assert np.abs(fit.predict(ends)) * (2 * np.pi * ends) ** 2 == pytest.approx([0.6, 1.3], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_resonance_that_an_antiresonance_nearly_cancels_is_flagged() -> None:
     def with_pair(zero: float) -> Response:
         def response(frequency: np.ndarray) -> np.ndarray:
@@ -448,6 +454,7 @@ def test_two_mass_intervals_hold_the_truth() -> None:
     assert min(held.values()) >= 53, held
 
 
+@pytest.mark.slow
 def test_two_mass_predicts_another_record_and_signs_are_told() -> None:
     rng, lines = np.random.default_rng(26), np.arange(6, 80)
     first, second = (multisine([played(rng, lambda f, i=i: -rig(f, i), lines, noise=0.01)]) for i in (0, 1))
@@ -475,6 +482,7 @@ def sampled_with_hold(parameters: np.ndarray, frequency: np.ndarray, step: float
     return np.array(states)[:, [0, 2]].T
 
 
+@pytest.mark.cases(first=1, slow=0)
 @pytest.mark.parametrize("both", [False, True])
 def test_masses_from_a_force_that_is_held_for_an_eighth_of_the_fastest_period(both: bool) -> None:
     """Without a hold in the model the masses came out 1.4 to 1.9 % too large, with intervals of 0.4 to 0.8 %."""
@@ -583,6 +591,7 @@ def test_departure_from_the_mass_line() -> None:
     assert "follows the model down" in none.frequency.reason
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(("cart", "lowest"), [("stuck", 2400 / (1 + 2400 / 1e5)), ("sliding", 1.7)])
 def test_limit_cases_are_recognised(cart: str, lowest: float) -> None:
     """The first line is the stiffness to ground, or the whole mass; the last one is the mass of the stage alone."""

@@ -143,6 +143,7 @@ def test_machines_are_drawn_from_intervals_and_from_what_is_left() -> None:
     assert 10 < np.ptp(rows[:, 1]) <= 20.0
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(("left", "doubted", "failed"), [(0.5, False, False), (1.0, True, False), (15.0, True, True)])
 def test_a_record_that_the_whole_model_alone_describes_is_described(left: float, doubted: bool, failed: bool) -> None:
     """A record counts as described if the complete model explains it, even where the inverse model cannot.
@@ -164,6 +165,7 @@ def test_a_record_that_the_whole_model_alone_describes_is_described(left: float,
     assert bool(quality.without) == doubted
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 4.0, 5.0])
 def test_vibration_beyond_the_moves_does_not_hide_the_mass(phase: float) -> None:
     """A loop that shakes on the steps of its encoder: force and position swing at 40 Hz, but not as a mass does."""

@@ -63,6 +63,7 @@ def holds(log: Log, between: Between = THERE, bristles: MassOnBristles = KNOWN) 
     return all(estimate.holds(true) for estimate, true in zip(result.estimates, TRUE, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("coulomb", "stribeck"), [(0.4, 2.5e-3), (1.7, 1.2e-3), (1.2, 0.8e-3)])
 def test_known_friction_is_found(coulomb: float, stribeck: float) -> None:
     log = sliding(coulomb=coulomb, stribeck=stribeck)
@@ -70,6 +71,7 @@ def test_known_friction_is_found(coulomb: float, stribeck: float) -> None:
     assert stribeck_from_slow_sliding(log, THERE, KNOWN).unexplained < 0.01
 
 
+@pytest.mark.slow
 def test_noise_and_doubt_about_bristles_viscous_friction_and_delay_are_in_the_intervals() -> None:
     log = sliding()
     assert holds(log)
@@ -84,6 +86,7 @@ def test_noise_and_doubt_about_bristles_viscous_friction_and_delay_are_in_the_in
     assert holds(late, replace(THERE, delay=0.8 * DT))
 
 
+@pytest.mark.slow
 def test_strained_bristles_at_the_start_and_another_exponent_do_not_matter() -> None:
     for start in (-1.5e-5, 1e-5):
         assert values(sliding(start=start)) == pytest.approx(TRUE, rel=0.02)
@@ -92,6 +95,7 @@ def test_strained_bristles_at_the_start_and_another_exponent_do_not_matter() -> 
     assert not holds(log)
 
 
+@pytest.mark.slow
 def test_a_stage_with_a_mode_is_what_its_two_masses_do() -> None:
     """The reference is the steady vibration of two masses on a spring at the frequency of the free pair."""
     stage = friso.load(EXAMPLE)
@@ -199,6 +203,7 @@ def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig
         assert stribeck.holds(flat["friction.stribeck_velocity"])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("one_place")
 def test_the_stage_file_takes_it_with_what_presliding_shows() -> None:
     from friso_thesis.studies.rig.experiments.presliding import presliding_log

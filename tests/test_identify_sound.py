@@ -24,6 +24,7 @@ LIGHT = {
 }  # fmt: skip
 
 
+@pytest.mark.cases(slow=1)
 @pytest.mark.parametrize(
     ("machine", "digit"), [(HEAVY, 0.0), (HEAVY, 1e-6), (LIGHT, 5e-6), (LIGHT, 1e-5)], ids=["0", "1um", "5um", "10um"]
 )
@@ -40,8 +41,9 @@ def test_a_sound_log_raises_no_doubt(machine: dict[str, float], digit: float) ->
     assert all(estimate.holds(machine[KEYS[estimate.name]]) for estimate in reported)
 
 
-@pytest.mark.parametrize("seed", [3, 4])
-@pytest.mark.parametrize("falls", [0.0, 1.0])
+@pytest.mark.cases(slow=1)
+@pytest.mark.parametrize("seed", [4, 3])
+@pytest.mark.parametrize("falls", [1.0, 0.0])
 def test_bristles_are_refused_if_their_damping_falls_with_the_speed(seed: int, falls: float) -> None:
     """They would come out too stiff; with constant damping, as in the model, they are told."""
     rng = np.random.default_rng((seed, 56))
@@ -53,6 +55,7 @@ def test_bristles_are_refused_if_their_damping_falls_with_the_speed(seed: int, f
     assert stiffness.reason == decaying_damping.WHY if falls else stiffness.holds(machine["bristle"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [-0.15, 0.12])
 def test_friction_that_differs_by_direction_is_no_constant_force(share: float) -> None:
     """A fit takes the difference for a constant force, whose interval must hold the truth: nothing."""
@@ -66,6 +69,7 @@ def test_friction_that_differs_by_direction_is_no_constant_force(share: float) -
     assert force.holds(0.0)
 
 
+@pytest.mark.thorough
 def test_a_constant_force_hides_no_effect() -> None:
     """Cogging of an eighth of Coulomb friction shows, though the axis carries 120 times as much."""
     rng = np.random.default_rng((1, 56))

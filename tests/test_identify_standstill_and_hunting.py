@@ -66,6 +66,7 @@ def test_a_log_without_cycles_is_refused() -> None:
         swings_of(made("rests", np.linspace(1e-4, 0.0, 5000)))
 
 
+@pytest.mark.slow
 def test_the_simulated_rig_hunts_as_predicted(tmp_path: Path) -> None:
     """Through the command's function, the stage given: measured over predicted is one."""
     stage = friso.load(friso.example("thesis_rig")).replace({"joint.locked": True})

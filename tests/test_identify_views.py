@@ -216,6 +216,7 @@ def constant() -> tuple[Any, Log]:
     return FrictionAtSpeeds(friction_velocity(log), friction_position(log)), log
 
 
+@pytest.mark.slow
 def test_where_passes_do_not_repeat_nothing_is_said_of_the_rail() -> None:
     """White noise of the force sensor is no friction along the rail."""
     result, log = constant()
@@ -330,6 +331,7 @@ def test_units_as_prefixes_know_them() -> None:
         assert unit_of(unit) == prefixed
 
 
+@pytest.mark.slow
 @given(st.floats(1e-7, 1e7), st.floats(1e-5, 0.9), st.sampled_from(["kg", "N", "m", "N s/m", "Hz"]), st.booleans())
 @settings(max_examples=150)
 def test_rounding_hides_less_than_a_twentieth_of_half_the_interval(
@@ -551,6 +553,7 @@ def test_the_intervals_are_those_of_the_estimates(case: Case, figures: list[Figu
 UNITS = {"Position": "m", "Deflection": "m", "Force": "N", "Friction": "N", "Force left": "N"}
 
 
+@pytest.mark.slow
 def test_every_figure_can_be_drawn_and_its_axes_have_their_units(figures: list[Figure]) -> None:
     for figure in figures:
         assert f'id="figure-{figure.name}"' in plotly_renderer.fragment(figure)

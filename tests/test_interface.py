@@ -22,7 +22,7 @@ from friso.axis import unit_of_key
 from friso.cli.app import command_line
 from friso.interface.answer import Answer
 from friso.interface.question import TOPICS
-from friso.stage.stage import Stage
+from friso.stage import Stage
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 STICK_SLIP, LEAVES = EXAMPLES / "lugre_stick_slip.toml", EXAMPLES / "thesis_leaves.toml"
@@ -46,6 +46,7 @@ def function_of(command: str) -> Any:
     return getattr(friso, FUNCTIONS.get(command, command))
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("command", [name for name in commands() if name != "app"])  # which answers in a browser
 def test_a_command_has_a_function_and_its_options_are_keywords(command: str) -> None:
     keywords = {name.strip("_") for name in inspect.signature(function_of(command)).parameters}
@@ -60,6 +61,7 @@ def test_dir_is_the_public_list() -> None:
     assert [name for name in dir(friso) if inspect.ismodule(getattr(friso, name))] == []
 
 
+@pytest.mark.cases(first=8)
 @pytest.mark.parametrize("name", [name for name in dir(friso) if callable(getattr(friso, name))])
 def test_a_public_name_is_documented_with_an_example_that_runs(name: str) -> None:
     """Examples that take long are skipped, but have to be there."""
@@ -77,6 +79,7 @@ def imported(code: str, *modules: str) -> str:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 
 
+@pytest.mark.slow
 def test_importing_friso_imports_neither_arrays_nor_units() -> None:
     """Views that quote a word or a limit import the interface of friso.hunting."""
     assert imported("import friso", "numpy", "pydantic", "pint", "xarray", "sympy") == "[]"
@@ -93,6 +96,7 @@ def test_the_help_imports_no_stage_and_lists_every_command_once() -> None:
     assert "..." not in text.partition("Does it hunt?")[2]
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("name", [*commands()])
 def test_what_a_command_does_is_said_in_one_line(name: str) -> None:
     """The list of commands shows the first line of the help."""
@@ -139,7 +143,8 @@ def test_an_answer_is_drawn_on_axes_given_or_made(response: Answer) -> None:
     pyplot.close("all")
 
 
-@pytest.mark.parametrize(("command", "path"), [("simulate", STICK_SLIP), ("flexure", LEAVES)])
+@pytest.mark.cases(first=1)
+@pytest.mark.parametrize(("command", "path"), [("flexure", LEAVES), ("simulate", STICK_SLIP)])
 def test_an_answer_as_a_dictionary_is_the_document(command: str, path: Path, tmp_path: Path) -> None:
     document = json.loads(friso_inside(tmp_path, command, path, "--json").stdout)
     answer = function_of(command)(path)

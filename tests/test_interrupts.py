@@ -34,6 +34,7 @@ RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 COMMAND = [sys.executable, "-X", "importtime", "-m", "friso", "bode", str(RIG)]
 
 
+@pytest.mark.cases(first=1, slow=1)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_signal_while_friso_starts_is_one_line(tmp_path: Path, seed: int) -> None:
     """After a random one of the modules that are imported."""
@@ -104,6 +105,7 @@ _TERMINATION = "import signal; signal.raise_signal(signal.SIGTERM)"
 HALF_THERE = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhole = True\n"
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("then", ["wait", "whole", "file"])
 def test_ctrl_c_during_an_import(then: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The import ends first, and what must be whole after it; files that would be put in place after it are not."""
@@ -174,6 +176,7 @@ with interrupts.raising():
 CLOSED, FULL = "os.close(2)", "end, full = os.pipe(); os.dup2(full, 2); os.write(2, bytes(2**16))"
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
     "way",
     ["import endless", "pbkdf2_hmac('sha256', b'', b'', 2 * 10**9)", "swallow()", "write()"]
@@ -203,6 +206,7 @@ def test_a_signal_that_is_ignored_is_so_where_others_wait() -> None:
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.slow
 def test_a_command_that_answers_an_interrupt_has_the_time_for_it(tmp_path: Path) -> None:
     program = [sys.executable, "-c", STUCK.replace("WAY", "answer()")]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT)
@@ -369,6 +373,7 @@ def _answers(address: str) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signals", [[signal.SIGHUP], [signal.SIGINT, signal.SIGINT]])
 def test_the_app_ends_in_one_line(signals: list[signal.Signals]) -> None:
     """The app also does so if the terminal is closed, and if an impatient user presses Ctrl-C again."""

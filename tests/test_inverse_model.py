@@ -40,6 +40,7 @@ def values(log: Log, bandwidth: float | None = 10.0, by_direction: bool = False)
     return {estimate.name: estimate.value for estimate in inverse_model(log, bandwidth, by_direction).estimates}
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(SIZES, SIZES, SIZES, st.floats(-1.0, 1.0))
 def test_without_noise_all_is_found(mass: float, viscous: float, coulomb: float, offset: float) -> None:
@@ -133,6 +134,7 @@ def test_the_bandwidth_holds_95_percent_of_the_accelerations_power(share: float,
     )
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth() -> None:
     """Force with correlated errors: of 60 records about 95 % of the intervals hold mass and viscous friction."""
     rng, log, held = np.random.default_rng(5), swinging(2.0, 5.0, 0.0, 0.0), np.zeros(2)
@@ -189,6 +191,7 @@ PER_DIRECTION = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("by_direction", "published", "error"), [(False, PUBLISHED, 4.0834), (True, PER_DIRECTION, 3.1117)]
 )
@@ -200,6 +203,7 @@ def test_emps(emps: Log, by_direction: bool, published: dict[str, tuple[float, f
     assert 100 * model.error <= error + 5e-5
 
 
+@pytest.mark.slow
 def test_emps_by_its_own_bandwidth(emps: Log) -> None:
     """Near the published one, 20 Hz, and so are the values."""
     model = inverse_model(emps)

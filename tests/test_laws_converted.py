@@ -17,8 +17,7 @@ from friso.equations.friction.gms import STIFFNESS
 from friso.errors import InputError
 from friso.frequency.members import steady_force
 from friso.identification.readings.common import stribeck_curve
-from friso.stage import Stage
-from friso.stage.lists import element_keys
+from friso.stage import Stage, element_keys
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import (
     compared,
@@ -72,6 +71,7 @@ def _keys(friction: Any, rates: list[Any]) -> set[Any]:
     return set().union(*(expression.free_symbols for expression in expressions))
 
 
+@pytest.mark.cases(first=1, slow=3)
 @pytest.mark.parametrize("friction", STICKING)
 def test_virgin_curves_are_those_of_the_declared_equations(friction: str) -> None:
     """The force over displacement from rest that a law says is measured of it, against its declaration by SciPy."""
@@ -96,7 +96,8 @@ def test_the_curve_of_readings_is_that_of_the_laws() -> None:
     assert stribeck_curve(speeds, *levels) == pytest.approx(dry, rel=1e-12)
 
 
-@pytest.mark.parametrize("law", ["gms", "elasto_plastic", "rolling"])
+@pytest.mark.cases(first=1)
+@pytest.mark.parametrize("law", ["rolling", "elasto_plastic", "gms"])
 def test_a_conversion_there_and_back(law: str) -> None:
     """LuGre's keys come back through any law that keeps them, with what a measurement shows."""
     conversion, flat = convert(LUGRE, law), LUGRE.flat()
@@ -111,6 +112,7 @@ def test_a_conversion_there_and_back(law: str) -> None:
     assert {key: back[key] for key in friction} == pytest.approx(friction, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_what_a_law_cannot_keep_is_said() -> None:
     lost = {law: [item.kind for item in convert(LUGRE, law).lost] for law in ("dahl", "stribeck")}
     assert {"static", "curve", "virgin"} <= {*lost["dahl"]}
@@ -136,6 +138,7 @@ def test_a_loop_of_dahl_is_that_of_its_solution() -> None:
     assert "loop area" in {item.kind for item in convert(LUGRE, "gms").lost}
 
 
+@pytest.mark.slow
 def test_passive_laws_are_not_warned_of() -> None:
     passive = LUGRE.replace({"friction.viscous": "640 N*s/m"})
     assert not convert(passive, "elasto_plastic").active

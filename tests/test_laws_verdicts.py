@@ -1,7 +1,6 @@
 """The verdict across friction laws: which are tried, whether it depends on the law, and what would decide."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +11,6 @@ from variants import VARIANTS, gains, lugre, release, stage
 
 from friso.hunting import AttractionEnd, BandwidthWindow
 from friso.questions.check.laws import laws_document, laws_rows, laws_sentences
-from friso.shown.drawing.prefixes import NOTHING
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert
 from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, verdicts_by_law
@@ -54,6 +52,7 @@ def across(*verdicts: LawVerdict) -> VerdictsByLaw:
 FAST, SLOW, LOST = ("hunts", 9.7), ("settles", 6.0), ("settles", None, True, True, ("other bandwidths",))
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
     ("lugre", "other", "verdicts", "hunts", "words"),
     [
@@ -89,6 +88,7 @@ def test_what_laws_say_together(lugre: Any, other: str, verdicts: list[Any], hun
     assert laws.depends_on_law("given") == ("depends on the friction law" in laws_sentences(laws)[0])
 
 
+@pytest.mark.slow
 def test_what_decides_between_laws() -> None:
     """The measurement that separates the fewer laws from the others, or what is open in the law that is not certain."""
     rolling = under("rolling", ("settles", 6.0), ("settles", 6.1))
@@ -125,20 +125,6 @@ def test_hunting_beyond_the_edge_is_told_under_any_law() -> None:
     assert "edge 9.10 to 9.70 Hz, and hunting again from 19.6 Hz" in laws_sentences(laws)[0]
 
 
-@pytest.mark.parametrize(
-    ("verdicts", "edge"),
-    [
-        ([("hunts", 9.1), ("hunts", 10.4)], "9.10 to 10.4 Hz"),
-        ([("failed", None)], "not determined"),
-        ([("settles", None)], NOTHING),
-        ([LOST], "not determined"),
-        ([("settles", 7.0, True, False)], "7.00 to 9.33 Hz (not certain)"),
-    ],
-)
-def test_edges_of_a_law(verdicts: list[Any], edge: str) -> None:
-    assert dict(laws_rows(across(under("gms", *verdicts))))["As given: edge"] == [edge]
-
-
 @pytest.mark.parametrize("verdict", [("settles", 6.0, False), ("hunts", 6.0, False), ("failed", None)])
 def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple) -> None:
     laws = across(under("lugre", ("settles", 6.0)), under("rolling", ("settles", 6.1)), under("gms", verdict))
@@ -163,32 +149,11 @@ def test_no_law_says_that_a_stage_does_not_hunt_whose_reference_keeps_moving() -
     assert dict(laws_rows(laws))["As given: verdict"] == ["sticks and slips", "slides smoothly"]
 
 
-def test_no_law_that_gives_one_answer() -> None:
-    """The text says nothing of the stage before the first law; values that differ are printed differently."""
-    gms = under("gms", ("hunts", 9.1), ("settles", 7.0))
-    (key,), trials = gms.conversion.open, gms.trials
-    close = tuple(replace(trial, drawn={key: value}) for trial, value in zip(trials, (1.0, 1.0004), strict=True))
-    said = laws_sentences(across(replace(gms, trials=close)))[0]
-    assert "hunts with attraction 1.0000 N/s and settles with attraction 1.0004 N/s" in said
-
-
-def test_edges_as_factors_that_look_the_same_are_one_number() -> None:
-    laws = across(under("lugre", ("settles", 8.0)), under("gms", ("settles", 8.001), ("settles", 8.08)))
-    for trial in (trial for verdict in laws.verdicts for trial in verdict.trials):
-        trial.cases["given"].judgement.margin.crossover = None
-    to_a_share = across(under("lugre", ("settles", 6.0)))
-    to_a_share.verdicts[0].trials[0].cases["given"].judgement.margin.reserve = 0.01
-    assert dict(laws_rows(to_a_share))["As given: edge"] == ["5.94 to 6.06 Hz"]
-    gains = replace(laws, stage=PD)
-    assert dict(laws_rows(gains))["As given: edge"] == ["at 2 times the bandwidth", "at 2 to 2.02 times the bandwidth"]
-    several = replace(gains.verdicts[1], trials=gains.verdicts[1].trials[:1])
-    assert "edge at 2 times the bandwidth." in laws_sentences(replace(gains, verdicts=(laws.verdicts[0], several)))[0]
-
-
 OTHERS = ("dwell", "elasto_plastic", "gms", "load_dependent", "rolling")
 """Laws that keep what is measured under LuGre."""
 
 
+@pytest.mark.slow
 def test_nothing_hunts_without_an_integrator() -> None:
     laws = verdicts_by_law(PD)
     assert [verdict.law for verdict in laws.verdicts] == ["lugre", *OTHERS]
@@ -200,6 +165,7 @@ def test_nothing_hunts_without_an_integrator() -> None:
     assert laws.verdicts[0].conversion.stage == PD
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path) -> None:
     file = tmp_path / "pd.toml"
     file.write_text(PD.to_toml())

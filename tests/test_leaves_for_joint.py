@@ -36,6 +36,7 @@ def joint(stiffness: str, stroke: str) -> Stage:
     return RIG.replace({"joint.stiffness": stiffness, "joint.stroke": stroke})
 
 
+@pytest.mark.cases(slow=3)
 @pytest.mark.parametrize(
     ("stiffness", "stroke"),
     [("515 N/m", "2.97 mm"), ("2.4 kN/m", "1 mm"), ("20 kN/m", "0.1 mm"), ("0.3 kN/m", "3 mm"), ("4 kN/m", "0.3 mm")],
@@ -94,6 +95,7 @@ def test_a_coulomb_friction_close_to_a_static_one_that_is_known_well_is_outlined
     assert (friction.coulomb.low, friction.coulomb.high) == pytest.approx((0.7 * 2.8, 1.05 * 3))
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("load", [-200.0, 20.0])
 def test_other_leaves_guide_and_carry_what_those_of_the_file_do(load: float) -> None:
     carried = {"flexure.sensor_x": "110 mm", "flexure.inertia_y": "1 g*m^2", "flexure.load": f"{load} N"}
@@ -115,6 +117,7 @@ def tuning() -> Advice:
     return tune(rigid, Goal(controller=False), budget=budget, chosen=["isolator"])
 
 
+@pytest.mark.thorough
 def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) -> None:
     isolator, made = tuning.outcomes
     assert tuning.working == (isolator,)
@@ -137,6 +140,7 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
     ]
 
 
+@pytest.mark.thorough
 def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(tuning: Advice) -> None:
     """The mode of the present joint is named if the file states it as a number, not if the file has leaf springs."""
 
@@ -148,6 +152,7 @@ def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(tuning: Advic
     assert [replaced(stage) for stage in (tuning.stage, RIG, LEAVES)] == [False, True, False]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("why", get_args(Unmade))
 def test_why_no_leaves_were_sized_is_said(tuning: Advice, why: Unmade) -> None:
     (isolator, _) = tuning.outcomes
@@ -156,6 +161,7 @@ def test_why_no_leaves_were_sized_is_said(tuning: Advice, why: Unmade) -> None:
     assert UNMADE[why] in sentence
 
 
+@pytest.mark.thorough
 def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) -> None:
     isolator, made = tuning.outcomes
     doubted = replace(tuning, outcomes=(isolator, replace(made, doubts=("distance",))))
@@ -167,6 +173,7 @@ def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) ->
     assert TuneAnswer(doubted).next_steps(paths) == ["friso design tuned/tuned-isolator.toml"]
 
 
+@pytest.mark.thorough
 def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
     """The least change comes first in the answer."""
     (isolator, _), tried = tuning.outcomes, []

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from benchmarks.log_variants import ASKS, MISREAD, REFUSED, RIGHT, table
+
+pytestmark = pytest.mark.slow
 
 
 def test_no_variant_of_a_record_is_misread(tmp_path: Path) -> None:

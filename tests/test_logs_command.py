@@ -56,6 +56,7 @@ def test_the_course_of_a_channel(tmp_path: Path) -> None:
     assert sparkline(np.array([1.0, np.nan, 1.0])) == "▁ ▁"
 
 
+@pytest.mark.slow
 def test_what_is_open_and_the_command_for_it(bare: Path) -> None:
     content = log_content(bare, Mapping())
     assert {gap.key for gap in content.gaps} == {"position", "force", "time"}
@@ -106,6 +107,7 @@ def test_a_frequency_response(tmp_path: Path) -> None:
     assert content.response.frequency.size == 100
 
 
+@pytest.mark.slow
 def test_the_command(bare: Path, tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "logs", "bare.csv", "--out", "out")
     assert done.returncode == 0
@@ -161,6 +163,7 @@ def test_the_only_channel_of_times_that_rises_is_the_clock(tmp_path: Path) -> No
         assert (content.channels[0].role == "time") == (sign > 0)
 
 
+@pytest.mark.slow
 def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
     """A reference is not suggested as a force, rpm not as a position, a counter not as a clock.
 

@@ -36,6 +36,7 @@ def seen(time: np.ndarray, values: np.ndarray, rng: np.random.Generator, noise: 
     return exact + noise * np.std(exact) * rng.normal(size=time.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", [("position", "position"), ("position", "velocity"), ("velocity", "position")])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
 def test_intervals_hold_over_twins_drawn_at_random(kinds: tuple[str, str], noise: float) -> None:

@@ -74,6 +74,7 @@ def written(folder: Path, names: list[str], *columns: np.ndarray) -> Path:
     return log_files.write_text(folder / f"{len([*folder.iterdir()])}.csv", names, columns)
 
 
+@pytest.mark.slow
 def test_force_and_velocity_without_a_unit(tmp_path: Path) -> None:
     """The one of two columns that is the derivative of nothing is no position; the copied line reads the log."""
     log = steps()
@@ -87,6 +88,7 @@ def test_force_and_velocity_without_a_unit(tmp_path: Path) -> None:
     assert '--scale force="-1 N/N"' in options(against)
 
 
+@pytest.mark.slow
 def test_a_ramp_of_whole_numbers_counts(tmp_path: Path) -> None:
     log = steps()
     count = np.arange(len(log["time"]))
@@ -96,6 +98,7 @@ def test_a_ramp_of_whole_numbers_counts(tmp_path: Path) -> None:
         read_all([path], Mapping(), tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (2, 3, 1, 0), (3, 2, 0, 1)])
 def test_no_role_follows_from_the_place_of_a_column(order: tuple[int, ...], tmp_path: Path) -> None:
     """A time that jitters is no position, and the column that leads is the reference."""
@@ -109,6 +112,7 @@ def test_no_role_follows_from_the_place_of_a_column(order: tuple[int, ...], tmp_
     assert f'"{names[1]}" goes ahead of "{names[2]}"' in str(log_content(path, Mapping()).gaps[0])
 
 
+@pytest.mark.slow
 def test_rpm_and_amperes(tmp_path: Path) -> None:
     """A reference speed is not taken for a position, and all open questions are asked at once."""
     log = steps()
@@ -119,6 +123,7 @@ def test_rpm_and_amperes(tmp_path: Path) -> None:
     assert file.source["velocity"].max() == pytest.approx(np.pi / 30 * rpm.max())  # pyright: ignore
 
 
+@pytest.mark.slow
 def test_a_position_comes_before_its_own_derivative(tmp_path: Path) -> None:
     """The velocity explains the force better, but the position holds the micrometres in which bristles bend."""
     log = servo()
@@ -127,6 +132,7 @@ def test_a_position_comes_before_its_own_derivative(tmp_path: Path) -> None:
     assert {"--map position=x", "--map force=u"} <= {*options(path)}
 
 
+@pytest.mark.slow
 def test_names_of_torques_tell_a_rotary_axis_where_the_motion_has_no_unit(tmp_path: Path) -> None:
     log = steps()
     columns = [log["time"], log["velocity"], log["force"]]
@@ -135,6 +141,7 @@ def test_names_of_torques_tell_a_rotary_axis_where_the_motion_has_no_unit(tmp_pa
     assert "--axis rotary" not in options(written(tmp_path, ["time", "speed [mm/s]", "torque"], *columns))
 
 
+@pytest.mark.slow
 def test_logs_with_the_same_channels_are_asked_once(tmp_path: Path) -> None:
     """A log that hardly moves would have the force for the position: most decide."""
     log, names = steps(), ["t", "u", "v"]
@@ -190,6 +197,7 @@ def test_two_readings_are_asked(tmp_path: Path) -> None:
         read_all([path], from_options(["position=x", "velocity=x"]), tmp_path)
 
 
+@pytest.mark.slow
 def test_a_bad_stamp_costs_its_file_alone(tmp_path: Path) -> None:
     log, paths = servo(), []
     for number in range(3):

@@ -1,6 +1,6 @@
 """From a file to a log: roles, units, scales, one time base, and which files are refused or commented on."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import refused
 from scipy.io import savemat
 
 import friso
-from friso.errors import InputError, LogError
+from friso.errors import InputError
 from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import (
@@ -53,6 +52,7 @@ def is_among(lines: Sequence[str], text: str) -> bool:
     return any(text in line for line in lines)
 
 
+@pytest.mark.slow
 def test_a_log_in_si_units(tmp_path: Path) -> None:
     log = log_of(tmp_path, NAMES, columns())
     assert log.name == "a"
@@ -97,48 +97,11 @@ def changed(column: int, values: np.ndarray) -> list[np.ndarray]:
     return [values if number == column else usual for number, usual in enumerate(columns())]
 
 
-STEPPED_BACK = np.where(np.arange(2000) < 900, M["time"], M["time"] - 0.3)
-HOLED = np.where((np.arange(2000) >= 100) & (np.arange(2000) < 1400), np.nan, M["force"])
-DAMAGED = np.where(np.arange(2000) == 77, 1e200, 1e3 * M["position"])
 SLOW_TIME = 4.0 * np.arange(500)
 TWO_CLOCKS = [1e3 * M["time"], 1e3 * M["position"], SLOW_TIME, np.cos(SLOW_TIME)]
 
 
-@pytest.mark.parametrize(
-    ("names", "values", "options", "words"),
-    [
-        (["time [s]", "enc1 [mm]", "enc2 [mm]", "force [N]"], columns(), {}, "--map position=enc1"),
-        ([*NAMES[:3], "force a [N]", "force b [N]"], [*columns(), M["force"]], {}, '--map force="force a"'),
-        (["time [s]", "a [mm]", "b [mm]", "force [N]"], columns(), {}, "--map position=a"),
-        (["t1", "position [mm]", "t2", "force [N]"], TWO_CLOCKS, {}, "--map time=t1"),
-        (NAMES, columns(), {"maps": ["position=postion"]}, '--map position="position"'),
-        (NAMES, columns(), {"maps": ["cart_position=gone"]}, '"gone"'),
-        (NAMES, columns(), {"units": ["gone=mm"]}, '"gone"'),
-        (NAMES, columns(), {"scales": ["acceleration=9.81 m/s^2/V"]}, "a scale for acceleration"),
-        (["Zeit [s]", "Istposition [mm]", "F [N]"], columns()[:3], {"maps": ["position=IstPos"]}, '="Istposition"'),
-        (["time [s]", "position", *NAMES[2:]], columns(), {}, "runs from -59.96 to 59.95"),
-        (["time [s]", "position", *NAMES[2:]], columns(), {}, "--unit position=mm"),
-        (["time", *NAMES[1:]], columns(), {}, "--unit time=s"),
-        ([*NAMES[:3], "current [mA]"], columns(), {}, '--scale force="35.1507 N/A"'),
-        (NAMES[1:], columns()[1:], {}, "--dt"),
-        (NAMES, changed(0, np.round(M["time"], 2)), {}, "--dt"),
-        (NAMES, changed(0, STEPPED_BACK), {}, "decreases, from 0.899 s to 0.6 s at sample 901"),
-        (NAMES, changed(1, np.full(2000, 3.0)), {}, "position\n  given:    a constant signal, 0.003"),
-        (NAMES, changed(3, np.full(2000, 3.0)), {}, "constant signal, 3.0"),
-        (NAMES, changed(1, DAMAGED), {}, "values up to 1e+197 m"),
-        (NAMES, changed(3, HOLED), {}, "1300 of 2000"),
-        (NAMES, [column[:30] for column in columns()], {}, "30 samples"),
-    ],
-)
-def test_what_a_log_lacks_is_refused_with_its_remedy(
-    tmp_path: Path, names: list[str], values: list[np.ndarray], options: dict, words: str
-) -> None:
-    with refused() as caught:
-        log_of(tmp_path, names, values, from_options(**options))
-    assert words in str(caught.value)
-    assert str(tmp_path / "a.csv") in str(caught.value)
-
-
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("first", "others"),
     [("force", ["force_p", "force_i", "friction_force"]), ("Force", ["Force_d"]), ("iq", ["iq filtered"])],
@@ -179,6 +142,7 @@ def test_everything_that_is_open_is_told_at_once(tmp_path: Path) -> None:
     assert not open_questions(tmp_path, NAMES[:3], columns()[:3], "position", "force").options
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(
     ("wanted", "measured", "force", "scale"), [("qg", "qm", "vir", "N/V"), ("xd", "xm", "iq", "N/A")]
@@ -209,13 +173,6 @@ def test_of_two_channels_that_are_the_same_none_is_the_position(tmp_path: Path) 
     assert "--map position=x" in error.options
 
 
-def test_time_is_never_proposed_for_another_role(tmp_path: Path) -> None:
-    path = log_files.write_text(tmp_path / "a.csv", ["t [s]", "pos [mm]"], columns()[:2])
-    with pytest.raises(LogError, match="channels for position and force") as caught:
-        read_log(path, needed=("position", "force"))
-    assert not caught.value.example
-
-
 @pytest.mark.parametrize(
     ("names", "chosen", "options"),
     [
@@ -231,6 +188,7 @@ def test_a_torque_is_no_time_whatever_its_letter(
     assert log["force"] == pytest.approx(M["force"])
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
     "names",
     [
@@ -247,6 +205,7 @@ def test_a_unit_tells_the_role_of_the_only_channel_that_has_it(tmp_path: Path, n
     assert [gap.key for gap in error.gaps] == ["position"]
 
 
+@pytest.mark.slow
 def test_units_and_scales_of_options(tmp_path: Path) -> None:
     """Units that are not those of the role are kept where that is allowed."""
     names = ["time [s]", "position", "velocity [mm/s]", "current [mA]"]
@@ -254,6 +213,8 @@ def test_units_and_scales_of_options(tmp_path: Path) -> None:
     log = log_of(tmp_path, names, columns(), mapping)
     assert log["position"] == pytest.approx(M["position"])
     assert log["force"] == pytest.approx(M["force"] * 12e-3)
+    with pytest.raises(InputError, match="--scale force"):
+        log_of(tmp_path, [*NAMES[:3], "current [mA]"], columns())
     log = log_of(tmp_path, [*NAMES[:3], "current [mA]"], columns(), strict=False)
     assert log.unit("force") == "A"
     assert log["force"] == pytest.approx(M["force"] * 1e-3)
@@ -307,6 +268,7 @@ def test_unit_spellings(text: str, si: str, factor: float) -> None:
         assert unit_factor(large, "m") is unit_factor(large, "s") is unit_factor(large, "rad") is None
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.integers(8, 24), st.integers(0, 2**24), st.integers(1, 20))
 def test_a_counter_that_overflows_is_unwrapped(bits: int, start: int, turns: int) -> None:
@@ -412,6 +374,7 @@ def test_jitter_is_interpolated_and_told(tmp_path: Path) -> None:
     assert log.sample_time == pytest.approx(period, rel=1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(
     st.floats(3, 40) | st.floats(1.4, 3),
@@ -473,6 +436,7 @@ def test_values_that_are_held_or_interpolated_are_told(tmp_path: Path) -> None:
     assert is_among(log_of(tmp_path, NAMES, changed(3, slower)).warnings, "straight lines of 4 samples")
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("velocity", "words"),
     [
@@ -540,9 +504,6 @@ def test_channels_of_different_rates(tmp_path: Path) -> None:
     assert is_among(log.warnings, "sampled at 4000 Hz and read at 1000 Hz")
 
 
-UNTIL_1 = 1e-3 * np.arange(100)
-
-
 @settings(max_examples=30)
 @given(
     st.lists(st.integers(20, 100), min_size=1, max_size=4),
@@ -586,6 +547,7 @@ def test_mapping_is_kept_and_overridden(tmp_path: Path) -> None:
     assert second.scales == first.scales
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(
     st.dictionaries(st.sampled_from(list(ROLES)), st.text(st.characters(codec="utf-8"), min_size=1)),
@@ -628,46 +590,6 @@ def test_what_is_said_now_silences_what_was_kept() -> None:
     assert (beside.roles, beside.scales, beside.sample_time) == ({"force": "u"}, {"force": "25 N/A"}, None)
 
 
-@pytest.mark.parametrize(
-    ("text", "key"),
-    [
-        ("rubbish", ""),
-        ("[roles]\nstage = 'x'\n", "roles"),
-        ("[roles]\nposition = 3\n", "roles.position"),
-        ("nonsense = 1\n", "nonsense"),
-        ("sample_time = 1\n", ""),
-    ],
-)
-def test_a_broken_mapping(tmp_path: Path, text: str, key: str) -> None:
-    (tmp_path / "a.csv.friso.toml").write_text(text)
-    with refused(key):
-        mappings.load_mapping(tmp_path / "a.csv")
-
-
-@pytest.mark.parametrize(
-    ("call", "key"),
-    [
-        (lambda: from_options(["position"]), "--map"),
-        (lambda: from_options(["position="]), "--map"),
-        (lambda: from_options(["place=x"]), "--map"),
-        (lambda: from_options(units=["x"]), "--unit"),
-        (lambda: from_options(scales=["time=3 s/V"]), "--scale"),
-        (lambda: from_options(dt="1"), ""),
-        (lambda: from_options(dt="-1 ms"), ""),
-        (lambda: read_scale("force", "35", ""), "scale"),
-        (lambda: read_scale("force", "35 N", "V"), "scale"),
-        (lambda: read_scale("force", "35 m/V", "V"), "scale"),
-        (lambda: read_scale("force", "3 N/V", "A"), "scale"),
-        (lambda: read_scale("force", "x N/V", "V"), "scale"),
-        (lambda: read_scale("force", "24 N/A", "N"), "scale"),
-        (lambda: resample_tracks({"a": track("a", UNTIL_1, UNTIL_1), "b": track("b", UNTIL_1 + 5, UNTIL_1)}), "log"),
-    ],
-)
-def test_wrong_options_and_scales(call: Callable[[], object], key: str) -> None:
-    with refused(key):
-        call()
-
-
 def test_the_unit_of_a_time_column_can_be_told(tmp_path: Path) -> None:
     """Also over what the file says."""
     for first in ("time", "time [s]"):
@@ -697,6 +619,7 @@ def test_emps() -> None:
     assert [line.split(":")[0] for line in log.warnings] == ["time", "reference", "position"]  # without units
 
 
+@pytest.mark.slow
 def test_ku_leuven() -> None:
     path = record("kuleuven_lsb250/exp1.mat")
     with pytest.raises(InputError, match='"enc1" and "enc2"'):
@@ -707,6 +630,7 @@ def test_ku_leuven() -> None:
     assert np.abs(log["force"]).max() == pytest.approx(0.5, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_tokyo_bench() -> None:
     path = record("utokyo_motorbench/MultisineTypeA.mat")
     options = from_options(["position=theta_mx", "force=iq_adx"], ["theta_mx=rad", "iq_adx=A"])

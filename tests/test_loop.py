@@ -1,7 +1,6 @@
 """Whether a loop is stable, friction aside, against the criterion of Hurwitz."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ import friso
 from friso.equations.bandwidth import faster
 from friso.hunting import AttractionEnd, BandwidthWindow, Ensemble, loops_unstable, unstable
 from friso.hunting.loop import at_lower_gains
-from friso.hunting.margin import search_bandwidths, unstable_bandwidths
-from friso.hunting.settings import CheckSettings, EdgeSettings
+from friso.hunting.margin import unstable_bandwidths
 from friso.stage import Stage
 
 
@@ -39,7 +37,6 @@ def test_a_loop_without_proportional_gain_is_looked_at() -> None:
     assert unstable(VARIANTS["rigid stage, PI"].replace({"controller.kp": "0 N/m"})) == ()
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize(("share", "always"), [(0.98, "stable"), (1.02, "unstable")])
 def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None:
     """m s^3 + sigma_2 s^2 + N kp s + N ki has its roots on the left at all gains N where m ki < sigma_2 kp."""
@@ -50,21 +47,6 @@ def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None
     assert loop_at_lower_gains(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == always
 
 
-@pytest.mark.inner
-def test_many_loops_are_looked_at_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All loops at once took 0.1 MB each, hence 1 GB for a map of 100 by 100 cells."""
-    flat, shares, held = VARIANTS["rigid, Stribeck 2, PI, limit"].flat(), np.array([0.9, 1.1, 0.9, 1.1, 1.1]), []
-    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
-    gains = shares * flat["friction.viscous"] * flat["controller.kp"] / mass
-    stages, at_once = Ensemble.held({**flat, "controller.ki": gains}, len(gains)), Ensemble.held
-    monkeypatch.setattr(Ensemble, "held", lambda keys, count, **how: held.append(count) or at_once(keys, count, **how))
-    with CheckSettings(loops_at_once=2).in_use():
-        words = at_lower_gains(stages).tolist()
-    assert words == ["stable" if share < 1 else "unstable" for share in shares]
-    assert max(held) == 2 * CheckSettings().lower_gain_shares[-1]
-
-
-@pytest.mark.inner
 @pytest.mark.parametrize("mass", [0.01, 0.1, 0.3, 0.6, 1.7, 200.0])
 def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     """The roots of (m s^2 + sigma_2 s) tau_i s (tau_p s + 1) + k_p (tau_z s + 1)(tau_i s + 1) decide (Eq. 7, 8)."""
@@ -81,7 +63,6 @@ def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     assert lost == (mass < 0.2)
 
 
-@pytest.mark.inner
 def test_van_dijks_rules_need_their_gain_where_hardly_anything_is_viscous() -> None:
     """The derivative makes the loop stable at its own gain; at lower ones m ki > sigma_2 kp decides."""
     assert unstable(VARIANTS["rigid"]) == ()
@@ -99,7 +80,6 @@ def test_a_stage_without_friction_is_judged_too() -> None:
     assert unstable(smooth) == ("sticks", "slides")
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize(
     ("changes", "always"),
     [
@@ -141,6 +121,7 @@ MINUTES: dict[str, Callable[[Stage], object]] = {
 }
 
 
+@pytest.mark.cases(first=2, slow=1)
 @pytest.mark.parametrize("command", MINUTES)
 def test_an_unstable_loop_is_mentioned_before_work_that_takes_minutes(
     command: str, rig: Stage, caplog: pytest.LogCaptureFixture
@@ -159,7 +140,6 @@ def test_an_unstable_loop_is_mentioned_beside_a_run(rig: Stage, caplog: pytest.L
     assert any("is unstable while the stage sticks and while" in text for text in caplog.messages)
 
 
-@pytest.mark.inner
 def test_a_loop_is_unstable_just_inside_the_bandwidths_stated_and_stable_just_outside() -> None:
     """A cascade with filters on a parasitic mode is unstable over a range of bandwidths, and stable again above it."""
     chosen = friso.load(friso.example("twincat_cascade"))
@@ -171,7 +151,6 @@ def test_a_loop_is_unstable_just_inside_the_bandwidths_stated_and_stable_just_ou
         assert loops_unstable(faster(chosen.flat(), places), 3).tolist() == [True, False, False]
 
 
-@pytest.mark.inner
 def test_what_lies_outside_of_another_window_is_left() -> None:
     def window(low: float | None, high: float | None, reserve: float = 0.0) -> BandwidthWindow:
         low_end = None if low is None else AttractionEnd(low, low * (1 - reserve), True)
@@ -189,54 +168,3 @@ def test_what_lies_outside_of_another_window_is_left() -> None:
     ):
         parts = whole.without(lost)
         assert [(part.low and part.low.inside, part.high and part.high.inside) for part in parts] == left
-
-
-LAGGED = """
-name = "cascade whose velocity is low-passed"
-masses = { stage = "8 kg" }
-
-[motion]
-kind = "there_and_back"
-duration = "20 s"
-acceleration = "3 m/s^2"
-acceleration_time = "80 ms"
-return_at = "5 s"
-
-[friction]
-model = "lugre"
-static = "12 N"
-coulomb = "8 N"
-stribeck_velocity = "2 mm/s"
-stribeck_exponent = 2
-viscous = "30 N*s/m"
-bristle_stiffness = "3 N/um"
-bristle_damping = "1500 N*s/m"
-
-[controller]
-kind = "cascade"
-kv = "60 1/s"
-kp = "2513 N*s/m"
-velocity_integral_time = "0.1 s"
-force_limit = "2513 N"
-anti_windup = "clamp"
-
-[[controller.filters]]
-kind = "low_pass"
-path = "feedback"
-frequency = "159 Hz"
-order = 2
-damping_ratio = 1.0
-"""
-
-
-@pytest.mark.inner
-def test_where_the_loop_is_unstable_no_bandwidth_is_left_undecided(tmp_path: Path) -> None:
-    """That hunting was not determined, for its work, was told of bandwidths at which the loop is unstable alone."""
-    (tmp_path / "lagged.toml").write_text(LAGGED, encoding="utf-8")
-    chosen = friso.load(tmp_path / "lagged.toml")
-    (window,) = unstable_bandwidths(chosen)
-    with EdgeSettings(simulated_work=1e6).in_use():
-        sought = search_bandwidths(chosen, attracting=False)
-    assert (sought.margin, sought.undecided) == (None, False)
-    assert window.low is not None
-    assert [part for hunting in sought.windows for part in hunting.without(window)] == []

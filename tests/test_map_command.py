@@ -45,6 +45,7 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     return folder, json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     folder, document = mapped
     assert {Path(file).name for file in document["files"]} == {f"a.{form}" for form in ("png", "svg", "pdf", "html")}
@@ -59,6 +60,7 @@ def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     assert json.loads(done.stdout)["outcomes"] == document["outcomes"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_cell_is_run_again_alone(mapped: tuple[Path, dict]) -> None:
     folder, _ = mapped
@@ -84,6 +86,7 @@ def test_files_of_the_user_are_not_overwritten(tmp_path: Path) -> None:
 OF_ANOTHER_STUDY = (("--metric", "loudness"), ("--rtol", "1e-4"), ("--samples", "8"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [*OF_ANOTHER_STUDY, ("--set", "controller.alpha=0.2")])
 def test_a_store_takes_nothing_that_makes_another_study(mapped: tuple[Path, dict], options: tuple[str, ...]) -> None:
     done = friso_inside(mapped[0], "map", "a.zarr", *options)
@@ -91,7 +94,6 @@ def test_a_store_takes_nothing_that_makes_another_study(mapped: tuple[Path, dict
     assert rows_of(done.stderr)
 
 
-@pytest.mark.first
 @posix
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     """Interrupted on a terminal in the middle of its bar; resumed by the store alone."""
@@ -124,6 +126,7 @@ def _interruptible() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -152,6 +155,7 @@ def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments:
     assert RIG.read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("numbers", [("5", "0"), ("0",), ("a", "b"), ("-1", "0")])
 def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str, ...]) -> None:
     done = friso_inside(mapped[0], "simulate", "--cell", "a.zarr", "--out", "new", "--", *numbers)
@@ -195,6 +199,7 @@ def test_a_damaged_block_is_noticed_and_run_again(mapped: tuple[Path, dict], tmp
     assert (done.returncode, "--overwrite" in done.stderr) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_figure_beside_a_store_that_it_has_not_made_stays(
     mapped: tuple[Path, dict], tmp_path: Path, undrawn: None
 ) -> None:
@@ -217,6 +222,7 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(
         refuse_overwriting(replace(study, rtol=1e-7), tmp_path / "b.zarr", overwrite=False)
 
 
+@pytest.mark.slow
 def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
@@ -238,6 +244,7 @@ def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     assert not [*tmp_path.glob(".*")]
 
 
+@pytest.mark.slow
 def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
     mapped: tuple[Path, dict], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
@@ -264,6 +271,7 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
     assert {file.name for file in tmp_path.iterdir()} == {"a.zarr", "a.png", "figures"}
 
 
+@pytest.mark.slow
 def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
     other = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--out", "a.zarr")
@@ -273,6 +281,7 @@ def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict
         assert stored.outcome.shape == (2,)
 
 
+@pytest.mark.slow
 def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     made = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--metric", "peaks", "--out", "a.zarr")
     assert friso_inside(tmp_path, *made).returncode == 0
@@ -285,6 +294,7 @@ def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict],
     assert (tmp_path / "a.svg").read_bytes() != first
 
 
+@pytest.mark.slow
 def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     """Asked of the stage or of the store."""
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")

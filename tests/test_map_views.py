@@ -362,6 +362,7 @@ EVERY = {
 }
 
 
+@pytest.mark.cases(slow=4)
 @pytest.mark.parametrize("figure", EVERY.values(), ids=EVERY)
 def test_both_renderers_draw_the_same(figure):
     canvas, page = matplotlib_renderer.render(figure), plotly_renderer.render(figure)
@@ -380,6 +381,7 @@ def test_both_renderers_draw_the_same(figure):
         assert len(matplotlib_renderer.image(figure, form)) > 1000
 
 
+@pytest.mark.slow
 def test_a_large_map_is_a_picture_inside_a_vector_file():
     runs = made_up({CROSSOVER: np.linspace(1, 16, 150), STROKE: np.linspace(0, 1e-3, 150)})
     assert b"data:image/png" in matplotlib_renderer.image(map_figure(runs, "peaks"), "svg")
@@ -402,6 +404,7 @@ def told(runs: xr.Dataset, metric: str = "peaks") -> list[Any]:
     return [trace for trace in plotly_renderer.render(figure).data if trace.text is not None]
 
 
+@pytest.mark.slow
 def test_the_machine_that_was_swept_stands_in_its_map():
     attrs = {"stage": RIG.to_toml()}
     outside = plain(stage=RIG.replace({CROSSOVER: "27 Hz"}).to_toml())
@@ -449,6 +452,7 @@ def test_the_page_opens_offline_and_says_what_it_shows():
     assert "shows at most" not in parsed.text
 
 
+@pytest.mark.slow
 def test_a_page_too_large_is_thinned_and_says_so():
     runs = made_up({CROSSOVER: np.linspace(1, 16, 1000), STROKE: np.linspace(0, 1e-3, 400)})[["peaks", "outcome"]]
     assert f"{MOST_CELLS} of its 400000 cells" in Page(page_of(runs)).text
@@ -465,6 +469,7 @@ def test_a_page_too_large_is_thinned_and_says_so():
 EVIL = '</script><script>alert("x")</script><img src=x onerror=alert(1)>$&'
 
 
+@pytest.mark.slow
 def test_names_states_and_words_cannot_inject_markup():
     def runs(word: str) -> xr.Dataset:
         table = made_up({CROSSOVER: [1.0, 2.0], word: ["a", word]}, name=word, stage=word)
@@ -494,6 +499,7 @@ print(hashlib.sha256(t.page_of(t.troubled()).encode()).hexdigest())
 """
 
 
+@pytest.mark.thorough
 def test_files_are_the_same_bytes_in_every_process(request, tmp_path, printed):
     environment = {"PYTHONHASHSEED": "7", "HOME": str(tmp_path), "PYTHONPATH": str(request.config.rootpath)}
     environment |= {"MPLCONFIGDIR": matplotlib.get_cachedir()}  # the list of fonts takes seconds to make
@@ -521,6 +527,7 @@ def swinging(where: np.ndarray) -> xr.Dataset:
     return runs
 
 
+@pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
     ("rows", "columns", "expected"),
     [

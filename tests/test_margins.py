@@ -1,18 +1,14 @@
 """Margins in static friction, and in a joint's stroke and stiffness."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from made_up import FakeCase, fake_stage, hunts, settles
-from patched import patched
 from variants import VARIANTS
 
-from friso.engine.allowance import Exhausted
 from friso.equations.scaled_friction import (
     least_static_factor,
     static_frictions,
@@ -27,17 +23,9 @@ from friso.hunting import (
     ParameterMargin,
     advised,
     check,
-    edge_search,
     find_attractors,
-    hunting,
     joint_margins,
-    path_search,
 )
-from friso.hunting.attractors import Attractors
-from friso.hunting.attractors.survey import Swinging
-from friso.hunting.path import key_path
-from friso.hunting.stage_margins import _margin, friction_margin
-from friso.hunting.what_attracts import Sketch
 from friso.questions.check.cases import joint_margins_document
 from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
 from friso.questions.check.question import CheckAnswer
@@ -45,11 +33,7 @@ from friso.questions.check.words import details_sentences, verdict_sentence
 from friso.shown.cases import ShownCase
 from friso.stage import Stage
 
-
-@pytest.fixture(scope="module")
-def locked(rig: Stage) -> Stage:
-    """The thesis rig, its joint locked."""
-    return rig.variants()["locked"]
+RIGID = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz"})
 
 
 def attracts(stage: Stage, factor: float) -> bool:
@@ -57,23 +41,28 @@ def attracts(stage: Stage, factor: float) -> bool:
     return bool(find_attractors(with_static_friction(stage.flat(), factor), 1).attracts[0])
 
 
-def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) -> None:
-    """The locked rig hunts; with half its static friction it does not, nor with half as much again."""
-    margin = check(locked)["locked"].static_friction
+def test_a_margin_ends_where_a_search_from_many_starts_says_so() -> None:
+    """The rigid mass hunts; with half its static friction it does not, nor with half as much again."""
+    case = check(RIGID)["given"]
+    margin, edge = case.static_friction, case.judgement.margin
     assert margin is not None
     assert margin.certain
     for end in (margin.below, margin.above):
         assert end is not None
-        assert attracts(locked, end.inside)
-        assert not attracts(locked, end.outside)
+        assert attracts(RIGID, end.inside)
+        assert not attracts(RIGID, end.outside)
         assert abs(np.log(end.outside / end.inside)) < 0.06
+    assert edge is not None
+    assert (edge.crossover, edge.kind, edge.certain) == (pytest.approx(9.770, abs=1e-3), "flip", True)
+    assert edge.factor < edge.quiet < 1.02 * edge.factor
     assert margin.below is not None
     assert margin.above is not None
     assert (margin.below.kind, margin.above.kind) == ("fold", "flip")
     assert margin.below.inside < 1 < margin.above.inside
 
 
-@pytest.mark.inner
+@pytest.mark.slow
+@pytest.mark.usefixtures("own_bandwidth")
 def test_an_end_just_above_coulomb_friction_is_found() -> None:
     """Hunting ended between 107 and 109 mN, closer to Coulomb friction than a step beyond an orbit's end."""
     stage = Stage(
@@ -90,7 +79,7 @@ def test_an_end_just_above_coulomb_friction_is_found() -> None:
         },
         motion={"kind": "release", "displacement": "1 mm", "duration": "4 s"},
     )
-    margin = friction_margin(stage, hunts(hunting=hunting(stage)))
+    margin = check(stage)["given"].static_friction
     assert margin is not None
     assert margin.below is not None
     assert margin.below.certain
@@ -99,9 +88,9 @@ def test_an_end_just_above_coulomb_friction_is_found() -> None:
     assert not attracts(stage, 0.107 / 0.2222)
 
 
-def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
-    """At half its static friction the locked rig settles; with a little more it hunts. The first lines say so."""
-    case = check(rig.replace({"friction.static": "1.4 N", "joint.locked": True}))["locked"]
+def test_where_hunting_begins_is_told_of_a_stage_that_settles() -> None:
+    """At half its static friction the rigid mass settles; with a little more it hunts. The first lines say so."""
+    case = check(RIGID.replace({"friction.static": "1.4 N"}))["given"]
     margin = case.static_friction
     assert margin is not None
     assert not margin.attracts
@@ -126,6 +115,7 @@ def test_static_friction_alone_is_scaled_or_all_of_it() -> None:
         assert least_static_factor(flat) == flat["friction.coulomb"] / flat["friction.static"]
 
 
+@pytest.mark.slow
 def test_the_joint_has_margins_where_it_is_free(rig: Stage) -> None:
     cases = check(rig)
     margins = joint_margins(cases["free"].stage, cases["free"].judgement)
@@ -160,17 +150,31 @@ def made_up_case(margin: ParameterMargin, judgement: Any) -> Any:
     return FakeCase(stage, None, judgement, static_friction=margin)
 
 
-def test_a_margin_is_told_with_both_of_its_ends() -> None:
-    """Hunting begins or ends within the stated range; stating one end alone was wrong by up to a tenth."""
-    begins = ParameterMargin(False, None, AttractionEnd(1.4, 1.3149, True), (1 / 3, 3.0))
-    assert margin_sentence("static friction", begins).startswith("Robust")
-    assert "0.333 to 1.31 times" in margin_sentence("static friction", begins)
-    ends = ParameterMargin(True, AttractionEnd(0.5011, 0.4449, True), AttractionEnd(1.3, 1.4411, True), (1 / 3, 3.0))
-    assert "0.502 to 1.3 times" in margin_sentence("static friction", ends)
-    (sentence,) = friction_sentences(made_up_case(begins, settles()))
-    assert "1.00 to 3.93 N" in sentence  # 3 N times the factors, rounded towards the stage's own
-    already = ParameterMargin(False, None, AttractionEnd(1.08, 1.0, True), (1 / 3, 3.0))
-    assert margin_sentence("static friction", already).startswith("No hunting")
+@pytest.mark.parametrize(
+    ("attracts", "below", "above", "others", "value", "wanted", "unwanted"),
+    [
+        (False, None, (1.4, 1.3149), {}, (), ("Robust", "0.333 to 1.31 times"), "not"),
+        (True, (0.5011, 0.4449), (1.3, 1.4411), {}, (), ("0.502 to 1.3 times",), "not"),
+        (False, None, (1.08, 1.0), {}, (), ("No hunting",), "not det"),
+        (True, None, (1.3, 1.4), {"again": {1: AttractionEnd(2.2, 2.1, True)}}, (10.0, "N"), ("from 21",), "not"),
+        (True, None, None, {"open_sides": (-1,)}, (), ("not determined",), "certain"),
+        (False, (0.7, 0.8, False), None, {"open_sides": (1,)}, (), ("not certain", "not determined"), "again"),
+        # 12.65 N, at which nothing hunts, was rounded out of its own range
+        (False, None, (1.05, 1.0), {"range": (1.0, 3.0)}, (12.65, "N"), ("as yours",), "12.7 to 12.6"),
+        (False, (0.9, 0.93), (1.05, 1.0), {"range": (0.5, 3.0)}, (12.65, "N"), ("up to yours",), "to 12.6"),
+        (False, (0.97, 1.0), (1.4, 1.3), {"range": (0.5, 3.0)}, (12.65, "N"), ("16.4 N", "yours"), "12.7 to"),
+        (False, (0.97, 0.9995), (1.05, 1.0005), {"range": (0.5, 3.0)}, (12.65, "N"), ("1.05 times",), "to 12.6"),
+    ],
+)
+def test_a_margin_is_told_with_its_ends_rounded_towards_the_stage(
+    attracts: bool, below: Any, above: Any, others: dict[str, Any], value: Any, wanted: tuple[str, ...], unwanted: str
+) -> None:
+    ends = [None if end is None else AttractionEnd(*(*end, True)[:3]) for end in (below, above)]
+    margin = ParameterMargin(attracts, *ends, **{"range": (1 / 3, 3.0), **others})
+    assert margin.certain == (not margin.open_sides)
+    sentence = margin_sentence("static friction", margin, *value)
+    assert all(text in sentence for text in wanted)
+    assert unwanted not in sentence
 
 
 def test_the_lower_bandwidth_advised_keeps_a_factor_from_hunting() -> None:
@@ -214,104 +218,6 @@ def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:
     assert not thin_margins(made_up_case(far, settles(margin=None)))
 
 
-def test_a_side_that_was_given_up_is_no_margin() -> None:
-    margin = ParameterMargin(True, None, None, (1 / 3, 3.0), open_sides=(-1,))
-    assert not margin.certain
-    assert "not determined" in margin_sentence("static friction", margin)
-    assert hunts().verdict == "hunts"
-
-
-def margin_of(attracts: bool, roughly: Callable[..., Any], thoroughly: Callable[..., Any]) -> ParameterMargin:
-    """The margin of a made-up stage, from 1/3 to 3 times a parameter, by functions that say where it hunts."""
-
-    def answers(hunts: Callable[..., Any], factors: np.ndarray, **_: Any) -> Attractors:
-        nothing = np.zeros(len(factors), bool)
-        motions = [Swinging(k, 1e-3, 1.0, 1.0, 1e-4, 2) for k in np.flatnonzero(hunts(factors)).tolist()]
-        return Attractors(tuple(motions), ~nothing, np.ones(len(factors)), (), nothing, ~nothing, nothing)
-
-    search = {
-        "attractors": partial(answers, thoroughly),
-        "what_attracts": partial(answers, thoroughly),
-        "surely_surveyed": lambda stages, survey: survey.decided,
-    }
-    sketched = {"sketched": lambda stages: Sketch(roughly(stages), np.ones(len(stages), bool))}
-    judgement = SimpleNamespace(hunting=SimpleNamespace(surveyed=answers(lambda _: np.array([attracts]), np.ones(1))))
-    path = replace(key_path({"key": 1.0}, "key"), stages=lambda factors: factors)  # type: ignore[arg-type,return-value]
-    own = {"has_a_map": lambda stages: True, "bends": lambda stages: False}
-    with patched({path_search: search | sketched, edge_search: search | own}):
-        return _margin(path, judgement)  # type: ignore[arg-type]
-
-
-@pytest.mark.inner
-def test_where_hunting_begins_is_found_between_the_factors_tried_first() -> None:
-    """A swing lasts only from 0.8 to 0.9 times a parameter: the nearest end below is that of this window."""
-
-    def hunts(factors: np.ndarray) -> np.ndarray:
-        return (factors > 0.8) & (factors < 0.9)
-
-    margin = margin_of(False, hunts, hunts)
-    assert margin.below is not None
-    assert 0.8 < margin.below.inside < 0.9 <= margin.below.outside < 0.92
-    assert margin.below.certain
-    assert margin.above is None
-    assert not margin.open_sides
-
-
-@pytest.mark.inner
-def test_hunting_beyond_an_end_is_told() -> None:
-    """More than 1.3 times a parameter stops the hunting, but from 2.2 times on it is there again."""
-
-    def hunts(factors: np.ndarray) -> np.ndarray:
-        return (factors > 0.4) & (factors < 1.3) | (factors > 2.2)
-
-    margin = margin_of(True, hunts, hunts)
-    assert margin.above is not None
-    assert margin.above.inside < 1.3 < margin.above.outside < 1.4
-    assert set(margin.again) == {1}
-    assert margin.again[1].outside < 2.2 < margin.again[1].inside < 2.3
-    assert "and again from 21" in margin_sentence("static friction", margin, 10.0, "N")
-    assert not margin_of(True, lambda factors: factors < 1.3, lambda factors: factors < 1.3).again
-
-
-@pytest.mark.inner
-def test_scarce_work_leaves_a_side_open() -> None:
-    left = 40
-
-    def hunts(factors: np.ndarray) -> np.ndarray:
-        nonlocal left
-        left -= len(factors)
-        if left < 0:
-            raise Exhausted
-        return (factors < 0.5) | (factors > 2.0)
-
-    margin = margin_of(False, hunts, hunts)
-    assert margin.below is not None
-    assert margin.open_sides == (1,) or (margin.above and not margin.above.certain)
-
-
-@pytest.mark.inner
-def test_a_rough_survey_alone_does_not_tell_that_hunting_has_no_end() -> None:
-    """On a drawn axis with a leaking integral rough surveys saw hunting up to 3 times the friction; it ends at 2.2."""
-    margin = margin_of(True, lambda factors: factors > 0, lambda factors: factors < 2.2)
-    assert margin.below is None
-    assert margin.above is not None
-    assert margin.above.inside <= 2.2 <= margin.above.outside < 2.3
-
-
-@pytest.mark.inner
-def test_hunting_that_only_a_thorough_search_sees_has_its_end_found() -> None:
-    margin = margin_of(False, lambda factors: factors > 5, lambda factors: factors > 2.2)
-    assert margin.above is not None
-    assert margin.above.outside <= 2.2 <= margin.above.inside
-
-
-def test_a_doubt_of_an_end_is_told_beside_a_side_that_is_open() -> None:
-    margin = ParameterMargin(False, AttractionEnd(0.7, 0.8, False), None, (1 / 3, 3.0), open_sides=(1,))
-    sentence = margin_sentence("static friction", margin)
-    assert "not certain" in sentence
-    assert "not determined" in sentence
-
-
 def test_static_friction_is_never_told_below_coulomb_friction() -> None:
     """Its least multiple, rounded down, would be 2 mN below; the numbers that stand beside each other agree."""
     stage = VARIANTS["rigid"].replace({"friction.static": "26.3 N", "friction.coulomb": "11.31 N"})
@@ -320,26 +226,6 @@ def test_static_friction_is_never_told_below_coulomb_friction() -> None:
     (says,) = friction_sentences(FakeCase(stage, None, static_friction=margin))
     assert "11.308" not in says
     assert "11.3" in says or "12.5" in says
-
-
-@pytest.mark.parametrize(
-    ("below", "above", "range_", "wanted", "unwanted"),
-    [
-        (None, AttractionEnd(1.05, 1.0, True), (1.0, 3.0), "as yours", "12.7 to 12.6"),
-        (AttractionEnd(0.9, 0.93, True), AttractionEnd(1.05, 1.0, True), (0.5, 3.0), "up to yours", "to 12.6"),
-        (AttractionEnd(0.97, 1.0, True), AttractionEnd(1.4, 1.3, True), (0.5, 3.0), "16.4 N", "12.7 to"),
-        (AttractionEnd(0.97, 0.9995, True), AttractionEnd(1.05, 1.0005, True), (0.5, 3.0), "1.05 times", " to 12.6"),
-    ],
-)
-def test_a_range_of_static_friction_holds_that_of_the_stage(
-    below: AttractionEnd | None, above: AttractionEnd | None, range_: tuple[float, float], wanted: str, unwanted: str
-) -> None:
-    """12.65 N, at which nothing hunts, was rounded out of its own range; with ends on both sides that turned round."""
-    margin = ParameterMargin(False, below, above, range_)
-    says = margin_sentence("static friction", margin, 12.65, "N")
-    assert wanted in says
-    assert unwanted not in says
-    assert "yours" in says
 
 
 @pytest.mark.parametrize(

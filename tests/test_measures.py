@@ -30,24 +30,33 @@ def periods(times: np.ndarray, values: np.ndarray, counts: np.ndarray, amplitude
     return scan_turning_points(times, values, counts, amplitude, np.full(len(counts), 20.0)).period
 
 
-def test_only_late_and_tall_maxima_count() -> None:
-    turns = [(9.0, 2e-4), (9.5, -2e-4), (11.0, 2e-4), (12.0, -2e-4), (13.0, 0.9e-4), (14.0, -2e-4), (15.0, 3e-4)]
-    assert peaks(turns) == [11.0, 15.0]
+RINGING = [(11.0, -3e-4), (12.0, 3e-4), (12.1, 3e-4 - 1e-9), (12.2, 3e-4 - 1e-10), (13.0, -3e-4)]
+AT_THE_EDGE = [(9.5, 0.0), (10.0, 2e-4), (10.2, 0.0), (10.5, 2e-4), (10.7, 0.0), (11.5, 1e-4), (12.0, 0.0)]
 
 
-def test_of_close_peaks_the_tallest_stays() -> None:
-    turns = [(11.0, 2e-4), (11.1, 1e-4), (11.2, 5e-4), (11.3, 1e-4), (11.6, 4e-4), (11.65, 0.0), (11.75, 3e-4)]
-    assert peaks(turns) == [11.2, 11.75]
-
-
-def test_what_counts_at_the_edge() -> None:
-    """Peaks at 10 s and 0.5 s apart count, those of 0.1 mm do not; of equal peaks too close the first counts."""
-    assert peaks([(9.5, 0.0), (10.0, 2e-4), (10.2, 0.0), (10.5, 2e-4), (10.7, 0.0), (11.5, 1e-4), (12.0, 0.0)]) == [
-        *(10.0, 10.5),
-    ]
-    assert peaks([(11.0, 0.0), (11.2, 2e-4), (11.3, 0.0), (11.4, 2e-4), (11.5, 0.0)]) == [11.2]
-    assert peaks([(11.0, 5e-4), (11.2, 0.0), (11.3, 3e-4), (11.4, 0.0)]) == [11.0]
-    assert peaks([(9.0, 3e-4), (9.5, 0.0), (11.0, 0.5e-4), (12.0, 0.0)]) == []
+@pytest.mark.parametrize(
+    ("turns", "counted"),
+    [
+        (
+            [(9.0, 2e-4), (9.5, -2e-4), (11.0, 2e-4), (12.0, -2e-4), (13.0, 0.9e-4), (14.0, -2e-4), (15.0, 3e-4)],
+            [11.0, 15.0],
+        ),
+        (
+            [(11.0, 2e-4), (11.1, 1e-4), (11.2, 5e-4), (11.3, 1e-4), (11.6, 4e-4), (11.65, 0.0), (11.75, 3e-4)],
+            [11.2, 11.75],
+        ),
+        (AT_THE_EDGE, [10.0, 10.5]),  # peaks at 10 s and 0.5 s apart count, those of 0.1 mm do not
+        ([(11.0, 0.0), (11.2, 2e-4), (11.3, 0.0), (11.4, 2e-4), (11.5, 0.0)], [11.2]),
+        ([(11.0, 5e-4), (11.2, 0.0), (11.3, 3e-4), (11.4, 0.0)], [11.0]),
+        ([(9.0, 3e-4), (9.5, 0.0), (11.0, 0.5e-4), (12.0, 0.0)], []),
+        ([(11.0 + k, 2e-4 + 1e-19 * (-1) ** k) for k in range(9)], []),  # a stuck stage turns by rounding alone
+        (RINGING, [12.0]),
+    ],
+)
+def test_late_and_tall_maxima_count_and_of_close_ones_the_tallest(
+    turns: list[tuple[float, float]], counted: list[float]
+) -> None:
+    assert peaks(turns) == counted
 
 
 def test_runs_of_a_batch_do_not_mix() -> None:
@@ -56,6 +65,7 @@ def test_runs_of_a_batch_do_not_mix() -> None:
     assert distinct_peaks(times, values, np.array([3, 1])).sum(axis=1).tolist() == [2, 0]
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.floats(0.01, 0.4), st.integers(-500, 500)), min_size=2, max_size=60))
 def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
     """Against find_peaks with the same prominence (the swing), and the tallest kept first done slowly."""
@@ -72,7 +82,6 @@ def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
         assert peaks(list(zip(times.tolist(), values.tolist(), strict=True))) == times[sorted(kept)].tolist()
 
 
-@pytest.mark.inner
 @pytest.mark.parametrize("many", [0, 10**9])
 def test_period_of_a_cycle_with_ringing_on_top(many: int) -> None:
     """A 2 s cycle of 1 mm on which a 0.05 s ringing of 0.1 mm makes turning points of its own; compiled and plain."""
@@ -114,17 +123,6 @@ def test_a_period_longer_than_the_last_quarter_is_taken_from_the_last_half() -> 
     assert period[0] == pytest.approx(6.0)
 
 
-def test_rounding_noise_is_no_peak() -> None:
-    """A stage stuck 0.2 mm from its reference turns by rounding alone."""
-    assert peaks([(11.0 + k, 2e-4 + 1e-19 * (-1) ** k) for k in range(9)]) == []
-
-
-def test_ringing_on_a_peak_does_not_hide_it() -> None:
-    turns = [(11.0, -3e-4), (12.0, 3e-4), (12.1, 3e-4 - 1e-9), (12.2, 3e-4 - 1e-10), (13.0, -3e-4)]
-    assert peaks(turns) == [12.0]
-
-
-@pytest.mark.inner
 def test_compiled_loops_do_what_the_plain_ones_do() -> None:
     rng = np.random.default_rng(1)
     times = np.sort(rng.uniform(8, 20, (300, 40)), axis=1)

@@ -11,9 +11,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import friso
 from benchmarks.oracles import cycles, dcmotor, drift, orbits, servo, switch
 from benchmarks.oracles.edges import RESTS, SEED, SWINGS, edge_of, kept, what_becomes
-from benchmarks.oracles.independent import beyond, differences, same_edge
-from benchmarks.oracles.oracle import Finding, Oracle, number
-from benchmarks.oracles.page import page, section, sections
 from benchmarks.oracles.plain_runs import Plain
 from benchmarks.truth.by_hand import by_hand
 from benchmarks.truth.draws import draw
@@ -24,12 +21,14 @@ PUBLISHED = 7.54040, 6.36272, 0.369816
 """First passage [s], period [s] and top speed [m/s] of the stick-slip of 1995 (references.md, section 1)."""
 
 
+@pytest.mark.slow
 def test_bristles_creep_under_a_load_that_oscillates_below_break_away() -> None:
     """LuGre's do, without end; elasto-plastic ones do not (references.md, section 9)."""
     assert drift.by_friso("lugre") == pytest.approx(drift.by_scipy("lugre"), rel=1e-6)
     assert abs(drift.by_friso("elasto_plastic")) < 1e-12
 
 
+@pytest.mark.slow
 def test_the_servo_of_1995_hunts_with_its_integral_and_rests_without() -> None:
     (swing,) = find_swings(servo.stage().flat())
     times, places, _ = servo.by_scipy(servo.KI)
@@ -42,6 +41,7 @@ def test_the_servo_of_1995_hunts_with_its_integral_and_rests_without() -> None:
     assert 1 - end < servo.STATIC / servo.KP
 
 
+@pytest.mark.slow
 def test_every_stabilising_pid_has_a_limit_cycle_with_a_gap_and_none_without() -> None:
     """Solved exactly; towards the limit friso's cycle comes near that."""
     pids = switch.drawn(12)
@@ -61,6 +61,7 @@ def test_a_pid_with_a_gap_swings_about_its_own_limit_cycle() -> None:
     assert -pid.stop(2 * size, switch.GAP)[0] < 2 * size
 
 
+@pytest.mark.slow
 def test_multipliers_by_differences_are_those_of_the_variational_equations() -> None:
     orbit = orbits.first_orbit(4.0)
     assert orbit.period == pytest.approx(3.15031069, abs=1e-8)
@@ -77,6 +78,7 @@ def test_mujoco_errs_in_proportion_to_its_time_step() -> None:
     assert (coarse - PUBLISHED) / (fine - PUBLISHED) == pytest.approx(2, abs=0.1)
 
 
+@pytest.mark.slow
 def test_plain_runs_keep_to_a_cycle_that_is_published() -> None:
     """The rigid mass at 4 Hz, on its cycle of 2.0166608 mm by the end; the error falls with the tolerance."""
     plain = Plain.of(cycles.stage(4.0).flat())
@@ -92,6 +94,7 @@ def test_a_faster_stage_is_the_same_by_hand_and_by_friso(number: int) -> None:
     assert scaled == pytest.approx(by_hand(faster(flat, 1.7)).numbers, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_an_edge_by_brute_force_is_one_in_friso() -> None:
     record = next(r for r in kept() if (r["series"], r["number"]) == ("stages", 30))
     flat = draw(SEED, 30).flat()
@@ -108,26 +111,3 @@ def test_the_edge_is_the_last_one_of_a_stage_that_swings_and_else_the_nearest_be
     assert edge_of(words) == [0.63, 1.0]
     assert edge_of(words | {1.0: SWINGS}) == [1.6, 4.0]
     assert edge_of(dict.fromkeys(words, RESTS)) is None
-
-
-def test_what_friso_says_wrong_of_an_edge_is_seen() -> None:
-    record = {"words": {"1": SWINGS, "2": SWINGS, "3": RESTS, "6": SWINGS, "10": RESTS}, "edge": [2.0, 2.03]}
-    edge = {"factor": 2.01, "quiet": 2.02, "reserve": 0.005, "certain": True}
-    window = [{"factor": 5.0, "quiet": 4.9}, {"factor": 7.0, "quiet": 7.1}]
-    said = {"verdict": "hunts", "certain": True, "edge": edge, "windows": [window]}
-    assert list(differences(record, said)) == []
-    assert beyond(record, said | {"windows": []}) == [6.0]
-    assert not same_edge(record, said | {"edge": edge | {"factor": 2.04, "quiet": 2.05}, "windows": []})
-    assert [what for what, _ in differences(record, said | {"verdict": "settles"})] == ["verdict"]
-
-
-def test_the_page_keeps_what_was_not_asked_and_says_what_does_not_agree(tmp_path: Path) -> None:
-    oracle = Oracle("one", "A fact.", "A source", "To 1 %.", lambda: iter(()))
-    wrong = [number("a number", 1.02, 1.0, rtol=0.01), Finding("a word", "-", "yes", None)]
-    right = [number("a number", 1.002, 1.0, rtol=0.01)]
-    file = tmp_path / "page.md"
-    file.write_text(page({"one": section(oracle, wrong), "two": section(oracle, right)}))
-    again = sections(file)
-    assert page(again) == file.read_text()
-    assert "| [one](#one) | **no**, 0 of 1 |" in page(again)
-    assert "| [two](#two) | yes, 1 of 1 |" in page(again)

@@ -343,6 +343,7 @@ def test_a_file_that_is_overwritten_keeps_its_permissions_and_its_link(tmp_path:
     assert file.read_text() == "new"
 
 
+@pytest.mark.thorough
 def test_files_are_written_though_nobody_reads_the_answer(tmp_path: Path) -> None:
     """A pager that was left while a command computed took the files with it."""
     read, full = os.pipe()

@@ -13,7 +13,6 @@ from patched import patched
 
 import friso
 from friso.engine.arrays import Status
-from friso.equations.as_built import AsBuilt
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
@@ -24,9 +23,6 @@ from friso.remedies import method
 from friso.remedies.catalogue import remedies
 from friso.remedies.search import Budget
 from friso.stage import Stage, save
-from friso.virtual_rig.run import as_built_keys
-from friso_thesis.studies.rig.experiments import hunting
-from friso_thesis.studies.rig.moves_on_rails import rails
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 CONTROLLER = {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg", "force_limit": "200 N"}
@@ -85,6 +81,7 @@ def answer(folder: Path, stage: Stage, command: str, *arguments: object, status:
     return json.loads(run.stdout)
 
 
+@pytest.mark.thorough
 def test_check(locked: Stage, tmp_path: Path) -> None:
     """The multiplier of its cycle is that of a simulation; the remedy names its own key and value."""
     document = answer(tmp_path, locked, "check")
@@ -97,6 +94,7 @@ def test_check(locked: Stage, tmp_path: Path) -> None:
     assert float(factor) >= EDGE / 6.0
 
 
+@pytest.mark.slow
 def test_boundary(locked: Stage, tmp_path: Path) -> None:
     """None of the stage's cycles is stable beyond the edge."""
     document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=6 Hz..15 Hz")
@@ -104,6 +102,7 @@ def test_boundary(locked: Stage, tmp_path: Path) -> None:
     assert min(abs(point["value"] - EDGE) for point in document["points"]) < 0.05
 
 
+@pytest.mark.slow
 def test_map_of_multipliers(locked: Stage, tmp_path: Path) -> None:
     places = f"{BANDWIDTH}={EDGE * 0.97} Hz, {EDGE * 1.03} Hz"
     document = answer(tmp_path, locked, "map", "--x", places, "--metric", "multiplier", "--out", "map")
@@ -113,32 +112,12 @@ def test_map_of_multipliers(locked: Stage, tmp_path: Path) -> None:
     assert not outside < 1
 
 
+@pytest.mark.slow
 def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
     document = answer(tmp_path, whole, "bode")
     assert "At 6.00 Hz" in document["conclusion"]
     slow = crossover.limits(whole.replace({"drive.delay": None, "drive.sample_time": None}).flat())
     assert document["highest_stable_crossover_hz"] < slow.highest_stable
-
-
-def small(stage: Stage) -> np.ndarray:
-    return rails(stage)[:2]
-
-
-def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
-    save(whole, tmp_path / "stage.toml")
-    sizes = {
-        "RELATIVE_CROSSOVERS": np.array([0.3, 0.5]),
-        "SHOWN_CROSSOVERS": (0, 1),
-        "RELEASE_DISTANCES": (0.02,),
-        "rails": small,
-    }
-    with patched({hunting: sizes}):
-        run = friso_inside(tmp_path, "rig", "hunting", "stage.toml", "--json")
-    assert run.returncode == 0, run.stderr
-    document = json.loads(run.stdout)
-    assert len(document["logs"]) == 4
-    assert document["results"]["crossovers_hz"] == pytest.approx([1.8, 3.0])
-    assert AsBuilt.of(as_built_keys(whole)).structure.controller is not None
 
 
 def test_compare(whole: Stage, tmp_path: Path) -> None:
@@ -147,6 +126,7 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
     assert not document["stages"]["own"]["failed"]
 
 
+@pytest.mark.slow
 def test_tune(locked: Stage, tmp_path: Path) -> None:
     """The answer knows the stage's cycles and tunes its bandwidth; with so few machines no remedy is sure to work."""
     tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=12, further=12)
@@ -172,6 +152,7 @@ def test_export(locked: Stage, tmp_path: Path) -> None:
     assert "[ pi-d ]--[ limit ]" in document["structure"][0]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""

@@ -107,6 +107,7 @@ METRIC = Metric(
 '''
 
 
+@pytest.mark.slow
 def test_a_metric_of_a_package_is_mapped(tmp_path: Path) -> None:
     (tmp_path / "force_use.py").write_text(METRIC)
     package(tmp_path, "other", metrics={"force_use": "force_use", "peaks": "force_use"})
@@ -118,6 +119,7 @@ def test_a_metric_of_a_package_is_mapped(tmp_path: Path) -> None:
     assert "Use of the force" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_a_controller_and_a_law_are_used_and_named(installed: Path) -> None:
     """Processes that compile or compute cells import neither before they receive a stage with it."""
     listed = answered(installed, "--help")
@@ -134,6 +136,7 @@ def test_a_controller_and_a_law_are_used_and_named(installed: Path) -> None:
     assert not outcomes.get("failed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "module", "why"),
     [("lugre", "taken", '"lugre"'), ("air", "missing", "cannot be imported"), ("air", "leaves", "cannot be imported")],
@@ -175,6 +178,7 @@ def resting(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_command_and_a_function_of_a_package_are_listed_and_answer(resting: Path) -> None:
     listed = friso_command(resting, "--help")
     assert (listed.returncode, listed.stderr) == (0, "")
@@ -193,6 +197,7 @@ def test_a_command_and_a_function_of_a_package_are_listed_and_answer(resting: Pa
     assert done.stdout.endswith("True\n")
 
 
+@pytest.mark.slow
 def test_an_experiment_of_a_package_is_listed_and_runs_with_its_view(resting: Path) -> None:
     assert "at-rest Nothing moves, and the force is the seed" in answered(resting, "rig", "--help")
     assert answered(resting, "rig", "at-rest", str(example("thesis_drive")), "--out", "rig").startswith("It rests.")
@@ -207,6 +212,7 @@ def unread(stage: Nowhere) -> None:
 """
 
 
+@pytest.mark.cases(slow=4)
 @pytest.mark.parametrize(
     ("name", "module", "why"),
     [
@@ -249,6 +255,7 @@ def write_question(folder: Path, declared: str, module: str) -> None:
     (folder / "question.py").write_text(module)
 
 
+@pytest.mark.slow
 def test_a_question_that_cannot_be_read_is_told_when_it_is_asked(tmp_path: Path) -> None:
     """Its options cannot, or it lacks its decorator."""
     write_question(tmp_path / "unread", "1, WHY, 'unread rig.toml'", FUNCTION)
@@ -262,6 +269,7 @@ def test_a_question_that_cannot_be_read_is_told_when_it_is_asked(tmp_path: Path)
     assert "a function with @question" in said
 
 
+@pytest.mark.slow
 def test_a_function_that_is_of_no_use_is_refused_and_leaves_the_others(tmp_path: Path) -> None:
     package(tmp_path, "other", questions={"check": "taken", "missing": "missing", "stage": "taken"})
     code = "import friso\nprint(friso.check.__module__, friso.stage.__name__)\nfriso.missing"

@@ -72,6 +72,7 @@ def run(folder: Path, source: str, **more: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["script", "module"])
 def test_a_law_of_ones_own(place: str, tmp_path: Path) -> None:
     """A mass on a spring with a damper: x = exp(-t) (cos 10 t + sin(10 t)/10) mm."""
@@ -81,6 +82,7 @@ def test_a_law_of_ones_own(place: str, tmp_path: Path) -> None:
     assert float(text) == pytest.approx(-3.286906e-4, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_one_process_builds_several_kernels_of_a_law_of_a_script(tmp_path: Path) -> None:
     """The process registers the law once."""
     assert run(tmp_path, LAW + SEVERAL).strip() == "2"

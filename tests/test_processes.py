@@ -29,6 +29,7 @@ AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:
 pytestmark = pytest.mark.xdist_group("rig")
 
 
+@pytest.mark.slow
 def test_processes_of_its_own_give_the_same_and_open_no_port(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -52,6 +53,7 @@ def test_processes_of_its_own_give_the_same_and_open_no_port(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_costs_nothing_that_is_done(rig: Stage, tmp_path: Path) -> None:
     study, path, done_by_then = Request(rig, AXES).study(rtol=1e-9), tmp_path / "a.zarr", []
 
@@ -100,6 +102,7 @@ def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.
         assert not worker.is_alive()
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("kill", [False, True])
 def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> None:
@@ -120,6 +123,7 @@ def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> 
     assert not [*tmp_path.glob("friso-kernels-*")]
 
 
+@pytest.mark.slow
 @posix
 def test_ctrl_c_ends_the_blocks_in_flight(rig: Stage) -> None:
     """The worker, too, ends at once instead of after minutes."""

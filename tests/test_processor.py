@@ -32,6 +32,7 @@ PLATFORMS = {
 """Processors with systems, and what code for these takes from the process that it is loaded into."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("platform", PLATFORMS, ids=lambda platform: platform.triple)
 def test_code_for_other_platforms_needs_nothing_else(platform: Processor) -> None:
     """The code needs neither a mathematics library nor a compiler's runtime; LLVM resolves all other symbols itself."""
@@ -102,6 +103,7 @@ def test_lanes_fill_a_register() -> None:
     assert Processor("", "haswell", "+avx,-avx512f").lanes == 4
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("x86_64" not in processor().triple, reason="names processors of this family")
 def test_a_lesser_processor_comes_to_the_same_result(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "friso", "simulate", str(STICK_SLIP), "--json"]

@@ -104,6 +104,7 @@ def jumping(crossover: float, size: float, joint: str = LOCKED) -> Stage:
     return rig(crossover, step(f"{size} mm", "100 s"), joint)
 
 
+@pytest.mark.cases(first=2)
 @LOCKED_RIG
 @pytest.mark.parametrize(
     ("crossover", "displacement", "amplitude", "multiplier"),
@@ -131,6 +132,7 @@ def test_jump_that_starts_hunting(crossover: float, dies: float, hunts: float) -
     assert times[-1] > 95
 
 
+@pytest.mark.slow
 @FREE_RIG
 def test_cycles_of_the_free_rig() -> None:
     """At 3 Hz, to the digits given, where only a hard move starts it, and at 5 Hz."""

@@ -86,6 +86,7 @@ def test_the_move_is_the_thesis_s() -> None:
         hunting.EXPERIMENT.run(RIG.replace({"joint": None, "parasitic": None}), 1, silent)
 
 
+@pytest.mark.slow
 def test_hunting_ends_at_more_crossover() -> None:
     """Fig. 25: it hunts at 8 Hz, here on some of eight rails, and no more at 14.3 Hz."""
     changes = on_rails(RIG, {"controller.crossover": np.array([8.0, 14.3])}, rails(RIG)[:8])
@@ -95,6 +96,7 @@ def test_hunting_ends_at_more_crossover() -> None:
     assert moved.swing[0, moved.swings[0]] == pytest.approx(1e-3, rel=0.5)
 
 
+@pytest.mark.slow
 def test_hunting_can_be_started() -> None:
     """Fig. 25: a rail that settles after the move hunts on once released, from several places; here at 11 Hz."""
     machine = with_joint(RIG, locked=True).replace({"controller.crossover": "11 Hz", "rail.seed": 20})

@@ -43,6 +43,7 @@ def test_steps_show_the_joint_on_its_cables(built: Stage) -> None:
     assert result.apparent > result.true
 
 
+@pytest.mark.slow
 def test_slips_lie_within_the_static_friction_of_their_rail(built: Stage) -> None:
     (log,) = stiction.slow_legs(built, 1, 1)
     flat = log.stage.flat()

@@ -12,8 +12,7 @@ from friso.identification.experiments.frequency import _of_stage_alone
 from friso.identification.method import identify
 from friso.identification.readings.common import record
 from friso.identification.readings.friction_velocity import friction_velocity
-from friso.stage import load
-from friso.stage.files import save
+from friso.stage import load, save
 from friso_thesis.studies.rig.experiments.stiction import slow_legs
 from friso_thesis.studies.rig.experiments.stiffness import steps
 from friso_thesis.studies.rig.outcome import freed
@@ -21,6 +20,7 @@ from friso_thesis.studies.rig.outcome import freed
 STIFFNESS, STATIC = "joint.stiffness", "friction.static"
 
 
+@pytest.mark.slow
 def test_rig_logs_come_back_as_a_stage_file_that_holds_the_truth(tmp_path: Path) -> None:
     machine = built(3)
     slow = slow_legs(machine.truth, 1, 1)

@@ -22,6 +22,7 @@ def built() -> Stage:
     return friso.load(Path(__file__).parent.parent / "examples" / "thesis_drive.toml")
 
 
+@pytest.mark.slow
 def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path) -> None:
     """For the analysis of that log alone: the stage file keeps its own stroke."""
     log, path = steps(built, 1), tmp_path / "steps.csv"

@@ -103,6 +103,7 @@ def spectra(draw: st.DrawFn) -> dict[str, list[str]]:
     }
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(spectra())
 def test_floors_come_through(floor: dict[str, list[str]]) -> None:
@@ -174,6 +175,7 @@ WRONG: dict[str, list[object]] = {
 }
 
 
+@pytest.mark.cases(first=17)
 @pytest.mark.parametrize("key", WRONG)
 def test_wrong_values(built: Stage, key: str) -> None:
     """Examples of arrays are right."""

@@ -58,6 +58,7 @@ def test_factors_are_positive_and_follow_one_field(
     assert np.ptp(first) > 0
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(st.integers(0, 10**6), lengths, deviations, st.floats(-3, 3))
 def test_mean_and_deviation_over_rails(first: int, length: float, deviation: float, place: float) -> None:
@@ -73,6 +74,7 @@ def test_mean_and_deviation_over_rails(first: int, length: float, deviation: flo
     assert abs(logs.var() - 1) < SURE * np.sqrt(2 / count)
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(seeds, lengths, deviations)
 def test_deviation_and_correlation_length_along_one_rail(seed: int, length: float, deviation: float) -> None:
@@ -175,6 +177,7 @@ points = st.lists(
 ).filter(lambda several: min(np.diff(sorted(f for f, _ in several))) > 1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(points)
 def test_variance_of_a_floor_is_the_integral_of_its_spectrum(several: list[tuple[float, float]]) -> None:
@@ -205,6 +208,7 @@ def test_spectrum_is_recovered(seed: int, first: float, second: float) -> None:
     assert power[frequency > 101].max() < 1e-3 * power[inside].max()
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(st.integers(0, 10**6), st.floats(0.005, 3.0))
 def test_variance_of_a_floor_however_short(first: int, duration: float) -> None:

@@ -45,6 +45,7 @@ def values(function: Callable[..., None], x: np.ndarray) -> np.ndarray:
     return in_all(function, np.stack([x, x]))[1]
 
 
+@pytest.mark.slow
 def test_exp(rng: np.random.Generator) -> None:
     x = np.concatenate([rng.uniform(-300, 700, 20_000), rng.uniform(-1, 1, 20_000), [0.0, 1e-300, -1e-300]])
     assert values(exps, x) == pytest.approx(np.exp(x.astype(np.longdouble)).astype(float), rel=1e-15)
@@ -62,6 +63,7 @@ def test_log(rng: np.random.Generator) -> None:
     assert np.all(np.abs(values(logs, x) - exact) <= 1e-15 * np.abs(exact))
 
 
+@pytest.mark.slow
 def test_tanh(rng: np.random.Generator) -> None:
     x = np.concatenate([rng.uniform(-30, 30, 20_000), rng.uniform(-1, 1, 20_000), [0.0, 1e6, -1e6]])
     assert values(tanhs, x) == pytest.approx(np.tanh(x), abs=1e-15, rel=0)
@@ -111,6 +113,7 @@ def first_crossing(B):
     B[6] = roots.cubic(p0, p1, p2, p3, root)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("seed", range(5))
 def test_first_crossing_of_a_cubic(seed: int) -> None:
     """Found exactly where the polynomial's roots say there is one, also in a dip between the thirds; and never before

@@ -122,6 +122,7 @@ def largest_error(stage: Stage, sample_time: str, delay: str, duration: str = "2
     return float(np.abs(data["position"] - data["reference"]).max())
 
 
+@pytest.mark.slow
 @given(
     sample_time=st.floats(100.0, 400.0),
     samples=st.floats(0.01, 2.99),
@@ -150,6 +151,7 @@ def test_more_delay_is_no_better_tracking(stage: Stage) -> None:
     assert errors[-1] > 1.01 * errors[0]
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("duration", ["2 s", "2.00005 s"])
 @pytest.mark.parametrize("delay", ["100 us", "350 us", "249.9999 us", "249.99999999 us", "250 us"])
 def test_a_move_that_rests_is_told_at_rest_whatever_the_delay_and_duration(

@@ -1,17 +1,13 @@
 """Maps of verdicts by sketches, and axes that make the controller faster or scale all friction."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from refusals import refused
 
 import friso
 from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import with_friction
-from friso.hunting import check, sketch_attractors
+from friso.hunting import ReturnMapSettings, check, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, SWINGS
-from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import caveats, message, own_place
 from friso.questions.map.question import SweepAnswer
@@ -34,6 +30,7 @@ def sketched(locked: Stage) -> SweepAnswer:
     return friso.sweep(locked, {"speed": SPEEDS.tolist(), "friction": [0.5, 1.0, 2.0]})
 
 
+@pytest.mark.slow
 def test_the_default_map_is_a_sketch_of_the_verdicts_that_a_search_gives(locked: Stage, sketched: SweepAnswer) -> None:
     searched = friso.sweep(locked, {"speed": SPEEDS.tolist(), "friction": [0.5, 1.0, 2.0]}, confirm=True)
     assert sketched.metric == "sketch"
@@ -43,6 +40,7 @@ def test_the_default_map_is_a_sketch_of_the_verdicts_that_a_search_gives(locked:
     np.testing.assert_array_equal(sketch, verdict)
 
 
+@pytest.mark.slow
 def test_a_cell_has_the_verdict_that_check_gives(locked: Stage) -> None:
     """At half its static friction the rig is soon within 10 um at its last place, but not at the one before."""
     stage = locked.replace({"friction.static": "1.5 N"})
@@ -52,6 +50,7 @@ def test_a_cell_has_the_verdict_that_check_gives(locked: Stage) -> None:
         assert runs.data["verdict"].values[k] == case.verdict
 
 
+@pytest.mark.slow
 def test_a_scaled_cell_is_a_stage_with_a_faster_controller_or_more_friction(
     locked: Stage, sketched: SweepAnswer
 ) -> None:
@@ -71,19 +70,6 @@ def test_gains_are_scaled_with_the_speed() -> None:
     assert runs.cell(1).flat() == pytest.approx(
         {**faster(stage.flat(), 2.0), **{k: v for k, v in stage.flat().items() if isinstance(v, str)}}
     )
-
-
-@pytest.mark.parametrize(
-    ("changed", "axes", "options"),
-    [
-        ({"friction": {"model": "none"}}, {"friction": [0.5, 2.0]}, {"metric": "outcome"}),
-        ({}, {"speed": "-1,0,1"}, {}),
-        ({}, {"speed": [0.5, 1.0]}, {"metric": "outcome", "confirm": True}),
-    ],
-)
-def test_what_cannot_be_scaled_or_confirmed_is_refused(locked: Stage, changed: Any, axes: Any, options: Any) -> None:
-    with refused():
-        friso.sweep(locked.replace(changed), axes, **options)
 
 
 def test_the_edge_of_a_map_is_that_at_which_followed_cycles_cease_to_attract(
@@ -135,6 +121,7 @@ def test_regions_of_a_map_are_written_on_and_the_stage_points_to_the_nearest_edg
     assert cells.text[1, 2] == "2 1"
 
 
+@pytest.mark.slow
 def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(locked: Stage, sketched: SweepAnswer) -> None:
     """Without edges, the nearest cell is not called the stage."""
     (sentence,) = own_place(sketched.data, "sketch", sketched.edges)
@@ -159,7 +146,6 @@ def test_a_cycle_longer_than_the_run_is_told(locked: Stage) -> None:
     assert not caveats(runs.isel({"controller.crossover": [2]}), "sketch")
 
 
-@pytest.mark.inner
 def test_an_attractor_of_few_points_is_not_trusted(locked: Stage) -> None:
     """At 1.357 times its speed, with 2.4 % more friction, a coarse map has an attractor that no orbit confirms."""
     flat = with_friction(faster(locked.flat(), 1.3572), 1.02436)

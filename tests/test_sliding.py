@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 import friso
-from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, stick_slip
+from friso.hunting import StickSlipSpeeds, is_moved_evenly
+from friso.hunting.sliding import stick_slip
 from friso.shown.motion_words import stick_slip_sentences
 from friso.stage import Stage
-
-pytestmark = pytest.mark.inner
 
 
 @pytest.fixture(scope="module")

@@ -99,6 +99,7 @@ def balanced(flat: dict, shape: Kernel, start: np.ndarray, member: Members) -> n
     return start
 
 
+@pytest.mark.cases(first=5)
 @pytest.mark.parametrize("name", CASES)
 def test_a_small_disturbance_goes_the_linear_way(rig: Stage, name: str) -> None:
     """The difference of two runs against the matrix exponential, and whether it dies out or grows."""
@@ -118,6 +119,7 @@ def test_a_small_disturbance_goes_the_linear_way(rig: Stage, name: str) -> None:
     assert (cart[-40:].max() < cart[:100].max()) == (growth < 0)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize("name", ["stuck", "sliding", "sliding-touched", "locked, sliding"])
 def test_frequency_response_of_a_simulated_impulse(rig: Stage, name: str) -> None:
     """Plant and loop as they would be measured: position and force after an impulse on the stage, transformed."""

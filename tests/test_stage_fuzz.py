@@ -122,6 +122,7 @@ scalars = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     st.sampled_from(TEXTS),
@@ -143,6 +144,7 @@ def values_for(place: tuple[str, str, str]) -> st.SearchStrategy[tuple[tuple[str
     return st.tuples(st.just(place), fitting | scalars)
 
 
+@pytest.mark.thorough
 @settings(max_examples=500)
 @given(st.sampled_from(KEYS).flatmap(values_for))
 def test_value_mutations(case: tuple[tuple[str, str, str], object]) -> None:
@@ -151,6 +153,7 @@ def test_value_mutations(case: tuple[tuple[str, str, str], object]) -> None:
     check(written(tables))
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.sampled_from(KEYS), st.sampled_from(KEYS), st.sampled_from(["drop", "copy", "move"]))
 def test_key_mutations(place: tuple[str, str, str], other: tuple[str, str, str], edit: str) -> None:
@@ -168,6 +171,7 @@ def test_noise(content: bytes) -> None:
     check(content.decode(errors="replace"))
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     st.sampled_from(KEYS),

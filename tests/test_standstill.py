@@ -19,9 +19,8 @@ from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
 from friso.frequency.parts import compensator
-from friso.hunting import DITHERS, Ensemble, stuck, wait
+from friso.hunting import DITHERS, Ensemble, HuntingDoubt, stuck, wait
 from friso.hunting import hunting as hunting_of
-from friso.hunting.doubt import HuntingDoubt
 from friso.stage import Stage
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import MoveTask
@@ -93,6 +92,7 @@ def by_hand(flat: dict[str, Any], times: np.ndarray, step: float) -> np.ndarray:
     return np.array(positions)
 
 
+@pytest.mark.cases(slow=4)
 @pytest.mark.parametrize("name", [*SETTINGS, "all"])
 def test_a_trace_against_a_model_by_hand(name: str) -> None:
     settings = {key: value for part in SETTINGS.values() for key, value in part.items()}
@@ -177,6 +177,7 @@ def test_a_dead_zone_before_a_filter_runs_on_a_machine_as_built() -> None:
     assert np.abs(without[:-1] - ideal).max() > 5e-5
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     "name", ["leak", "hysteresis", "push", "standstill", "wide deadband", "dead zone", "wide dead zone"]
 )
@@ -212,7 +213,6 @@ def test_an_integral_that_leaks_is_waited_for_until_it_changes_no_more() -> None
     assert after == pytest.approx(long_after, rel=1e-3)
 
 
-@pytest.mark.inner
 def test_nothing_is_sure_beyond_a_wide_dead_zone() -> None:
     """The break-away force deflects the loop by 1.5 mm; most starts are nearer than 3.5 mm to the reference."""
     wide = hunting_of(machine({"error_deadband": "3.5 mm"}))
@@ -234,18 +234,3 @@ def test_dither_leaves_the_answer_to_runs() -> None:
     assert (hunting.cycles, hunting.certain, hunting.reason) == ((), False, DITHERS)
     with pytest.raises(InputError, match="dither"):
         friso.boundary(chosen, {"controller.ki": "1e4 N/(m*s)..3e4 N/(m*s)"})
-
-
-@pytest.mark.parametrize(
-    ("settings", "parts"),
-    [
-        ({"standstill_window": "5 um"}, ["standstill_factor", "belongs to standstill_window"]),
-        ({"dither_frequency": "5 Hz"}, ["dither_amplitude", "belongs to dither_frequency"]),
-        ({"integral_deadband_exit": "5 um"}, ["integral_deadband", "belongs to integral_deadband_exit"]),
-        ({"integral_deadband": "9 um", "integral_deadband_exit": "5 um"}, ["left at a larger error"]),
-    ],
-)
-def test_what_is_wrong_is_told(settings: dict[str, Any], parts: list[str]) -> None:
-    with pytest.raises(friso.StageError) as refused:
-        machine(settings)
-    assert all(part in str(refused.value) for part in parts), str(refused.value)

@@ -129,6 +129,7 @@ class Twin:
             )
 
 
+@pytest.mark.cases(first=4, slow=7)
 @pytest.mark.parametrize(("name", "method"), EVERY)
 def test_step_against_plain_python(name: str, method: str, tmp_path: Path) -> None:
     """End of the step and dense output agree to what rounding of the state and of the stages may change in them."""

@@ -61,6 +61,7 @@ def same(stored: xr.Dataset, whole: xr.Dataset) -> None:
     xr.testing.assert_identical(loaded, whole)
 
 
+@pytest.mark.slow
 def test_a_store_holds_what_the_sweep_in_memory_gives_and_is_not_run_again(
     rig: Stage, whole: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -102,12 +103,14 @@ def killed_and_resumed(folder: Path) -> tuple[xr.Dataset, int]:
     return read_store(path), kills
 
 
+@pytest.mark.thorough
 def test_a_study_killed_several_times_is_as_if_it_never_was(rig: Stage, tmp_path: Path) -> None:
     resumed, kills = killed_and_resumed(tmp_path)
     assert kills >= 2
     same(resumed, sweep(rig, AXES, rtol=1e-9))
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_done_and_repeats_the_rest(
     rig: Stage, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -131,6 +134,7 @@ def test_ctrl_c_keeps_what_is_done_and_repeats_the_rest(
     same(sweep(rig, AXES, store=path), whole)
 
 
+@pytest.mark.slow
 def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
     rig: Stage, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -163,6 +167,7 @@ FOLLOW = {"friction.static": "3 * friction.coulomb", "friction.coulomb": "0.9 * 
 LISTS = {"joint.stroke": ["0.1 mm", "1 mm"], "controller.alpha": [0.1, 0.2]}
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
     ("first", "second"),
     [
@@ -189,6 +194,7 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, first: 
     assert before == sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
 
 
+@pytest.mark.slow
 def test_chunks_that_a_power_cut_took_are_run_again(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
     path = tmp_path / "a.zarr"
     sweep(rig, AXES, store=path)
@@ -247,6 +253,7 @@ with Store.opened(Path(sys.argv[2]), Request(friso.load(sys.argv[1]), {AXES!r}).
 """
 
 
+@pytest.mark.slow
 def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path) -> None:
     path = tmp_path / "a.zarr"
     command = [sys.executable, "-c", HOLD.replace("{AXES!r}", repr(AXES)), str(EXAMPLES / "thesis_rig.toml"), str(path)]
@@ -325,6 +332,7 @@ def unfinished(path: Path) -> list[str]:
     return [store._number(block) for block in store.missing()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "place"), [("peaks", 0.2), ("period", 0.6), ("status", 0.99), ("outcome", 0.6)])
 def test_a_damaged_block_is_run_again(
     stored: Path, finished: Path, rig: Stage, name: str, place: float, caplog: pytest.LogCaptureFixture
@@ -498,6 +506,7 @@ def test_what_a_store_states_is_such_as_friso_states(stored: Path, name: str, ch
         read_store(stored)["peaks"].load()
 
 
+@pytest.mark.slow
 @posix
 def test_what_lies_deeper_than_files_of_a_store_is_not_looked_at(stored: Path, rig: Stage, tmp_path: Path) -> None:
     """However deep: a path, or a function that calls itself, has an end."""
@@ -513,6 +522,7 @@ def test_a_store_of_another_version_says_so(stored: Path) -> None:
         read_store(stored)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damaged", [(), ("zarr.json",)])
 def test_a_store_of_another_study_or_a_damaged_one_is_replaced_when_told(
     stored: Path, rig: Stage, damaged: tuple[str, ...]
@@ -528,6 +538,7 @@ def test_a_store_of_another_study_or_a_damaged_one_is_replaced_when_told(
         assert list(stored.parent.iterdir()) == [stored]
 
 
+@pytest.mark.slow
 def test_a_store_at_the_end_of_a_link_is_replaced_there(stored: Path, rig: Stage, tmp_path: Path) -> None:
     link, study = tmp_path / "links" / "b.zarr", Request(rig, {"controller.crossover": "2 Hz..3 Hz:2"}).study()
     link.parent.mkdir()
@@ -544,6 +555,7 @@ def test_a_store_at_the_end_of_a_link_is_replaced_there(stored: Path, rig: Stage
     assert not stored.exists()
 
 
+@pytest.mark.slow
 def test_what_is_no_store_is_not_replaced_even_when_told(stored: Path, rig: Stage, tmp_path: Path) -> None:
     """Files of others in a store do not go with it, nor a folder whose metadata mention equations, but not friso."""
     other = Request(rig, {**AXES, "masses.stage": "0.4 kg..0.5 kg:2"}).study()
@@ -591,6 +603,7 @@ def file_of(store: Path, name: object, number: str) -> Path:
     return store / str(name) / (number if name == ".friso" else f"c.{number}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [["peaks"], ["outcome"], ["peaks", ".friso"], None])
 def test_exchanged_chunks_are_run_again(
     stored: Path, finished: Path, rig: Stage, names: list[str] | None, caplog: pytest.LogCaptureFixture
@@ -604,6 +617,7 @@ def test_exchanged_chunks_are_run_again(
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("damage", ["exchanged", "missing", "foreign", "record", "unreadable"])
 def test_damaged_cells_are_not_handed_out(stored: Path, damage: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The error names the chunk; the others are read."""
@@ -629,6 +643,7 @@ def test_damaged_cells_are_not_handed_out(stored: Path, damage: str, monkeypatch
         assert runs["steps"][first].notnull().all()
 
 
+@pytest.mark.slow
 def test_blocks_that_are_not_done_are_read_as_empty(stored: Path) -> None:
     (stored / ".friso" / "0.0").unlink()
     peaks = read_store(stored)["peaks"]
@@ -645,6 +660,7 @@ def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path) -> None:
         read_store(tmp_path / "a.zarr")
 
 
+@pytest.mark.slow
 def test_blocks_of_another_study_are_run_again(stored: Path, rig: Stage, tmp_path: Path) -> None:
     """The other study has the same shape, but another tolerance."""
     other = sweep(rig, AXES, store=tmp_path / "b.zarr", rtol=1e-4)
@@ -664,6 +680,7 @@ def test_a_store_is_open_to_whom_the_user_lets_read_files(rig: Stage, tmp_path: 
     assert modes == {0o640, 0o750}
 
 
+@pytest.mark.slow
 def test_files_that_were_being_written_go_but_no_others(stored: Path, rig: Stage) -> None:
     left = [stored / "peaks" / f"c.1.{'a' * 32}.partial", stored / ".friso" / f"0.1.{'b' * 32}.partial"]
     for file in (*left, stored / "notes.partial"):
@@ -673,6 +690,7 @@ def test_files_that_were_being_written_go_but_no_others(stored: Path, rig: Stage
     assert (stored / "notes.partial").exists()
 
 
+@pytest.mark.slow
 def test_a_store_stays_where_the_one_in_its_place_cannot_be_made(
     stored: Path, finished: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -41,6 +41,7 @@ def order(errors: list[float], ratio: float = 2.0) -> float:
     return float(np.log(errors[-2] / errors[-1]) / np.log(ratio))
 
 
+@pytest.mark.slow
 @METHODS
 def test_order_of_the_solution(method: Tableau, exact: np.ndarray) -> None:
     errors = [float(np.linalg.norm(march(method, START, n) - exact)) for n in (40, 80)]
@@ -58,6 +59,7 @@ def test_order_of_the_error_estimate(method: Tableau) -> None:
     assert order(errors) == pytest.approx(method.error_order + 1, abs=0.1)
 
 
+@pytest.mark.cases(first=2)
 @METHODS
 @pytest.mark.parametrize("theta", [0.2, 0.5, 0.8])
 def test_order_of_the_dense_output(method: Tableau, theta: float) -> None:

@@ -62,6 +62,7 @@ def put(one: Any, version: str, place: int, value: float) -> None:
     getattr(one, SLAVES[version][1])([place], [value])
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(("control", "machine"), PAIRS)
 def test_fmus_are_valid_and_reproduce_the_run(tmp_path: Path, control: str, machine: str) -> None:
     """FMPy finds nothing against the standard's schemas and rules, and the test that is written passes."""
@@ -153,6 +154,7 @@ def test_communication_may_be_rarer_or_more_frequent_than_samples(folder: Path) 
     np.testing.assert_allclose(ends[1::2], 100 * STEP)
 
 
+@pytest.mark.slow
 @runs_here
 @pytest.mark.parametrize("version", "23")
 def test_two_coupled_fmus_hunt_as_friso_s_machine(tmp_path: Path, version: str) -> None:

@@ -181,6 +181,7 @@ def by_hand(stage: Stage, times: np.ndarray, law: Law, numbers_held: int) -> np.
     return answer.y[[0, 2]]
 
 
+@pytest.mark.slow
 def test_trace_of_a_pid_on_the_load() -> None:
     stage = machine()
     gains, size = numbers(stage.flat()), stage.flat()["motion.size"]
@@ -294,6 +295,7 @@ def described(stage: Stage, harmonics: int) -> tuple[float, float]:
     return np.ptp(np.real(of_load @ waves)) / 2, 2 * np.pi / omega
 
 
+@pytest.mark.slow
 def test_an_integrator_across_a_backlash_hunts_without_friction(backlash_alone: Stage) -> None:
     """Shooting, long simulation and the describing function of its harmonics find the same cycle.
 
@@ -317,7 +319,6 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
     assert cannot_hunt(backlash_alone.replace({"transmission.backlash": "0 um"}))
 
 
-@pytest.mark.inner
 def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) -> None:
     """All motions shrink in proportion to the backlash, so no small share of it ends them."""
     result = feeding(backlash_alone)
@@ -326,7 +327,7 @@ def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) 
     assert "backlash" in " ".join(feeding_sentences(result))
 
 
-@pytest.mark.inner
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "certain"), [(0.01, True), (0.001, False)])
 def test_what_feeds_it_is_computed(share: float, certain: bool) -> None:
     """A belt with backlash and little friction still swings without friction, and rests with less backlash.
@@ -340,7 +341,6 @@ def test_what_feeds_it_is_computed(share: float, certain: bool) -> None:
     assert result == Feeding(Decline(share, None, True), Decline(1.0, share, certain))
 
 
-@pytest.mark.inner
 def test_what_feeds_it_is_told() -> None:
     keys = dry_friction(machine().flat())
     assert {"friction.static", "motor_friction.bristle_stiffness", "friction.bristle_damping"} <= {*keys}
@@ -369,6 +369,7 @@ def test_a_drive_as_built_reads_its_encoders(position: str, velocity: str) -> No
     assert np.abs(other[:count] - smooth[:count]).max() > 5 * error, "the side makes no difference"
 
 
+@pytest.mark.slow
 def test_bode_across_a_transmission() -> None:
     """Loops of all states with encoders on both sides, sampled: as they are one by one; the fastest controller."""
     drive = {"sample_time": "100 us", "delay": "100 us"}

@@ -269,6 +269,7 @@ CONTROLLERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.5, 3.978])
 def test_bandwidth_and_margin_are_those_of_the_gains_at_standstill_too(
     rigid: Stage, machines: Fleet, factor: float
@@ -316,6 +317,7 @@ def observed(s: complex) -> complex:
     return complex(mass * feedback @ np.linalg.solve(s * np.eye(3) - drift, gains))
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(
     ("controller", "force", "free", "between"),
     [
@@ -356,6 +358,7 @@ def test_a_light_mode_that_rises_above_0_db_is_where_the_loop_last_crosses_it(ri
     assert bandwidths_at(stage, [1.0]) == pytest.approx([loop_bandwidth(stage)], rel=1e-3)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("free", [False, True])
 def test_a_search_tries_the_bandwidth_at_its_limit(free: bool, machines: Fleet) -> None:
     """The limit is tried even if the bandwidth is not proportional to the controller's key."""
@@ -488,6 +491,7 @@ def working(remedy: Remedy, tuned: Stage) -> RemedyOutcome:
     return RemedyOutcome(remedy, tuned, None, None, ())
 
 
+@pytest.mark.slow
 def test_the_answer_does_not_hunt(tuning: Advice, works: Any) -> None:
     """The answer's verdicts say so, and so does `friso check`; the edge is at least a fifth of the bandwidth away."""
     assert tuning.needed
@@ -511,6 +515,7 @@ def test_what_does_not_change_is_as_before(tuning: Advice) -> None:
     assert f"acts of {with_unit(present.stiffness, 'N/m')}" in price(present, of_none, buys_joint=False)
 
 
+@pytest.mark.slow
 def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
     """Before the integral acts, a controller is nowhere softer.
 
@@ -629,6 +634,7 @@ def test_the_answer_as_files(tuning: Advice, undrawn: None) -> None:
     assert high is None  # of few machines
 
 
+@pytest.mark.slow
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
     """Settings with which only some moves settle are none either: 11.5 Hz is too close to the edge of 9.75 Hz."""
     near = rigid.replace({"controller.crossover": "11.5 Hz"})
@@ -639,6 +645,7 @@ def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning:
     assert confirmed(rigid, goal).doubts == ("verdict", "distance", "window")
 
 
+@pytest.mark.slow
 def test_the_distance_from_hunting_is_that_from_its_edge(rigid: Stage, goal: Goal) -> None:
     """Found from other starts than the edge, which follows orbits: 1.2 times the quiet end is far enough, less is not.
 
@@ -757,6 +764,7 @@ def test_what_changes_nothing_costs_nothing(tuning: Advice, works: Any) -> None:
     assert (tuning.machines.sizes < tuning.machines.moves.largest).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("doubt", "work", "verified"),
     [("given up", 1e9, 1), ("distance", 1e9, RemedySettings().most_tries), ("distance", 1.0, 1)],
@@ -889,6 +897,7 @@ def test_sensitivities_and_gains_are_those_behind_the_drive_as_built(tuning: Adv
     assert "bandwidth" in gains
 
 
+@pytest.mark.slow
 def test_what_decides_is_drawn_and_named(tuning: Advice, works: Any) -> None:
     """Nine lines were drawn over each other."""
     moves = works.measured.moves
@@ -954,6 +963,7 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before(tuning: Advic
     assert "none surely meets it" not in reason(kept, cut=True)  # none was surveyed: nothing is said of these
 
 
+@pytest.mark.cases(first=7)
 @pytest.mark.parametrize("first", np.arange(0, 0.95, 0.08))
 def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machines: Fleet, rigid: Stage) -> None:
     """Settings settle sooner the lower they are, and a window of 6 % anywhere has no limit cycle.
@@ -1011,6 +1021,7 @@ def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet
     assert not np.isfinite(moves.looser).any()
 
 
+@pytest.mark.slow
 def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     """At 8 Hz one isolator settles the stage; at 1 Hz none of those tried does."""
     tried, none = suggestion(rigid), suggestion(rigid.replace({"controller.crossover": "1 Hz"}))
@@ -1085,6 +1096,7 @@ def test_what_works_alone_is_not_tried_together(tuning: Advice, works: Any) -> N
         assert session._combines(listed["isolator and gains"]) == left_out
 
 
+@pytest.mark.slow
 def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) -> None:
     """The answer was "as it is: never (0 %)" for a stage without a limit cycle, 12 % of whose moves were too slow."""
     assert as_it_is(tuning) in explained(tuning)
@@ -1112,6 +1124,7 @@ def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) ->
     assert "perhaps a limit cycle, but" in says("certain", case=doubtful)
 
 
+@pytest.mark.slow
 def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet_the_goal(
     rigid: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -1142,6 +1155,7 @@ def test_costs_order_settings() -> None:
     assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3, 4]
 
 
+@pytest.mark.slow
 def test_points_given_up_early_are_those_that_no_search_would_have_kept(
     rigid: Stage, goal: Goal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -1188,6 +1202,7 @@ def test_a_search_goes_on_while_all_points_are_as_bad(rigid: Stage, goal: Goal, 
     assert counts[0] > counts[1]
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(("margins", "kept"), [([0.6, 0.0, 0.5], [0, 2, 0]), ([0.6, 0.3, 0.5], [0, 1, 2])])
 def test_a_rare_machine_does_not_stand_for_a_twentieth(
     rigid: Stage, monkeypatch: pytest.MonkeyPatch, margins: list[float], kept: list[int]

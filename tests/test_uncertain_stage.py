@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from refusals import refused
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
-from friso.design_method.spec import SpecMachine
 from friso.errors import InputError
 from friso.interface.inputs import read_stage
 from friso.intervals import NORMAL_COVERAGE, UncertainValue
@@ -97,32 +96,6 @@ def test_value_survives_pickling_and_set(rig: Stage) -> None:
     assert (value, value.text, value.interval) == (2.0, "2 N +/- 1 N", stage.uncertain()[COULOMB])
     assert stage.replace({"joint.locked": True}).uncertain() == stage.uncertain()
     assert stage.replace({COULOMB: "2 N"}).uncertain() == {}
-
-
-WRONG = {
-    COULOMB: ["2 +/- 1 N", "2 N +/- 1", "2 N +/- 1 mm", "2 N .. 1 N", "-1 N .. 2 N", "-1 N +/- 2 N", "2 N +/- -1 N"],
-    f"{COULOMB}, {STATIC}": ["2 N .. 5 N"],
-    "controller.alpha": ["0.5 .. 1", "0.5 +/- nan", "0.1"],
-    "controller.kind": ["pid .. pd"],
-    "joint.locked": ["0 .. 1"],
-}
-
-
-@pytest.mark.parametrize("key", WRONG)
-def test_refused(rig: Stage, key: str) -> None:
-    for text in WRONG[key]:
-        with refused(key):
-            rig.replace({key.split(", ", maxsplit=1)[0]: text})
-
-
-def test_numbers_of_leaves_and_of_specifications_are_certain() -> None:
-    """A specification states one value or an allowed range, not the uncertainty of a machine."""
-    leaves = load(EXAMPLE.parent / "thesis_leaves.toml")
-    for text in ("2 +/- 1", "2 .. 4"):
-        with refused("flexure.leaves"):
-            leaves.replace({"flexure.leaves": text})
-    with refused("crossover_limit"):
-        SpecMachine(crossover_limit="48 Hz +/- 5 Hz")
 
 
 def test_single_valued_commands_say_that_centres_are_used(

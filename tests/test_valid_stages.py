@@ -55,6 +55,7 @@ def test_a_joint_of_which_all_is_told_can_be_free() -> None:
     assert isolated(stage) == stage.variants()["free"]
 
 
+@pytest.mark.slow
 def test_commands_take_a_joint_that_cannot_be_free() -> None:
     """Messages named a joint without damping, although only a free joint needs it."""
     stage = locked(("stiffness",))
@@ -79,6 +80,7 @@ def _answered(stage: Stage, ask: Callable[[Stage], Answer]) -> bool:
         return not (error.actual and error.expected)
 
 
+@pytest.mark.slow
 def test_what_is_drawn_from_the_schema_is_taken_as_a_whole(caplog: pytest.LogCaptureFixture) -> None:
     """The stage as a whole is valid, not only each key, and every key occurs."""
     caplog.set_level(logging.ERROR)

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 import pytest
 import sympy as sp
-from cycles import by_gains
+from cycles import by_gains, flow, flow_by_differences
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
@@ -24,8 +24,6 @@ from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.structure import structure
 from friso.equations.variational import PREFIX, variational
 from friso.hunting import Ensemble
-from friso.hunting.cycle.ensemble import done
-from friso.hunting.cycle.shooting import shoot
 from friso.stage import Stage
 
 STEADY = settings(max_examples=40)
@@ -39,9 +37,6 @@ STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
 
 CLOSE = 3e-6
 """Share to which derivatives agree with differences; a tenth of it is observed, mostly noise of the differences."""
-
-DIFFERENCES = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
-"""Weights of the central difference of order 4."""
 
 RIGID, LIMITED = "rigid", "rigid, van Dijk, limit"
 LOCKED_RIG, FREE_RIG = "locked, parasitic", "free, parasitic"
@@ -68,24 +63,6 @@ def moving(stages: Ensemble, place: float, speed: float, **others: float) -> np.
     return np.array([sizes[name] for name in stages.kernel.states])
 
 
-def flow(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
-    """Derivative of the state after a time [s] by the state at the start, all in units of the states' magnitudes."""
-    shot = shoot(stages, start[None], np.array([time]), 1.0, FINE)
-    assert shot.done.all()
-    return shot.flows[0] * stages.scales[0] / stages.scales[0][:, None]
-
-
-def flow_by_differences(stages: Ensemble, start: np.ndarray, time: float, step: float) -> np.ndarray:
-    """Return the derivative of the flow by finite differences of simulated runs."""
-    size, scales = start.size, stages.scales[0]
-    starts = np.concatenate([start + k * step * np.diag(scales) for k in DIFFERENCES])
-    several = stages.take(np.zeros(len(starts), np.int64))
-    results = several.run(starts, np.full(len(starts), time), FINE / 10)
-    assert done(results).all()
-    ends = results.ends.reshape(len(DIFFERENCES), size, size)
-    return np.tensordot(list(DIFFERENCES.values()), ends, 1).T / step / scales[:, None]
-
-
 def off(stages: Ensemble, start: np.ndarray, time: float, flows: np.ndarray) -> np.ndarray:
     """Return the error of each column of a derivative, relative to its norm or to a tenth if that is larger.
 
@@ -103,7 +80,7 @@ def velocities(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
     return results.samples[0][:, names.index("cart_velocity" if "cart_velocity" in names else "velocity")]
 
 
-@pytest.mark.inner
+@pytest.mark.slow
 @pytest.mark.xdist_group("rigid")
 @STEADY
 @given(
@@ -135,7 +112,7 @@ CASES = [
 ]
 
 
-@pytest.mark.inner
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize(("name", "time", "crosses"), CASES)
 def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -> None:
     """Each structure runs up to its first reversal and past several.
@@ -149,7 +126,6 @@ def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -
     assert np.all(off(stages, start, time, flow(stages, start, time)) < CLOSE)
 
 
-@pytest.mark.inner
 @pytest.mark.xdist_group("gains")
 @pytest.mark.parametrize("time", [0.02, 0.05, 0.1, 0.3, 0.5])
 def test_flow_at_the_force_limit(time: float) -> None:
@@ -210,7 +186,6 @@ def bounce() -> Bounce:
     return Bounce()
 
 
-@pytest.mark.inner
 @pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> None:
@@ -219,7 +194,6 @@ def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> Non
     assert np.all(off(bounce.stages, bounce.start, time, flow(bounce.stages, bounce.start, time)) < CLOSE)
 
 
-@pytest.mark.inner
 @pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_deviations_jump_at_the_limiter_by_the_saltation_matrix(bounce: Bounce, time: float) -> None:
@@ -245,6 +219,7 @@ def declared(name: str) -> tuple[Model, Model]:
     return model, variational(model)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("name", [RIGID, LIMITED, LOCKED_RIG, FREE_RIG, "touching"])
 def test_deviations_follow_the_linearised_equations(name: str) -> None:
     """After the states come as many deviations; their rates are the Jacobian times them."""
@@ -315,6 +290,7 @@ def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> M
     return Meeting(dict(values), dict(zip(map(str, whole.jumps[kink]), map(float, result), strict=True)))
 
 
+@pytest.mark.cases(first=6, slow=14)
 @pytest.mark.parametrize("name", VARIANTS)
 def test_deviations_jump_at_a_limiter_alone(name: str) -> None:
     """No friction law's rates jump at v = 0, nor a controller's at its limit.
@@ -334,6 +310,7 @@ def test_deviations_jump_at_a_limiter_alone(name: str) -> None:
         assert list(point.jumps.values()) == pytest.approx([0.0], abs=1e-9 * size)
 
 
+@pytest.mark.cases(first=2)
 @pytest.mark.parametrize(("side", "leaves"), list(product(("ahead", "behind"), (False, True))))
 def test_jump_at_a_limiter_by_hand(side: str, leaves: bool) -> None:
     """The force of its damper, d_l times a speed, is shared over that speed: whatever it is, the velocities deviate by
@@ -348,6 +325,7 @@ def test_jump_at_a_limiter_by_hand(side: str, leaves: bool) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_kink_whose_surface_is_level_at_a_trial_point_has_a_jump() -> None:
     """Two windows and a cascade: the surface of one does not depend there on the symbol that it is linear in."""
     stage = friso.load(friso.example("thesis_rig")).replace(

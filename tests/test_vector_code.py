@@ -44,6 +44,7 @@ def parted(x, at):
 CODE = [arithmetic, choices, of_known_truths, of_several]
 
 
+@pytest.mark.cases(first=9)
 @pytest.mark.parametrize("lanes", [1, 2, 8, 12])
 @pytest.mark.parametrize("function", CODE)
 def test_all_lanes_do_what_plain_python_does_in_one(function: Callable[..., None], lanes: int) -> None:

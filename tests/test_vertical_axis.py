@@ -29,6 +29,7 @@ def axis(controller: dict, weight: float = WEIGHT, **tables: dict) -> Stage:
     return rig.replace({**hold, "bias": {"stage": f"{-weight} N"}, "controller": controller, **tables})
 
 
+@pytest.mark.cases(first=3)
 @pytest.mark.parametrize("drive", [{}, {"drive": AS_BUILT}], ids=["continuous", "as built"])
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_a_held_axis_stays_where_it_is(name: str, drive: dict) -> None:
@@ -61,6 +62,7 @@ BIASES = {
 DRIVES = pytest.mark.parametrize("drive", [{}, {"drive": {"sample_time": "100 us", "delay": "130 us"}}])
 
 
+@pytest.mark.cases(first=3)
 @DRIVES
 @pytest.mark.parametrize("bias", BIASES)
 @pytest.mark.parametrize(
@@ -83,6 +85,7 @@ def test_a_joint_is_deflected_from_the_start(structure: dict, bias: str, drive: 
     assert np.abs(run.friction_force).max() < 1e-9
 
 
+@pytest.mark.cases(first=2)
 @DRIVES
 @pytest.mark.parametrize("velocity", ["load", "motor"])
 @pytest.mark.parametrize("position", ["load", "motor"])
@@ -102,6 +105,7 @@ def test_a_transmission_is_on_its_flank_from_the_start(
     assert run.transmission_deflection.values == pytest.approx(WEIGHT / 20e6 + 1e-5 * bool(backlash), rel=1e-6)
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("drive", [{}, {"drive": {**AS_BUILT, "motor_constant_ratio": 0.8}}])
 def test_a_release_is_a_step_of_the_reference_that_the_derivative_does_not_see(drive: dict) -> None:
     """At a displacement the controller has carried the weight, in continuous time and sampled."""
@@ -125,6 +129,7 @@ def test_a_cable_is_carried_from_the_start() -> None:
     assert run.logged["force"] == pytest.approx(WEIGHT + 20.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_pushes_hunt_alike_with_a_weight_and_without() -> None:
     """The integral carries the weight before the push, as before a displacement; a level axis is the same."""
     kicks = []

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from variants import gains, lugre, release, stage, there_and_back, van_dijk
+from variants import gains, lugre, release, stage, there_and_back
 
 import friso
 from benchmarks.windows_by_hand import trace
 from friso.equations import motion
 from friso.equations.settings import gain_states
+from friso.hunting import HuntingDoubt
 from friso.hunting import hunting as hunting_of
-from friso.hunting.doubt import HuntingDoubt
 from friso.stage import Stage
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import MoveTask
@@ -195,43 +195,12 @@ def test_windows_in_the_position_loop_leave_the_velocity_loop_alone(name: str, s
     assert np.abs(ours - theirs).max() < 2e-6
 
 
-def test_a_position_loop_needs_a_cascade() -> None:
-    with pytest.raises(friso.StageError, match="cascade"):
-        machine({"windows_in_position_loop": True})
-
-
 def test_margins_are_of_the_gains_of_the_position_loop() -> None:
     states = gain_states(cascade({**IN_LOOP["inner gains"], "windows_in_position_loop": True}).flat())
     assert [(one["controller.kv"], one["controller.kp"]) for one in states] == [(25.0, 60.0), (10.0, 60.0)]
     times = [one["controller.position_integral_time"] for one in states]
     assert times == pytest.approx([0.2, 0.2 * 0.4 / 3.0])
     assert {one["controller.velocity_integral_time"] for one in states} == {0.03}
-
-
-@pytest.mark.parametrize(
-    ("settings", "parts"),
-    [
-        ({"freeze_window_exit": "5 um"}, ["freeze_window", "belongs to freeze_window_exit"]),
-        ({"error_deadband_time": "5 ms"}, ["error_deadband", "belongs to error_deadband_time"]),
-        ({"integral_deadband_decay": "5 ms"}, ["integral_deadband", "belongs to integral_deadband_decay"]),
-        ({"schedule_error": ["1 um", "2 um"]}, ["schedule_factor"]),
-        ({"schedule_factor": [1, 2]}, ["schedule_error"]),
-        ({"schedule_error": ["2 um", "1 um"], "schedule_factor": [1, 2]}, ["rising"]),
-        ({"schedule_error": ["1 um", "2 um"], "schedule_factor": [1, 2, 3]}, ["as many values"]),
-        ({"freeze_window": "9 um", "freeze_window_exit": "5 um"}, ["left at a larger error"]),
-    ],
-)
-def test_what_is_wrong_is_told(settings: dict[str, Any], parts: list[str]) -> None:
-    with pytest.raises(friso.StageError) as refused:
-        machine(settings)
-    assert all(part in str(refused.value) for part in parts), str(refused.value)
-
-
-def test_an_integral_factor_needs_keys_for_the_integral() -> None:
-    settings = {"standstill_window": "9 um", "standstill_factor": 0.5, "standstill_integral_factor": 0.2}
-    by_rules = stage(MOVE, friction=lugre(2), controller=van_dijk())
-    with pytest.raises(friso.StageError, match="standstill_integral_factor"):
-        by_rules.replace({f"controller.{key}": value for key, value in settings.items()})
 
 
 def test_margins_are_of_every_set_of_gains() -> None:
@@ -244,6 +213,7 @@ def test_margins_are_of_every_set_of_gains() -> None:
     assert not any("schedule" in key for state in states for key in state)
 
 
+@pytest.mark.slow
 def test_cycles_are_as_stable_as_runs_beside_them_show() -> None:
     """Deviations are carried through the switches: multipliers of orbits against the growth in runs."""
     for name in ("deadband with time", "inner gains", "schedule over the error"):
@@ -251,7 +221,6 @@ def test_cycles_are_as_stable_as_runs_beside_them_show() -> None:
         assert cycle.multiplier == pytest.approx(cycle.growth, abs=2e-3)
 
 
-@pytest.mark.inner
 def test_without_an_integral_a_switched_force_leaves_the_answer_open() -> None:
     """A dead zone that is left later than it is entered takes force away where it would brake."""
     plain = machine({"error_deadband": "100 um"}).replace({"controller.ki": "0 N/(m*s)"})
@@ -260,6 +229,7 @@ def test_without_an_integral_a_switched_force_leaves_the_answer_open() -> None:
     assert (hunting_of(switched).certain, hunting_of(switched).reason) == (False, HuntingDoubt.SWITCHES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["deadband with exit", "freeze", "inner gains", "decay"])
 def test_what_is_said_of_hunting_is_what_a_long_run_by_hand_does(name: str) -> None:
     chosen = machine(WINDOWS[name], release("2 mm", "40 s"))

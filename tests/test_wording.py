@@ -66,6 +66,7 @@ def test_every_command_has_its_words_here() -> None:
     assert sorted(MISTAKES) == list(COMMANDS)
 
 
+@pytest.mark.cases(first=6)
 @pytest.mark.parametrize("command", MISTAKES)
 def test_help(command: str, tmp_path: Path, snapshots: Snapshots) -> None:
     done = friso_inside(tmp_path, command, "--help")
@@ -74,6 +75,7 @@ def test_help(command: str, tmp_path: Path, snapshots: Snapshots) -> None:
     snapshots.check(command, "help", done.stdout)
 
 
+@pytest.mark.cases(first=13)
 @pytest.mark.parametrize("command", MISTAKES)
 def test_a_mistake(command: str, tmp_path: Path, snapshots: Snapshots) -> None:
     done = friso_inside(tmp_path, command, *MISTAKES[command])
@@ -81,7 +83,7 @@ def test_a_mistake(command: str, tmp_path: Path, snapshots: Snapshots) -> None:
     snapshots.check(command, "mistake", done.stderr)
 
 
-LONG = {"boundary": pytest.mark.thorough}
+LONG = dict.fromkeys(("boundary", "check"), pytest.mark.thorough) | {"bode": pytest.mark.slow}
 
 
 @pytest.mark.parametrize("command", [pytest.param(name, marks=LONG.get(name, ())) for name in RUNS])

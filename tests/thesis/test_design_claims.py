@@ -42,6 +42,7 @@ def test_the_parameter_study_against_the_experiment(below: float, holds: bool) -
     assert registered()["F25P"].judge(Evidence({"system": system}, {})).pattern == (holds,)
 
 
+@pytest.mark.slow
 def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
     """At a ratio just below the one found the margin is too small; from it on it never is."""
     from friso.frequency.crossover import settled_margin

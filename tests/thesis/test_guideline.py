@@ -83,8 +83,9 @@ def with_mode(flat: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
 # groups
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize(
-    "flat", [plain_rig(), plain_rig("joint"), plain_rig("joint") | {"parasitic.frequency": 300.0}], ids=len
+    "flat", [plain_rig("joint") | {"parasitic.frequency": 300.0}, plain_rig("joint"), plain_rig()], ids=len
 )
 def test_groups_are_as_many_as_buckingham_says_and_independent(flat: dict[str, Any]) -> None:
     """The number of groups is the number of parameters less the rank of their dimensions.
@@ -103,6 +104,7 @@ def test_groups_are_as_many_as_buckingham_says_and_independent(flat: dict[str, A
     assert np.allclose(powers @ np.stack([dimensions(name, flat) for name in names]), 0)
 
 
+@pytest.mark.slow
 def test_parameters_are_all_that_the_equations_contain() -> None:
     """Every key in the equations of the rig is in a parameter; rigid masses enter as their sum alone."""
     model = assemble(structure(plain_rig()))
@@ -121,6 +123,7 @@ def test_groups_and_back() -> None:
     assert again.keys() | {"motion.kind"} >= {key for key in flat if not key.startswith("motion.")}
 
 
+@pytest.mark.slow
 @RIGID
 @settings(max_examples=8)
 @given(*[st.floats(-3, 3)] * 3)
@@ -202,6 +205,7 @@ def swept(values: dict[str, np.ndarray]) -> Edges:
     return find_edges(sweeps._stages(values), sweeps.LOCKED_GRID[None])  # pyright: ignore[reportPrivateUsage]
 
 
+@pytest.mark.slow
 @RIGID
 def test_simulation_agrees_where_hunting_ends() -> None:
     """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz; at a gap of 0.12 one
@@ -218,6 +222,7 @@ def test_simulation_agrees_where_hunting_ends() -> None:
     assert [item[0] for item in swings_from_any_distance(stages)] == [True, True]
 
 
+@pytest.mark.slow
 @RIGID
 def test_edge_stays_where_simulations_settle_above_but_not_where_they_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """A cycle that repels far above does not tell of the edge; a failed simulation is not one that settles."""
@@ -235,6 +240,7 @@ def test_edge_stays_where_simulations_settle_above_but_not_where_they_fail(monke
     assert not runs.located[0]
 
 
+@pytest.mark.slow
 @RIGID
 def test_jump_is_told_apart_and_followed() -> None:
     runs = swept(JUMPS)
@@ -258,6 +264,7 @@ def made(count: int, seed: int, noise: float) -> tuple[dict[str, np.ndarray], np
     return values, np.exp(off) / (1 / slip + 1 / drop)
 
 
+@pytest.mark.slow
 def test_law_finds_known_numbers_and_leaves_out_the_rest() -> None:
     """Whatever outliers there are; held-out errors tell a law of the wrong shape."""
     values, edges = made(256, 1, 0.02)
@@ -491,6 +498,7 @@ def test_interrupted_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert keep.count == 0
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("after", [0, 9, 40])
 def test_an_interrupted_guideline_answers_from_fewer_samples(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
     """Sweeps grow in rounds; the last whole round counts, and a larger sweep takes the parts of smaller ones over."""

@@ -78,6 +78,7 @@ FAILS: Mapping[str, Mapping[str, Any]] = {
 """Rigs that are not, in more parts than ours."""
 
 
+@pytest.mark.cases(slow=2)
 @pytest.mark.parametrize("claim", HOLDS)
 def test_judges_recognise_what_holds_and_what_does_not(linear: Linear, claim: str) -> None:
     holds, fails = (judged(claim, changed(rigs[claim])) for rigs in (HOLDS, FAILS))
@@ -156,6 +157,7 @@ def test_bristles_in_steady_state_are_the_family() -> None:
     assert (abscissa_with_bristles(flat, speed, 0.0) < 0).all()
 
 
+@pytest.mark.cases(first=1)
 @pytest.mark.parametrize("joint", ["free", "locked"])
 def test_the_edges_of_stability(linear: Linear, joint: str) -> None:
     """The rig is stable just below the delay or the crossover of the edge, and unstable just above."""

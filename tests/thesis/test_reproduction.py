@@ -692,6 +692,7 @@ def test_values_that_do_not_enter_are_not_ranked() -> None:
 # --- the whole --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_zero_rows_have_their_meaning() -> None:
     result = reproduce(["path", "friction", "isolator-stiffness"], points=3, with_cycles=False, draws=0).maps
     still = result["path"]

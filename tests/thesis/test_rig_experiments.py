@@ -35,6 +35,7 @@ def test_the_stroke_of_a_free_joint_matters() -> None:
     assert rig_document(outcome)["results"]
 
 
+@pytest.mark.slow
 def test_limits_take_fewer_runs_than_the_grid_that_shows_them() -> None:
     """What is left out cannot move a limit: the lowest crossover is tried on some rails, one above the limit on all."""
     free, seeds = with_joint(RIG, locked=False), np.arange(1.0, 4.0)
@@ -49,6 +50,7 @@ def test_limits_take_fewer_runs_than_the_grid_that_shows_them() -> None:
     assert tried[:, 0].any(axis=1).all()
 
 
+@pytest.mark.slow
 def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
     """Fig. 27."""
     with patched({measured_cycles: {"CYCLE_STARTS": (0.0,)}}):

@@ -134,6 +134,7 @@ EACH = [
 ]
 
 
+@pytest.mark.cases(first=54)
 @pytest.mark.parametrize(("what", "made", "pattern"), EACH)
 def test_made_evidence(what: str, made: Any, pattern: tuple[bool, ...]) -> None:
     finding = judged(what, made)

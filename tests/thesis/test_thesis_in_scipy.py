@@ -129,6 +129,7 @@ def test_s341_s352_the_forces() -> None:
 STILL = {"peaks": np.zeros((2, 2)), "peak_to_peak": np.zeros((2, 2)), "outcome": np.full((2, 2), "rests")}
 
 
+@pytest.mark.slow
 def test_f5_the_locked_rig_hunts() -> None:
     """One mass with LuGre friction under the controller of Eq. 7, moved 90 mm there and back, swings afterwards.
 
@@ -176,6 +177,7 @@ def test_f5_the_locked_rig_hunts() -> None:
     assert 1e-4 < amplitude < 3.2e-3
 
 
+@pytest.mark.slow
 def test_s323_the_solver_of_the_thesis_follows_a_move_as_friso_does() -> None:
     """ode23s and the equations of the rig by hand, out of the limiters and back onto them."""
     end, sample = 0.1, 1e-3
