@@ -1,4 +1,4 @@
-"""Turning points of a run, and the return map of a hunting cycle."""
+"""Turning points of a run, its derivative by where it begins, and the return map of a hunting cycle."""
 
 import numpy as np
 from variants import gains, limit, lugre, release, stage
@@ -7,6 +7,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
+from friso.hunting import Ensemble
 from friso.stage import Stage
 
 
@@ -29,6 +30,27 @@ def swings(stage: Stage, rtol: float) -> tuple[np.ndarray, np.ndarray]:
     parts = zip(np.split(times, starts[1:]), np.split(np.abs(values), starts[1:]), strict=True)
     farthest = [(t[np.argmax(v)], np.max(v)) for t, v in parts]
     return np.array([t for t, _ in farthest]), np.array([v for _, v in farthest])
+
+
+def flow(stages: Ensemble, start: np.ndarray, time: float, rtol: float = 1e-11) -> np.ndarray:
+    """Derivative of the state after a time [s] by the state at the start, all in units of the states' magnitudes."""
+    size, scales = start.size, stages.scales[0]
+    starts, several = np.hstack([np.tile(start, (size, 1)), np.eye(size)]), stages.take(np.zeros(size, np.int64))
+    results = several.run(starts, np.full(size, time), rtol, variational=True)
+    assert (results.statuses == Status.DONE).all()
+    return results.ends[:, size:].T * scales / scales[:, None]
+
+
+def flow_by_differences(stages: Ensemble, start: np.ndarray, time: float, step: float) -> np.ndarray:
+    """The same by finite differences of simulated runs."""
+    weights = {2: -1 / 12, 1: 8 / 12, -1: -8 / 12, -2: 1 / 12}
+    size, scales = start.size, stages.scales[0]
+    starts = np.concatenate([start + k * step * np.diag(scales) for k in weights])
+    several = stages.take(np.zeros(len(starts), np.int64))
+    results = several.run(starts, np.full(len(starts), time), 1e-12)
+    assert (results.statuses == Status.DONE).all()
+    ends = results.ends.reshape(len(weights), size, size)
+    return np.tensordot(list(weights.values()), ends, 1).T / step / scales[:, None]
 
 
 def return_map(heights: np.ndarray, near: float = 0.03) -> tuple[float, float]:

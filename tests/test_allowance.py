@@ -11,9 +11,6 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import CALL_WORK, OPERATION_WORK, STEP_WORK, kernel
 from friso.engine.settings import WorkSettings
 from friso.equations.structure import structure
-from friso.hunting import CheckPart
-from friso.hunting.measures import measured_run
-from friso.hunting.verdict import judge
 from friso.stage import Stage
 
 
@@ -72,22 +69,6 @@ def test_runs_beyond_an_allowance_are_refused(locked: Stage) -> None:
     with allowance(needed.used / 4), allowance(2 * needed.used), pytest.raises(Exhausted):
         runs_of(locked, 1)
     runs_of(locked, 1)  # without one, as many as are wanted
-
-
-@pytest.mark.thorough
-def test_what_too_little_work_does_not_settle_is_not_certain(locked: Stage) -> None:
-    """The stage of the thesis hunts: the more of the work is missing, the less is said, and nothing else."""
-    full = judge(locked, measured_run(locked), 1e-6)
-    half = judge(locked, measured_run(locked), 1e-6, work=5e7)
-    none = judge(locked, measured_run(locked), 1e-6, work=1e5)
-    assert not full.given_up
-    assert full.margin
-    assert full.margin.certain
-    assert half.verdict == full.verdict == "hunts"
-    assert CheckPart.BANDWIDTHS in half.given_up
-    assert half.margin is None or not half.margin.certain
-    assert not none.hunting.certain
-    assert CheckPart.STARTS in half.given_up
 
 
 def test_who_gave_up_is_told_as_far_out_as_the_work_was_short() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -137,16 +136,6 @@ def test_the_constant_of_the_file_is_that_of_export() -> None:
     with pytest.raises(friso.InputError, match="50 N/A"):
         gains_of(stage, {"motor_constant": "40 N/A"})
     assert gains_of(stage, {"motor_constant": "50 N/A"}).conversions == gains_of(stage, {}).conversions
-
-
-def test_gains_to_type_in_name_the_log_to_record_next(tmp_path: Path) -> None:
-    """The file of a stage leads on; a stage without a file, or with changed keys, has no name to lead on with."""
-    file = tmp_path / "axis.toml"
-    file.write_text(Path(friso.example("thesis_rig")).read_text())
-    gains = friso.export(file)
-    assert gains.next_steps([]) == [f"friso identify NEW_LOG.csv --against {file}"]
-    assert friso.export(file, set={"controller.crossover": "9 Hz"}).next_steps([]) == []
-    assert friso.export(Stage(**LINEAR)).next_steps([]) == []
 
 
 def test_volts_exert_what_the_motor_draws_at_standstill() -> None:

@@ -11,6 +11,7 @@ from patched import patched
 from variants import VARIANTS
 
 import friso
+from benchmarks.laws.draws import under
 from benchmarks.truth.draws import draw
 from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS
@@ -35,7 +36,6 @@ from friso.hunting import (
     verdict,
 )
 from friso.hunting.attractors import starts
-from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.rest import bent
@@ -204,23 +204,7 @@ def test_many_stages_at_once_are_judged_alike_where_basins_are_narrow() -> None:
     assert list(judge_many(several, len(crossovers), 1e-6) == "bistable") == [True] * 5 + [False]
 
 
-DOUBLED = Stage(
-    masses={"cart": "3.17348 kg", "stage": "0.19508 kg"},
-    friction={
-        "model": "lugre",
-        "static": "11.1269 N",
-        "coulomb": "4.89224 N",
-        "stribeck_velocity": "0.00488045 m/s",
-        "stribeck_exponent": 2.413573913315823,
-        "viscous": "0.0665788 N*s/m",
-        "asymmetry": 0.11556827315012663,
-        "bristle_stiffness": "2.3886e+06 N/m",
-        "bristle_damping": "1770.67 N*s/m",
-    },
-    bias={"cart": "0.197415 N"},
-    controller={"kind": "pid", "crossover": "17.4 Hz", "alpha": 0.16935034862753084, "beta": 1.8573402854241317},
-    motion={"kind": "step", "duration": "20 s", "size": "0.196438 m"},
-)
+DOUBLED = draw(1301, 72).replace({"controller.crossover": "17.4 Hz"})
 """Its cycle flips at 17.841 Hz, beyond which one of twice the period attracts up to 17.88 Hz: by brute force, and by
 SciPy at 17.8762 Hz, +-0.17156 mm (`benchmarks.truth --seed 1301 --number 72`)."""
 
@@ -233,27 +217,7 @@ def test_beyond_the_end_of_a_cycle_others_attract_close_by() -> None:
     assert edge.crossover * (1 + edge.reserve) > 17.8762
 
 
-SMALLER = Stage(
-    masses={"cart": "2.66715 kg", "stage": "0.629963 kg"},
-    friction={
-        "model": "lugre",
-        "static": "6.6025 N",
-        "coulomb": "1.57348 N",
-        "stribeck_velocity": "0.000112272 m/s",
-        "stribeck_exponent": 2.0,
-        "viscous": "0.19127 N*s/m",
-        "bristle_stiffness": "3.12902e+06 N/m",
-        "bristle_damping": "268.046 N*s/m",
-    },
-    controller={
-        "kind": "pid",
-        "crossover": "30.8841 Hz",
-        "alpha": 0.25051635335746625,
-        "beta": 3.0275067598355063,
-        "tuned_mass": "2.67429 kg",
-    },
-    motion={"kind": "release", "displacement": "23 mm", "duration": "20 s"},
-)
+SMALLER = draw(1301, 90).replace({"controller.crossover": "30.8841 Hz"})
 """Just beyond the fold of its symmetric cycle, with one of half its size, which few starts end in: by brute force, and
 by SciPy, +-32.79 um (`benchmarks.truth --seed 1301 --number 90`)."""
 
@@ -262,29 +226,7 @@ def test_just_beyond_a_fold_a_smaller_cycle_is_found() -> None:
     assert min(motion.amplitude for motion in find_swings(SMALLER.flat())) == pytest.approx(3.279e-5, rel=1e-2)
 
 
-LOSING = Stage(
-    masses={"cart": "6.02292 kg", "stage": "1.25651 kg"},
-    friction={
-        "model": "lugre",
-        "static": "16.7585 N",
-        "coulomb": "15.9195 N",
-        "stribeck_velocity": "0.000124955 m/s",
-        "stribeck_exponent": 2.0,
-        "viscous": "23.3012 N*s/m",
-        "bristle_stiffness": "8.27899e+07 N/m",
-        "bristle_damping": "2354.68 N*s/m",
-    },
-    joint={
-        "stiffness": "54788.4 N/m",
-        "damping": "1.40538 N*s/m",
-        "stroke": "6.60098 um",
-        "limiter_stiffness": "3.35181e+07 N/m",
-        "limiter_damping": "132.774 N*s/m",
-    },
-    parasitic={"frequency": "232.739 Hz", "mass": "0.682278 kg", "damping_ratio": 0.022817854116299795},
-    controller={"kind": "pid", "crossover": "9.79954 Hz", "alpha": 0.07577805075007032, "beta": 2.1042478163947367},
-    motion={"kind": "step", "duration": "20 s", "size": "1 mm"},
-)
+LOSING = draw(1301, 3)
 """Followed from 1.3 times its bandwidth, its cycle is lost at 1.8997 times, while it attracts well
 (`benchmarks.truth --seed 1301 --number 3`)."""
 
@@ -297,35 +239,7 @@ def test_an_orbit_that_is_lost_while_it_attracts_well_ends_about_there() -> None
     assert 1.3 * edge.quiet >= 1.8997 * 0.998
 
 
-WINDOWED = Stage(
-    masses={"cart": "2.2093 kg", "stage": "6.3981 kg"},
-    friction={
-        "model": "rolling",
-        "static": "33.9481 N",
-        "coulomb": "16.5426 N",
-        "stribeck_velocity": "0.00737342 m/s",
-        "stribeck_exponent": 2.0,
-        "viscous": "1.66789 N*s/m",
-        "bristle_stiffness": "1839530 N/m",
-        "bristle_damping": "751.53 N*s/m",
-        "rolling_exponent": 1.7042797134956384,
-    },
-    joint={
-        "stiffness": "88459.9 N/m",
-        "damping": "7.66496 N*s/m",
-        "stroke": "0.000520529 m",
-        "limiter_stiffness": "1.07343e+08 N/m",
-        "limiter_damping": "1365.44 N*s/m",
-    },
-    controller={
-        "kind": "pid",
-        "crossover": "3 Hz",
-        "alpha": 0.132886167077582,
-        "beta": 7.362771926315565,
-        "tuned_mass": "11.5375 kg",
-    },
-    motion={"kind": "hold", "duration": "20 s"},
-)
+WINDOWED = under("rolling", 27, 91).replace({"controller.crossover": "3 Hz"})
 """Hunts below 3.016 Hz, and again from 3.10 to 3.35 Hz by cycles that are not symmetric, which no orbit leads to: by
 brute force at 1e-9 (`benchmarks.laws --law rolling --seed 27`, number 91)."""
 
@@ -571,17 +485,6 @@ def test_slow_travels_bend_bristles_one_after_the_other_until_they_yield() -> No
     assert back == pytest.approx(np.maximum(most - 0.1e-3, -most))
 
 
-def test_swings_that_repeat_themselves() -> None:
-    """A symmetric swing repeats after one turn, mirrored; a leaning one after two; a long-short one after four."""
-    rows = [[1.0, -1.0] * 16, [1.2, -0.9] * 16, [1.0, -0.5, 0.6, -0.4] * 8]
-    times = np.tile(np.cumsum([1.0] * 32), (3, 1))
-    repeats = recurrence(np.array(rows), times, np.ones(3, bool))
-    assert repeats.swings.tolist() == [1, 2, 4]
-    assert repeats.time.tolist() == [1.0, 2.0, 4.0]
-    noisy = recurrence(np.random.default_rng(1).normal(size=(1, 32)), times[:1], np.ones(1, bool))
-    assert noisy.swings.tolist() == [0]
-
-
 @pytest.mark.slow
 def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_at_rest() -> None:
     """A survey of many stages stops at one motion that attracts: there may be smaller ones."""
@@ -599,33 +502,9 @@ def ten_times_larger(flat: dict[str, Any]) -> StageAttractors:
 
 @pytest.mark.thorough
 def test_a_stage_that_begins_to_hunt_after_hundreds_of_seconds() -> None:
-    """Number 12 of seed 302 of `benchmarks.truth`: a bias on one side, and bristles that hardly yield."""
-    lazy = VARIANTS["rigid"].replace(
-        {
-            "masses": {"cart": "7.30387 kg", "stage": "22.5995 kg"},
-            "friction": {
-                "model": "lugre",
-                "static": "119.049 N",
-                "coulomb": "95.7216 N",
-                "stribeck_velocity": "13.863 mm/s",
-                "stribeck_exponent": 1.0891841348861435,
-                "viscous": "1.16355 N*s/m",
-                "asymmetry": 0.02522679536792999,
-                "bristle_stiffness": "2.21415e8 N/m",
-                "bristle_damping": "7837.87 N*s/m",
-            },
-            "bias": {"cart": "10.3906 N"},
-            "controller": {
-                "kind": "pid",
-                "crossover": "2.54702 Hz",
-                "alpha": 0.21540433018859048,
-                "beta": 5.154440753165315,
-                "tuned_mass": "30.3778 kg",
-            },
-        }
-    )
+    """A bias on one side, and bristles that hardly yield."""
     with allowance(CheckSettings().check_work / 2) as work:
-        (motion,) = find_swings(lazy.flat())
+        (motion,) = find_swings(draw(302, 12).flat())
     assert not work.exhausted
     assert motion.amplitude == pytest.approx(2.90279e-3, rel=1e-4)  # SciPy's as well
 

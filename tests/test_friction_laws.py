@@ -18,9 +18,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.frequency.members import steady_force
-from friso.hunting import Ensemble, HuntingDoubt
-from friso.hunting.attractors import Attractors
-from friso.hunting.cycle.hunting import beyond_the_survey, small_cycles_possible
+from friso.hunting import Ensemble, find_attractors
 from friso.stage.tables import FRICTION
 
 LAWS = Path(friso.__file__).parent / "equations" / "friction"
@@ -54,25 +52,25 @@ def test_friction_in_a_steady_motion_is_that_of_the_linear_systems(name: str) ->
     assert friction == pytest.approx(np.concatenate([forward, -backward]), rel=1e-12)
 
 
-@pytest.mark.parametrize(("share", "possible"), [(0.9995, True), (0.6, False)])
+@pytest.mark.parametrize(("share", "certain"), [(0.9995, False), (0.6, True)])
 def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_a_little(
-    share: float, possible: bool
+    share: float, certain: bool
 ) -> None:
-    flat = stage(release(), friction=maxwell(share, viscous="0 N*s/m"), controller=van_dijk()).flat()
-    assert small_cycles_possible(Ensemble.held(flat, 1)) == possible
+    fast = stage(release(), friction=maxwell(share, viscous="0 N*s/m"), controller=van_dijk("40 Hz"))
+    found = find_attractors(fast.flat(), 1)
+    assert (found.attracts.tolist(), found.decided.tolist(), found.certain.tolist()) == ([False], [True], [certain])
 
 
-@pytest.mark.parametrize(("play", "why"), [("200 um", ""), ("20 um", ""), ("100 nm", HuntingDoubt.BEYOND)])
-def test_what_a_backlash_deflects_the_loop_by_is_no_friction_that_falls(play: str, why: str) -> None:
+@pytest.mark.parametrize(("play", "certain"), [("20 um", True), ("100 nm", False)])
+def test_what_a_backlash_deflects_the_loop_by_is_no_friction_that_falls(play: str, certain: bool) -> None:
     """Friction falls by two thirds at speeds far above those of small swings.
 
     In a backlash below a thousandth of the loop's deflection, cycles may be smaller than the search covers.
     """
     screw = {"mass": "2 kg", "stiffness": "20 N/um", "damping": "400 N*s/m", "backlash": play}
     tables = {"transmission": screw, "encoder": {"position": "load", "velocity": "load"}}
-    stages = Ensemble.held(VARIANTS["rigid"].replace(tables).flat(), 1)
-    quiet = np.zeros(1, bool)
-    assert beyond_the_survey(stages, Attractors((), ~quiet, np.ones(1), (), quiet, ~quiet, quiet)).tolist() == [why]
+    found = find_attractors(VARIANTS["rigid"].replace({**tables, "controller.crossover": "20 Hz"}).flat(), 1)
+    assert (found.attracts.tolist(), found.decided.tolist(), found.certain.tolist()) == ([False], [True], [certain])
 
 
 def run(changes: dict[str, Any], rtol: float = 1e-8, interval: float = 1e-3) -> Results:

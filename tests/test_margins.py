@@ -33,11 +33,7 @@ from friso.questions.check.words import details_sentences, verdict_sentence
 from friso.shown.cases import ShownCase
 from friso.stage import Stage
 
-
-@pytest.fixture(scope="module")
-def locked(rig: Stage) -> Stage:
-    """The thesis rig, its joint locked."""
-    return rig.variants()["locked"]
+RIGID = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz"})
 
 
 def attracts(stage: Stage, factor: float) -> bool:
@@ -45,17 +41,20 @@ def attracts(stage: Stage, factor: float) -> bool:
     return bool(find_attractors(with_static_friction(stage.flat(), factor), 1).attracts[0])
 
 
-@pytest.mark.slow
-def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) -> None:
-    """The locked rig hunts; with half its static friction it does not, nor with half as much again."""
-    margin = check(locked)["locked"].static_friction
+def test_a_margin_ends_where_a_search_from_many_starts_says_so() -> None:
+    """The rigid mass hunts; with half its static friction it does not, nor with half as much again."""
+    case = check(RIGID)["given"]
+    margin, edge = case.static_friction, case.judgement.margin
     assert margin is not None
     assert margin.certain
     for end in (margin.below, margin.above):
         assert end is not None
-        assert attracts(locked, end.inside)
-        assert not attracts(locked, end.outside)
+        assert attracts(RIGID, end.inside)
+        assert not attracts(RIGID, end.outside)
         assert abs(np.log(end.outside / end.inside)) < 0.06
+    assert edge is not None
+    assert (edge.crossover, edge.kind, edge.certain) == (pytest.approx(9.770, abs=1e-3), "flip", True)
+    assert edge.factor < edge.quiet < 1.02 * edge.factor
     assert margin.below is not None
     assert margin.above is not None
     assert (margin.below.kind, margin.above.kind) == ("fold", "flip")
@@ -89,10 +88,9 @@ def test_an_end_just_above_coulomb_friction_is_found() -> None:
     assert not attracts(stage, 0.107 / 0.2222)
 
 
-@pytest.mark.slow
-def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
-    """At half its static friction the locked rig settles; with a little more it hunts. The first lines say so."""
-    case = check(rig.replace({"friction.static": "1.4 N", "joint.locked": True}))["locked"]
+def test_where_hunting_begins_is_told_of_a_stage_that_settles() -> None:
+    """At half its static friction the rigid mass settles; with a little more it hunts. The first lines say so."""
+    case = check(RIGID.replace({"friction.static": "1.4 N"}))["given"]
     margin = case.static_friction
     assert margin is not None
     assert not margin.attracts

@@ -11,9 +11,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import friso
 from benchmarks.oracles import cycles, dcmotor, drift, orbits, servo, switch
 from benchmarks.oracles.edges import RESTS, SEED, SWINGS, edge_of, kept, what_becomes
-from benchmarks.oracles.independent import beyond, differences, same_edge
-from benchmarks.oracles.oracle import Finding, Oracle, number
-from benchmarks.oracles.page import page, section, sections
 from benchmarks.oracles.plain_runs import Plain
 from benchmarks.truth.by_hand import by_hand
 from benchmarks.truth.draws import draw
@@ -114,27 +111,3 @@ def test_the_edge_is_the_last_one_of_a_stage_that_swings_and_else_the_nearest_be
     assert edge_of(words) == [0.63, 1.0]
     assert edge_of(words | {1.0: SWINGS}) == [1.6, 4.0]
     assert edge_of(dict.fromkeys(words, RESTS)) is None
-
-
-def test_what_friso_says_wrong_of_an_edge_is_seen() -> None:
-    record = {"words": {"1": SWINGS, "2": SWINGS, "3": RESTS, "6": SWINGS, "10": RESTS}, "edge": [2.0, 2.03]}
-    edge = {"factor": 2.01, "quiet": 2.02, "reserve": 0.005, "certain": True}
-    window = [{"factor": 5.0, "quiet": 4.9}, {"factor": 7.0, "quiet": 7.1}]
-    said = {"verdict": "hunts", "certain": True, "edge": edge, "windows": [window]}
-    assert list(differences(record, said)) == []
-    assert beyond(record, said | {"windows": []}) == [6.0]
-    assert not same_edge(record, said | {"edge": edge | {"factor": 2.04, "quiet": 2.05}, "windows": []})
-    assert [what for what, _ in differences(record, said | {"verdict": "settles"})] == ["verdict"]
-
-
-@pytest.mark.slow
-def test_the_page_keeps_what_was_not_asked_and_says_what_does_not_agree(tmp_path: Path) -> None:
-    oracle = Oracle("one", "A fact.", "A source", "To 1 %.", lambda: iter(()))
-    wrong = [number("a number", 1.02, 1.0, rtol=0.01), Finding("a word", "-", "yes", None)]
-    right = [number("a number", 1.002, 1.0, rtol=0.01)]
-    file = tmp_path / "page.md"
-    file.write_text(page({"one": section(oracle, wrong), "two": section(oracle, right)}))
-    again = sections(file)
-    assert page(again) == file.read_text()
-    assert "| [one](#one) | **no**, 0 of 1 |" in page(again)
-    assert "| [two](#two) | yes, 1 of 1 |" in page(again)

@@ -11,9 +11,8 @@ import pytest
 from inside import friso_inside
 
 import friso
-from friso.axis import LINEAR, ROTARY, AxisKind, speak_of, unit_shown
+from friso.axis import LINEAR, ROTARY, AxisKind
 from friso.intervals import UncertainValue
-from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage, numeric_keys
 from friso.stage.plausible import implausible_values
 
@@ -103,20 +102,6 @@ def test_units(linear: str, turned: str) -> None:
     assert ROTARY.unit(linear) == turned
     assert ROTARY.unit(turned) == turned
     assert LINEAR.unit(linear) == linear
-
-
-def test_prefixes() -> None:
-    try:
-        speak_of(ROTARY)
-        assert with_unit(5.2e-4, "m") == "0.520 mrad" or with_unit(5.2e-4, "m") == "520 µrad"
-        assert with_unit(1.7e-6, "m") == "1.70 µrad"
-        assert with_unit(3e-3, "N") == "3.00 mN·m"
-        assert with_unit(2400.0, "N/m") == "2.40 kN·m/rad"
-        assert with_unit(2.0, "kg") == "2.00 kg·m²"
-        assert unit_shown("N*s/m") == "N*m*s/rad"
-    finally:
-        speak_of(LINEAR)
-    assert with_unit(1.7e-6, "m") == "1.70 µm"
 
 
 @pytest.mark.slow

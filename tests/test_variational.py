@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 import pytest
 import sympy as sp
-from cycles import by_gains
+from cycles import by_gains, flow, flow_by_differences
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
@@ -24,8 +24,6 @@ from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.structure import structure
 from friso.equations.variational import PREFIX, variational
 from friso.hunting import Ensemble
-from friso.hunting.cycle.ensemble import done
-from friso.hunting.cycle.shooting import shoot
 from friso.stage import Stage
 
 STEADY = settings(max_examples=40)
@@ -39,9 +37,6 @@ STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
 
 CLOSE = 3e-6
 """Share to which derivatives agree with differences; a tenth of it is observed, mostly noise of the differences."""
-
-DIFFERENCES = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
-"""Weights of the central difference of order 4."""
 
 RIGID, LIMITED = "rigid", "rigid, van Dijk, limit"
 LOCKED_RIG, FREE_RIG = "locked, parasitic", "free, parasitic"
@@ -66,24 +61,6 @@ def moving(stages: Ensemble, place: float, speed: float, **others: float) -> np.
     sizes |= others
     sizes["integral"] *= length / rate
     return np.array([sizes[name] for name in stages.kernel.states])
-
-
-def flow(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
-    """Derivative of the state after a time [s] by the state at the start, all in units of the states' magnitudes."""
-    shot = shoot(stages, start[None], np.array([time]), 1.0, FINE)
-    assert shot.done.all()
-    return shot.flows[0] * stages.scales[0] / stages.scales[0][:, None]
-
-
-def flow_by_differences(stages: Ensemble, start: np.ndarray, time: float, step: float) -> np.ndarray:
-    """Return the derivative of the flow by finite differences of simulated runs."""
-    size, scales = start.size, stages.scales[0]
-    starts = np.concatenate([start + k * step * np.diag(scales) for k in DIFFERENCES])
-    several = stages.take(np.zeros(len(starts), np.int64))
-    results = several.run(starts, np.full(len(starts), time), FINE / 10)
-    assert done(results).all()
-    ends = results.ends.reshape(len(DIFFERENCES), size, size)
-    return np.tensordot(list(DIFFERENCES.values()), ends, 1).T / step / scales[:, None]
 
 
 def off(stages: Ensemble, start: np.ndarray, time: float, flows: np.ndarray) -> np.ndarray:

@@ -173,9 +173,10 @@ class Bench:
         return states
 
     def released(self, displacements: np.ndarray) -> Trial:
-        """Return releases from displacements [m]; the integrator balances the constant forces."""
-        count, balance = len(displacements), -sum(self.flat.get(f"bias.{mass}", 0.0) for mass in ("cart", "stage"))
-        return Trial(self._settled(np.zeros(count), displacements, balance), ("release",) * count, displacements)
+        """Return releases from displacements [m], where the stage was held until filters of the error had settled."""
+        count, free = len(displacements), {**self.held, "motion.size": np.nan, "motion.duration": np.inf}
+        states = self.kernel.at_rest(free, displacements, count, displacements)
+        return Trial(states, ("release",) * count, displacements)
 
     def follow(
         self, trial: Trial, rtol: float, rounds: tuple[float, ...] = ROUNDS, any_will_do: bool = True
