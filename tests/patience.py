@@ -14,3 +14,18 @@ def wait_until(happened: Callable[[], object]) -> None:
         if time.monotonic() > end:
             raise TimeoutError(f"not within {LIMIT:g} s")
         time.sleep(0.01)
+
+
+LONG = 30_000
+"""Characters of a text that is long, but not so long that it is refused unread."""
+
+
+def grows_with_the_square(read: Callable[[int], object], long: int = LONG) -> bool:
+    """Tell whether reading takes much more than four times as long, on the processor, where a text is so."""
+
+    def seconds(length: int) -> float:
+        begin = time.process_time()
+        read(length)
+        return time.process_time() - begin
+
+    return min(seconds(4 * long) for _ in range(2)) > 10 * max(0.01, *(seconds(long) for _ in range(3)))

@@ -261,83 +261,6 @@ def test_what_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None
     page.wait_for_function("() => document.querySelector('#left .older').innerText === ''")
 
 
-PLACE = """
-const { draw } = await import('/plot.js');
-const layout = { height: 2000 };
-const figure = (name) => ({ name, title: name, caption: '', data: [], bars: [], layout, narrow: layout });
-const place = document.createElement('div');
-document.body.append(place);
-"""
-"""Script that makes a place for pictures, below the visible part of the page but for the first."""
-
-
-@pytest.mark.slow
-def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
-    """Plots below the visible part are drawn later, when the machine may have changed."""
-    other = browsed.page.evaluate(
-        """async () => {
-            const { look, mark, now } = await import('/shown.js');
-            PLACE
-            draw(place, ['one', 'two'].map(figure));
-            [...place.children].forEach((box) => mark(box, { ...now(), machine: {name: 'another'} }));
-            look();
-            const due = () => [...place.querySelectorAll('.plot')].some((plot) => plot.due);
-            while (due()) await new Promise((then) => setTimeout(then, 10));
-            const boxes = [...place.querySelectorAll('.figure')];
-            place.remove();
-            return boxes.map((box) => box.classList.contains('other'));
-        }""".replace("PLACE", PLACE)
-    )
-    assert other == [True, True]
-
-
-@pytest.mark.slow
-def test_plots_that_come_in_parts_stay_in_order_and_go_once_it_is_known_that_they_do(browsed: Browsed) -> None:
-    shown = browsed.page.evaluate(
-        """async () => {
-            PLACE
-            const shown = [];
-            const drawn = (names, all) => {
-                draw(place, names.map(figure), {}, all);
-                shown.push([...place.children].map((box) => box.dataset.name).join(' '));
-            };
-            drawn(['one', 'four']);
-            drawn(['one', 'two'], null);
-            drawn(['three'], ['one', 'two', 'three']);
-            drawn(['one']);
-            place.remove();
-            return shown;
-        }""".replace("PLACE", PLACE)
-    )
-    assert shown == ["one four", "one four two", "one two three", "one"]
-
-
-@pytest.mark.thorough
-def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) -> None:
-    """Progress does not replace it; the whole answer says what is true of the machine."""
-    page = browsed.page
-    browsed.check("9.5 Hz")
-    said = page.inner_text("#answer")
-    show = """async parts => {
-        const { idle, progress } = await import('/answer.js');
-        parts.forEach((part) => progress(part, 'check'));
-        idle('check');
-    }"""
-    early = {"kind": "message", "text": "The loop is unstable", "lasts": True}
-    page.evaluate(show, [early])
-    assert page.inner_text("#answer") == said
-    page.route("**/ask/check", lambda _: None)
-    page.route("**/ask/verdict", lambda _: None)
-    browsed.type("controller.crossover", "11 Hz")
-    page.wait_for_selector("#answer .old .case")
-    page.evaluate(show, [early, early, {"kind": "progress", "done": 1, "total": 2, "label": "cells"}])
-    assert page.locator("#answer progress").count() == 0
-    assert page.inner_text("#answer").count("The loop is unstable") == 1
-    page.unroute_all(behavior="ignoreErrors")
-    browsed.type("controller.crossover", "12 Hz")
-    page.wait_for_function("() => !document.getElementById('answer').innerText.includes('The loop is unstable')")
-
-
 @pytest.mark.slow
 def test_the_pictures_of_an_answer_that_is_there_are_not_asked_for_again(browsed: Browsed) -> None:
     """Another check would take away the probability of hunting, which took minutes."""
@@ -905,17 +828,6 @@ def test_a_browser_whose_storage_is_full_is_said_so(browsed: Browsed) -> None:
 
 
 @pytest.mark.slow
-def test_of_very_many_changes_the_last_can_be_undone(browsed: Browsed) -> None:
-    page = browsed.page
-    steps = page.evaluate("""async () => {
-        const { set, current } = await import('/state.js');
-        for (let k = 0; k < 250; k += 1) set({ 'controller.crossover': `${8 + k / 100} Hz` });
-        return [current().steps.length, current().step, current().steps.at(-1)];
-    }""")
-    assert steps == [200, 199, {"controller.crossover": "10.49 Hz"}]
-
-
-@pytest.mark.slow
 def test_a_tab_that_is_opened_from_another_keeps_its_own(browsed: Browsed) -> None:
     """A copied tab begins with the mark by which the first tab keeps its data."""
     page = browsed.page
@@ -1028,24 +940,6 @@ def test_out_gives_the_lines_of_the_picture_that_is_shown(browsed: Browsed) -> N
         assert page.inner_text("#dialog pre >> nth=0") == f"friso {command} thesis_rig.toml"
         assert page.inner_text("#dialog button:has-text('ZIP')").split()[-2] == command
         page.keyboard.press("Escape")
-
-
-@pytest.mark.slow
-def test_what_takes_too_long_is_overtaken_without_being_asked_again(browsed: Browsed) -> None:
-    page, held = browsed.page, []
-    page.route("**/ask/cell", lambda route: route.continue_() if held else held.append(route))
-    sentence = page.evaluate(
-        """async () => {
-            const { Live } = await import('/wire.js');
-            const { sent } = await import('/state.js');
-            return new Promise((done) => {
-                const live = new Live('cell', 'test', 300, (answer) => done(answer.sentences[0]));
-                live.ask({ machine: sent(), options: {} });
-                live.ask({ machine: { ...sent(), changes: { "controller.crossover": "11 Hz" } }, options: {} });
-            });
-        }"""
-    )
-    assert sentence == friso.simulate(RIG, set={"controller.crossover": "11 Hz"}).sentences()[0]
 
 
 def long_report() -> str:
@@ -1196,20 +1090,6 @@ def test_a_slider_that_is_let_go_keeps_its_verdict(browsed: Browsed) -> None:
     with page.expect_request("**/ask/check"):
         page.mouse.up()
     assert asked.count("verdict") == 1
-
-
-@pytest.mark.slow
-def test_a_text_that_is_called_shape_stays_one_beside_arrays(browsed: Browsed) -> None:
-    """A hatching has one."""
-    read = browsed.page.evaluate(
-        """async bytes => {
-            const { frames } = await import('/wire.js');
-            const chunks = [{ value: new Uint8Array(bytes) }, { done: true }];
-            for await (const part of frames({ read: async () => chunks.shift() })) return { ...part, x: [...part.x] };
-        }""",
-        [*frame({"fillpattern": {"shape": "/"}, "x": np.arange(3.0)})],
-    )
-    assert read == {"fillpattern": {"shape": "/"}, "x": [0, 1, 2]}
 
 
 @pytest.mark.slow

@@ -11,8 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from inside import friso_inside
-from pages import Page
-from refusals import rows_of
 from snapshots import Snapshots
 
 from friso.hunting import (
@@ -33,15 +31,13 @@ from friso.hunting import (
 )
 from friso.hunting.boundary.plane import LastEnd
 from friso.questions.boundary.blocks import boundary_document
-from friso.questions.boundary.figures import LOST, NODES, boundary_figure
+from friso.questions.boundary.figures import LOST, boundary_figure
 from friso.questions.boundary.words import (
-    VERDICTS,
     ShownKey,
-    _along_one,
     conclusion,
     sentences,
 )
-from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing import plotly_renderer
 from friso.stage import Stage
 from friso.studies.boundary import corner_verdicts, end_verdicts, lines, plane_edge
 
@@ -95,11 +91,6 @@ def test_the_locked_rig_flips_at_9_75_hz(single: tuple[dict, Path]) -> None:
     assert list(special.kind) == [point["kind"] for point in document["points"]]
     assert list(special["controller.crossover [Hz]"]) == pytest.approx(values)
     assert table["error of controller.crossover [Hz]"].notna().sum() == len(special)
-    page = Page((folder / "thesis_rig_boundary.html").read_text(encoding="utf-8"))
-    assert document["conclusion"] in " ".join(page.text.split())
-    assert page.text.count("were followed over") == len(document["branches"])
-    assert page.tags.count("figure") == 1
-    assert 'crossover = "8 Hz"' in page.text
 
 
 @pytest.mark.thorough
@@ -118,9 +109,6 @@ def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None
 def test_a_range_without_a_boundary_says_so(tmp_path: Path, snapshots: Snapshots) -> None:
     done = boundary(tmp_path, *LOCKED, "--x", "controller.crossover=4 Hz..6 Hz", "--details")
     assert done.returncode == 0
-    text = " ".join(done.stdout.split())
-    assert text.count(VERDICTS["attracting cycle"]) == 2
-    assert VERDICTS["no attracting cycle"] not in text
     snapshots.check("boundary", "no boundary", done.stdout)
     assert list(tmp_path.iterdir()) == []
 
@@ -159,37 +147,6 @@ def test_the_curve_of_two_keys_separates_what_attracts(
     result = find_cycles(Ensemble.held(flat, 2 * len(points)))
     assert (np.split(np.abs(result.multiplier), 2)[0] < 1).all()
     assert (np.split(np.abs(result.multiplier), 2)[1] > 1).all()
-
-
-@pytest.mark.cases(first=8)
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        (),
-        ("--y", "masses.cart=1 kg..2 kg"),
-        ("--x", "controller.crossover"),
-        ("--x", "controller.crossover=1 Hz..40 Hz:41"),
-        ("--x", "controller.crossover=8 Hz, 9 Hz"),
-        ("--x", "controller.crossover=12 Hz..8 Hz"),
-        ("--x", "joint.locked=false..true"),
-        ("--x", "masses.stage=0 kg..1 kg:log"),
-        (*CROSSOVER, "--y", "controller.crossover=1 Hz..2 Hz"),
-        (*CROSSOVER, "--rtol", "1e-15"),
-        (*CROSSOVER, "--out", str(RIG)),
-    ],
-)
-def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple) -> None:
-    done = friso_inside(tmp_path, "boundary", RIG, *LOCKED, *arguments)
-    assert done.returncode == 2
-    assert rows_of(done.stderr)
-    assert done.stdout == ""
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_stage_that_cannot_hunt_is_refused(tmp_path: Path) -> None:
-    done = boundary(tmp_path, "--x", "controller.kp=1 N/m..10 N/m", stage=STICK_SLIP)
-    assert done.returncode == 2
-    assert "no integral action" in done.stderr
 
 
 def cycles(multipliers: Sequence[float], sign: float = -1.0) -> Cycles:
@@ -245,34 +202,23 @@ def test_special_points_stand_in_their_place_on_the_branch(round_a_fold: Diagram
     assert end_verdicts(round_a_fold) == ("attracting cycle", "unknown")
 
 
-def test_sentences_tell_what_becomes_of_a_cycle_as_the_key_rises(round_a_fold: Diagram, snapshots: Snapshots) -> None:
-    answer, *changes, followed = sentences(round_a_fold, (MM,))
-    assert answer == conclusion(round_a_fold, (MM,))
-    for place, kind, change in zip(("1.45", "1.72", "1.73"), ("flip", "flip", "fold"), changes, strict=True):
-        assert f"{place} mm" in answer
-        assert f"{place} ± 1e-06 mm ({kind}" in change
-    assert "1 to 1.73 mm" in followed
-    snapshots.check("boundary", "one key", "\n".join([answer, *changes, followed]))
-
-
-def test_an_unstable_loop_is_said_first(round_a_fold: Diagram, crossing: Plane) -> None:
+def test_sentences_of_one_key_begin_with_an_unstable_loop(
+    round_a_fold: Diagram, crossing: Plane, snapshots: Snapshots
+) -> None:
+    said = sentences(round_a_fold, (MM,))
+    assert said[0] == conclusion(round_a_fold, (MM,))
+    snapshots.check("boundary", "one key", "\n".join(said))
     high = replace(round_a_fold, unstable=np.array([False, True, True]))
-    said = sentences(high, (MM,))[0]
-    assert said.startswith("The loop is unstable, whatever the friction, at 2 of the 3 stages")
-    assert "1.45 mm (where the loop is unstable anyway)" in said
     corner = replace(crossing, unstable=np.array([False, True, False]))
-    assert "unstable, whatever the friction, at 1 of the 3 stages" in conclusion(corner, KEYS)
+    loops = [*sentences(high, (MM,))[:1], conclusion(corner, KEYS)]
+    snapshots.check("boundary", "unstable loop", "\n".join(loops))
 
 
 def test_the_figure_of_one_key_is_solid_where_the_cycle_attracts(round_a_fold: Diagram) -> None:
     figure = boundary_figure(round_a_fold, (MM,), "Rig")
-    assert [panel.y.quantity for panel in figure.panels] == ["Amplitude", "Period", "Multiplier"]
     dashes = [(line.dash, line.x[0], line.x[-1]) for line in figure.panels[2].series]
     assert [dash for dash, _, _ in dashes] == ["solid", "dashed", "solid", "dashed"]
     assert dashes[0][1:] == pytest.approx((1e-3, 1.45e-3))
-    words = [line for item in figure.panels[0].words for line in item.text.splitlines()]
-    assert words == ["flip at 1.45 mm", "flip at 1.72 mm", "fold at 1.73 mm"]
-    assert matplotlib_renderer.image(figure, "png")
 
 
 @pytest.fixture
@@ -286,20 +232,10 @@ def crossing() -> Plane:
     return Plane(Space((STROKE, GAIN), dict), (curve,), 2, np.array([0, 1, 3]), *expected, (np.array([0.5, 0.25]),))
 
 
-def test_sentences_of_two_keys(crossing: Plane, snapshots: Snapshots) -> None:
-    answer, curve, meaning, *corners, lost = sentences(crossing, KEYS)
-    words = ("3 points", "1.5 mm", "1 N/m", "100 N/m", "1e-06 mm")
-    assert [word for word in words if word not in curve] == []
+def test_sentences_of_two_keys(crossing: Plane, two: Plane, snapshots: Snapshots) -> None:
     verdicts = ["attracting cycle", "unknown", "invalid", "no attracting cycle"]
     assert [verdict for _, _, verdict in corner_verdicts(crossing)] == verdicts
-    places = ((answer, "1 mm", "1 N/m"), (corners[3], "2 mm", "100 N/m"), (lost, "1.5 mm", "3.16228 N/m"))
-    for sentence, stroke, gain in places:
-        assert f"joint.stroke = {stroke}, controller.kp = {gain}" in sentence
-    snapshots.check("boundary", "two keys", "\n".join([answer, curve, meaning, *corners, lost]))
-    (curve,) = crossing.curves
-    spots = tuple(replace(spot, at=np.array([0.123456, spot.at[1]])) for spot in curve.spots)
-    said = conclusion(replace(crossing, curves=(replace(curve, spots=spots),)), KEYS)
-    assert "from joint.stroke = 1.12 mm, controller.kp = 1 N/m to" in said
+    snapshots.check("boundary", "two keys", "\n".join([*sentences(crossing, KEYS), *sentences(two, KEYS)[:2]]))
 
 
 @pytest.fixture
@@ -312,9 +248,6 @@ def two(crossing: Plane) -> Plane:
 
 
 def test_where_curves_end_is_told(two: Plane) -> None:
-    first = sentences(two, KEYS)[1]
-    assert "at both, the range ends" in first
-    assert conclusion(two, KEYS).endswith("There is 1 more curve.")
     document = boundary_document(two, KEYS)
     assert [(end["curve"], end["how"]) for end in document["ends"]] == [
         *((0, "range"), (0, "range"), (1, "range"), (1, "lost")),
@@ -324,7 +257,7 @@ def test_where_curves_end_is_told(two: Plane) -> None:
     assert marks == {LOST: 2}
 
 
-def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane) -> None:
+def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane, snapshots: Snapshots) -> None:
     """Hunting ends on a curve or between two stages, along the first key or else the second.
 
     Otherwise the corners are told.
@@ -339,14 +272,7 @@ def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane)
     assert (edge.along, edge.below) == (0, True)
     assert edge.low == pytest.approx([1.5e-3, 1.7e-3])
     assert edge.low.tolist() == edge.high.tolist()
-    assert "below joint.stroke = 1.5 mm at controller.kp = 1 N/m, and below 1.7 mm at controller" in conclusion(
-        plane, KEYS
-    )
-    bulging = edge._replace(across=np.array([1.0, 10.0, 100.0]), low=np.array([1.5, 1.8, 1.7]) * 1e-3)
-    bulging = bulging._replace(high=bulging.low)
-    assert "below 1.8 mm at controller.kp = 10 N/m in between" in _along_one(bulging, KEYS)
-    level = bulging._replace(low=np.array([1.5, 1.50001, 1.49999]) * 1e-3)
-    assert "in between" not in _along_one(level._replace(high=level.low), KEYS)
+    snapshots.check("boundary", "along one key", conclusion(plane, KEYS))
     farther = LastEnd(np.array([0.8, 1.0]), np.array([0.9, 1.0]), True)
     beyond = plane_edge(replace(plane, last_ends=(farther,)))
     assert beyond is not None
@@ -370,15 +296,4 @@ def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: P
     (panel,) = figure.panels
     assert panel.y.log
     assert not panel.x.log
-    texts = [text.get_text() for text in matplotlib_renderer.render(figure).legends[0].get_texts()]
-    assert texts == [*(kind.label for kind in NODES.values()), LOST]
-    assert len(texts) <= 5
     assert any(trace.mode == "lines" for trace in plotly_renderer.render(figure).data)
-
-
-def test_a_value_is_told_as_far_as_it_is_known() -> None:
-    key = ShownKey("controller.crossover", "Hz")
-    assert key.as_known(9.7498512, 1e-8) == "9.74985 Hz"
-    assert key.as_known(5.60878, 0.02) == "5.609 ± 0.02 Hz"
-    assert key.as_known(1234.5, 30.0) == "1234 ± 30 Hz"
-    assert "unknown" in key.as_known(5.60878, float("inf"))

@@ -5,7 +5,6 @@ A stand-in of a few lines takes a kernel's place, so that compiling it takes a f
 
 import os
 import shutil
-import signal
 import stat
 import subprocess
 import sys
@@ -13,16 +12,14 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
 import pytest
-from patience import LIMIT, wait_until
+from patience import LIMIT
 from systems import posix
 
 from friso.engine import building, cache, prune
 from friso.engine.cache import SECONDS_OF_A_DAY
 from friso.engine.settings import BuildSettings
 from friso.platform import private
-from friso.platform.helper_process import HelperProcess
 from friso.platform.whole_file import PARTIAL
 
 BUILDER = """
@@ -130,23 +127,15 @@ def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path:
     assert mode(kernels) == 0o700  # mended
 
 
-@pytest.mark.cases(slow=1)
-@pytest.mark.parametrize("damage", ["truncate", "alter", "name", "remove"])
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", ["truncate", "alter", "name"])
 @pytest.mark.parametrize("pattern", ["*.kernel", "*.request"])
 def test_a_damaged_file_is_made_again(copied: Path, pattern: str, damage: str) -> None:
     (file,) = (copied / "kernels").glob(pattern)
-    content = file.read_bytes()
-    middle = len(content) // 2
-    damaged = {
-        "truncate": content[:middle],
-        "alter": content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :],
-        "name": b"../../elsewhere",
-        "remove": None,
-    }[damage]
-    if damaged is None:
-        file.unlink()
-    else:
-        file.write_bytes(damaged)
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    damaged = {"truncate": content[: len(content) // 2], "alter": content, "name": b"../../elsewhere"}
+    file.write_bytes(damaged[damage])
     assert built(copied)
     assert not built(copied)
 
@@ -156,13 +145,6 @@ def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:
     processes = [start(tmp_path) for _ in range(4)]
     assert sorted(finished(process)[0] for process in processes) == [False, False, False, True]
     assert not built(tmp_path)
-
-
-@pytest.mark.slow
-def test_different_kernels_do_not_mix(tmp_path: Path) -> None:
-    processes = [start(tmp_path, name, STAND_IN_ENDS_WITH=end) for name, end in (("one", ""), ("two", " + 0.0"))]
-    assert [finished(process)[0] for process in processes] == [True, True]
-    assert len(entries(tmp_path)) == 2
 
 
 @pytest.mark.slow
@@ -191,31 +173,27 @@ def test_what_has_not_been_used_for_long_is_deleted_when_something_is_built(copi
     assert len(entries(copied)) == 2
 
 
-@pytest.mark.slow
-def test_there_is_an_end_to_what_is_kept(copied: Path) -> None:
-    """Entries unused for longest go first; entries used today stay."""
+def test_what_is_kept_has_an_end(copied: Path) -> None:
+    """Entries unused for longest go first, and halves that killed processes left; entries in use and of today stay."""
     first, folder = entry(copied), copied / "kernels"
     others = [Path(shutil.copy(first, first.with_name(f"{i}" * 24 + ".kernel"))) for i in range(1, 4)]
+    drafts = [folder / f"{name}.kernel.x{PARTIAL}" for name in ("old", "new")]
+    for draft in drafts:
+        draft.write_bytes(b"half")
     size = first.stat().st_size
+    aged(2 * SECONDS_OF_A_DAY, drafts[0])
     for i, other in enumerate(others, 1):
         aged(i * 2 * SECONDS_OF_A_DAY, other)
     with BuildSettings(kept_size=int(2.5 * size)).in_use():
         prune.prune(folder)
-    assert set(entries(copied)) == {first, others[0]}
+    assert {*entries(copied)} == {first, others[0]}
+    assert [draft.exists() for draft in drafts] == [False, True]
     with BuildSettings(kept_size=0).in_use():
+        with cache.entry_lock(others[0]):
+            prune.prune(folder)
+        assert others[0].exists()
         prune.prune(folder)
     assert entries(copied) == [first]
-
-
-@pytest.mark.slow
-def test_an_entry_that_is_being_written_is_left_alone(copied: Path) -> None:
-    old = entry(copied)
-    aged(BuildSettings().kept_time + SECONDS_OF_A_DAY, old)
-    with cache.entry_lock(old):
-        prune.prune(copied / "kernels")
-        assert old.exists()
-    prune.prune(copied / "kernels")
-    assert not old.exists()
 
 
 def aged(seconds: float, *files: Path) -> None:
@@ -234,34 +212,6 @@ def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(RuntimeError, match="could not be compiled") as raised:
         building.built_entries([request, request])
     assert ("no such stage: µ −" in str(raised.value)) == ("no such stage" in crash)
-
-
-def test_a_builder_builds_again_unless_it_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A builder that has ended while waiting is replaced by a new one."""
-    (tmp_path / "telling_builder.py").write_text(
-        "import os\ndef build(folder, task):\n    return f'{os.getpid():024x}'\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(cache.CodeRequest, "answer", lambda request, name: processes.append(int(name, 16)))
-    processes: list[int] = []
-    for number in range(3):
-        with pytest.raises(RuntimeError, match="is not in"):  # it keeps nothing
-            building.built_entries(
-                [cache.CodeRequest(f"telling {number}", "what tells its process", "telling_builder")]
-            )
-        if number == 1:
-            os.kill(processes[-1], signal.SIGTERM)
-    assert processes[0] == processes[1] != processes[2]
-
-
-@pytest.mark.slow
-def test_what_killed_processes_left_is_deleted(copied: Path) -> None:
-    drafts = [copied / "kernels" / f"{name}.kernel.x{PARTIAL}" for name in ("old", "new")]
-    for draft in drafts:
-        draft.write_bytes(b"half")
-    aged(2 * SECONDS_OF_A_DAY, drafts[0])
-    prune.prune(copied / "kernels")
-    assert [draft.exists() for draft in drafts] == [False, True]
 
 
 FULL = """
@@ -293,40 +243,6 @@ def test_where_the_disk_is_full_kernels_are_compiled_and_not_kept(caplog: pytest
         building.built_entries([cache.CodeRequest("full", "what needs room", "full_builder", b"always")])
 
 
-@pytest.mark.slow
-@posix
-def test_a_helper_that_has_ended_leaves_no_zombie() -> None:
-    helper = HelperProcess("friso.engine.builder", ".", paths=sys.path)
-    helper.kill()
-    wait_until(lambda: not psutil.pid_exists(helper._process.pid))  # one that is a zombie exists
-    helper.end()
-
-
-@pytest.mark.slow
-def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:
-    file = tmp_path / "no folder"
-    file.write_text("")
-    made, log = finished(start(file))
-    assert made
-    assert log.count("temporary folder") == 1
-
-
-@posix
-def test_a_user_without_a_home_has_a_passing_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def none(name: str) -> str:
-        raise RuntimeError("could not determine the home directory")
-
-    monkeypatch.delenv(cache.FOLDER_VARIABLE, raising=False)
-    monkeypatch.setattr(cache, "user_cache_dir", none)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    (tmp_path / f"{cache._PASSING}left").mkdir(mode=0o700)  # by a process that was killed
-    folder = cache.cache_folder.__wrapped__()
-    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
-    assert [*tmp_path.iterdir()] == [folder.parent]
-    cache.remove_if_passing(folder)
-    assert not folder.exists()
-
-
 def test_the_folder_is_one_as_users_write_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -334,22 +250,16 @@ def test_the_folder_is_one_as_users_write_it(
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("USERPROFILE", str(tmp_path))
     monkeypatch.setenv(cache.FOLDER_VARIABLE, os.path.join("~", "kept"))
-    assert cache.cache_folder.__wrapped__() == tmp_path / "kept" / "kernels"
+    folder = cache.cache_folder.__wrapped__()
+    assert folder == tmp_path / "kept" / "kernels"
+    (folder / "trial-left").mkdir(mode=0o700)  # by a process that was killed
+    assert [*cache.cache_folder.__wrapped__().iterdir()] == []
     (tmp_path / "kept" / "file").touch()
     monkeypatch.setenv(cache.FOLDER_VARIABLE, os.path.join("~", "kept", "file"))
     cache.remove_if_passing(cache.cache_folder.__wrapped__())
     (warning,) = caplog.messages
     assert "Errno" not in warning
     assert str(tmp_path / "kept" / "file") in warning
-
-
-def test_what_a_killed_process_left_where_it_tried_to_write_goes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(cache.FOLDER_VARIABLE, str(tmp_path))
-    folder = cache.cache_folder.__wrapped__()
-    (folder / "trial-left").mkdir(mode=0o700)
-    assert [*cache.cache_folder.__wrapped__().iterdir()] == []
 
 
 # nobody else
@@ -365,64 +275,38 @@ def belongs_to_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @posix
-def test_folders_that_are_missing_are_made_private(tmp_path: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["open", "link", "link below", "no folder"])
+def test_what_is_no_folder_of_its_user_alone_is_left_alone(copied: Path, tmp_path: Path, way: str) -> None:
+    """friso may not close it: the kernel is compiled elsewhere, and nothing is loaded from the folder."""
+    folder = tmp_path / way
+    if way == "open":
+        folder = copied
+        folder.chmod(0o777)
+    elif way == "link":
+        folder.symlink_to(copied)
+    elif way == "link below":
+        folder.mkdir()
+        (folder / "kernels").symlink_to(copied / "kernels")
+    else:
+        folder.write_text("")
+    made, log = finished(start(folder))
+    assert made
+    assert log.count("temporary folder") == 1
+    assert ("is a symbolic link" in log) == ("link" in way)
+    assert way != "open" or mode(folder) == 0o777
+
+
+@posix
+def test_what_belongs_to_others_or_is_open_to_them_is_not_read(
+    copied: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = os.umask(0)
     try:
         private.make_private(tmp_path / "a" / "b")
     finally:
         os.umask(before)
     assert mode(tmp_path / "a") == mode(tmp_path / "a" / "b") == 0o700
-
-
-@pytest.mark.slow
-@posix
-@pytest.mark.parametrize("permissions", [0o770, 0o707, 0o777])
-def test_a_folder_on_the_way_that_others_may_write_to_is_left_alone(copied: Path, permissions: int) -> None:
-    """friso may not close it: the kernel is compiled elsewhere, and nothing is loaded from the folder."""
-    copied.chmod(permissions)
-    made, log = finished(start(copied))
-    assert made
-    assert log.count(str(copied)) == 1
-    assert mode(copied) == permissions
-
-
-@pytest.mark.slow
-@posix
-def test_a_link_is_not_followed(copied: Path, tmp_path: Path) -> None:
-    (tmp_path / "linked").symlink_to(copied)
-    (tmp_path / "below").mkdir()
-    (tmp_path / "below" / "kernels").symlink_to(copied / "kernels")
-    for folder in ("linked", "below"):
-        made, log = finished(start(tmp_path / folder))
-        assert made
-        assert "is a symbolic link" in log
-
-
-@pytest.mark.slow
-@posix
-def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = copied / "kernels"
-    folder.chmod(0o755)
-    belongs_to_another(folder, monkeypatch)
-    with pytest.raises(PermissionError, match="belongs to another user"):
-        private.make_private(folder)
-    assert mode(folder) == 0o755
-
-
-@pytest.mark.slow
-@posix
-@pytest.mark.parametrize("pattern", ["*.kernel", "*.request"])
-def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    (file,) = (copied / "kernels").glob(pattern)
-    belongs_to_another(file, monkeypatch)
-    with pytest.raises(PermissionError, match="belongs to another user"):
-        private.read_private(file)
-    if os.geteuid() == 0:
-        assert built(copied)
-
-
-@posix
-def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path: Path) -> None:
     file, link, pipe = tmp_path / "file", tmp_path / "link", tmp_path / "pipe"
     private.write_private(file, b"content")
     link.symlink_to(file)
@@ -434,6 +318,14 @@ def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path: Pa
     file.chmod(0o620)
     with pytest.raises(PermissionError):
         private.read_private(file)
+    folder = copied / "kernels"
+    folder.chmod(0o755)
+    for path, use in ((entry(copied), private.read_private), (folder, private.make_private)):
+        with monkeypatch.context() as patch:
+            belongs_to_another(path, patch)
+            with pytest.raises(PermissionError, match="belongs to another user"):
+                use(path)
+    assert mode(folder) == 0o755
 
 
 @posix

@@ -14,7 +14,6 @@ import plain
 import pytest
 import sympy as sp
 from emps import emps_log
-from patched import patched
 from scipy.integrate import solve_ivp
 from variants import cascade, gains, limit, lugre, release, stage, step, there_and_back
 
@@ -32,13 +31,8 @@ from friso.hunting import hunting as hunting_of
 from friso.identification.experiments.moves import identify_moves
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
-from friso.progress import silent
-from friso.remedies.comparison import compare
 from friso.stage import Stage
 from friso.studies.sweep import sweep
-from friso_thesis.questions.rig.words import sentences
-from friso_thesis.studies.rig.experiments import hunting as rig_hunting
-from friso_thesis.studies.rig.moves_on_rails import rails
 
 KV, KP, T_V, MASS = 60.0, 50.0, 0.03, 1.7
 
@@ -292,25 +286,9 @@ def test_loops_at_their_own_rates() -> None:
     assert commanded(flat, reference - reading, reading) == pytest.approx(np.array(forces), rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("ratio", ["100 us", "400 us", "900 us"])
-def test_sample_times_are_whole_multiples(ratio: str) -> None:
-    with pytest.raises(friso.StageError, match="a whole multiple of the faster sample time"):
-        rigid(cascade()).replace({"drive": {"sample_time": "250 us", "position_sample_time": ratio}})
-
-
 def commanded(flat: dict[str, Any], errors: np.ndarray, reading: np.ndarray) -> np.ndarray:
     """Forces of a drive, the reference at rest, that begins at its first reading."""
-    e, y = sp.symbols("e y", real=True)
-    force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, sp.S.Zero), 1)
-    parts = (force, *(number.update for number in held))
-    keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
-    once = sp.lambdify([e, y, *keys, *(number.symbol for number in held)], parts, [CLIP, "math"])
-    passed = {state("position_before_1")}
-    kept, forces = [reading[0] if number.symbol in passed else 0.0 for number in held], []
-    for row in zip(errors, reading, strict=True):
-        now, *kept = once(*row, *keys.values(), *kept)
-        forces.append(now)
-    return np.array(forces)
+    return sampled_forces(flat, errors, reading, 0 * errors)
 
 
 # what the house asks of any controller
@@ -324,20 +302,6 @@ def test_it_is_written_read_and_made_faster() -> None:
     assert quicker["controller.kp"] == 100.0
     assert quicker[INTEGRAL_TIME] == 0.015
     assert rigid(cascade(kv="1 (m/min)/mm")).flat()["controller.kv"] == pytest.approx(1000 / 60)
-
-
-@pytest.mark.parametrize(
-    ("changes", "parts"),
-    [
-        ({"controller.kv": "60 Hz"}, ["controller.kv", "2 pi", '"60 1/s"']),
-        ({"controller.proportional_on": "measurement", INTEGRAL_TIME: None}, ["proportional_on", "pseudo-derivative"]),
-        ({"controller.velocity_feedforward": -1}, ["velocity_feedforward", "0 or greater"]),
-    ],
-)
-def test_what_is_wrong_is_told(changes: dict[str, Any], parts: list[str]) -> None:
-    with pytest.raises(friso.StageError) as refused:
-        rigid(PI).replace(changes)
-    assert all(part in str(refused.value) for part in parts), str(refused.value)
 
 
 @pytest.mark.thorough
@@ -373,24 +337,6 @@ def test_bode_with_sampling_and_delay(whole: Stage) -> None:
     slow = friso.bode(whole.replace({"drive.delay": None, "drive.sample_time": None}))
     fast = friso.bode(whole)
     assert fast.limits["free"].highest_stable < slow.limits["free"].highest_stable
-
-
-def test_rig_hunting(whole: Stage) -> None:
-    sizes = {
-        "RELATIVE_CROSSOVERS": np.array([1.0, 3.0]),
-        "SHOWN_CROSSOVERS": (0, 1),
-        "RELEASE_DISTANCES": (0.02,),
-        "rails": lambda machine: rails(machine)[:2],
-    }
-    with patched({rig_hunting: sizes}):
-        outcome = rig_hunting.EXPERIMENT.run(whole, 1, silent)
-    assert all(sentences(outcome))
-
-
-def test_compare(whole: Stage) -> None:
-    comparison = compare({"cascade": whole}, 20, 1)
-    assert comparison.as_built
-    assert not any(result.failed for result in comparison.results)
 
 
 @pytest.mark.thorough

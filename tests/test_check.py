@@ -5,14 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import refused
 from snapshots import alike
 from variants import VARIANTS
 
 import friso
 from friso.hunting import check_given
 from friso.hunting.measures import measured_run
-from friso.interface.inputs import stage_of
 from friso.questions.check.question import CheckAnswer
 from friso.stage import Stage
 from friso.studies.sweep import sweep
@@ -43,15 +41,12 @@ def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer, rig:
     assert cases["given"].solver == free.solver
 
 
-def test_the_readme_shows_what_its_first_line_prints(rig: Stage, checked: CheckAnswer) -> None:
-    """Numbers agree as far as processors do, as the limiter scatters. What a stage file notes is repeated."""
+def test_the_readme_shows_what_its_first_line_prints(checked: CheckAnswer) -> None:
+    """Numbers agree as far as processors do, as the limiter scatters."""
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
     printed = readme.partition("```text\n")[2].partition("\n```")[0].splitlines()
     assert all(map(alike, checked.sentences(), printed)), [*checked.sentences()]
     assert len([*checked.sentences()]) == len(printed)
-    noted = friso.loads(rig.replace({"note": "The controller is a placeholder."}).to_toml())
-    answer = CheckAnswer(checked.result, stage=noted, draws=None, laws=None, cut=False)
-    assert "The controller is a placeholder." in answer.sentences()
 
 
 @pytest.mark.slow
@@ -88,11 +83,6 @@ def test_measures_agree_with_the_trace(rig: Stage) -> None:
 def test_locked_without_stiffness_has_no_free_case(rig: Stage) -> None:
     held = {"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None}
     assert list(friso.check(rig.replace(held))) == ["given", "locked"]
-
-
-def test_unusable_tolerance(rig: Stage) -> None:
-    with refused("rtol"):
-        friso.check(rig, rtol=1.0)
 
 
 SPRING = """
@@ -211,32 +201,18 @@ def test_a_force_limit_that_keeps_a_stage_off_its_reference_is_named(
     limit: str, duration: str, at: float | None
 ) -> None:
     changes = {"controller.force_limit": limit, "motion.duration": duration}
-    answer = friso.check(VARIANTS["rigid, van Dijk, limit"].replace(changes))
-    why = "with its force at controller.force_limit, 2.50 N, and break-away takes 3.00 N"
-    assert answer["given"].force_limit == at
-    assert (why in answer.sentences()[0]) == (at is not None)
+    case = friso.check(VARIANTS["rigid, van Dijk, limit"].replace(changes))["given"]
+    assert case.force_limit == at
 
 
 @pytest.mark.slow
 def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved() -> None:
-    """Released at 15 um the stage creeps home, and sentence and table tell the time; at 2 mm it breaks away."""
+    """Released at 15 um the stage creeps home; at 2 mm it breaks away."""
     settled = VARIANTS["rigid"].replace({"controller.crossover": "12 Hz", "motion.duration": "5 s"})
-    answers = {d: friso.check(settled.replace({"motion.displacement": d})) for d in ("15 um", "2 mm")}
-    cases = {d: answer["given"] for d, answer in answers.items()}
+    cases = {d: friso.check(settled.replace({"motion.displacement": d}))["given"] for d in ("15 um", "2 mm")}
     assert [case.unmoved for case in cases.values()] == [True, False]
     assert cases["15 um"].breakaway == pytest.approx(3.0)
     run = friso.simulate(cases["15 um"].stage)
     assert np.ptp(run.position.values) < 16e-6
     last = float(run.time.values[np.abs(run.error.values) > 10e-6][-1])
     assert cases["15 um"].settling_time[1e-5] == pytest.approx(last, abs=1e-3)
-    time = f"{1e3 * last:.0f} ms"
-    assert f"in {time} without breaking away" in answers["15 um"].sentences()[0]
-    assert [row[1:] for row in answers["15 um"].tables()[0].rows if "into 10 µm" in row[0]] == [([time],)]
-
-
-def test_a_bare_number_is_echoed_with_its_unit(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:
-    assert stage_of(rig, ["joint.stiffness=3"]).joint.stiffness == pytest.approx(3e3)
-    assert "3 N/mm" in caplog.text
-    caplog.clear()
-    stage_of(rig, ["joint.stiffness=3 N/mm"])
-    assert not caplog.text

@@ -1,10 +1,7 @@
 """Test `friso design` as a user runs it: what it writes, says, draws and refuses."""
 
 import json
-import re
-import shutil
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from dataclasses import replace
 from io import StringIO
@@ -21,7 +18,6 @@ from refusals import refused
 from snapshots import Snapshots
 
 import friso
-from friso.cli.app import main
 from friso.design_method import controller, method
 from friso.design_method.geometry import Geometry, Sheet
 from friso.design_method.method import Design, NoDesign
@@ -32,7 +28,7 @@ from friso.design_method.spec import Position, Spec, load_spec
 from friso.interface.output_folder import OutputFolder
 from friso.progress import Progress
 from friso.quantities import outwards
-from friso.questions.design.blocks import design_document, refused_document
+from friso.questions.design.blocks import design_document
 from friso.questions.design.figures import design_figures
 from friso.questions.design.steps import (
     controller_step,
@@ -40,11 +36,9 @@ from friso.questions.design.steps import (
     joint_step,
     leaves_step,
     moves_step,
-    requirement_rows,
-    steps,
 )
 from friso.questions.design.window import lower, stiffest, upper
-from friso.questions.design.words import brings, edge, hertz, refusal, settling, verdicts
+from friso.questions.design.words import brings, edge, refusal
 from friso.shown import files
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.figure import Figure
@@ -142,11 +136,6 @@ def verified(designed: Design, **moves: Any) -> Design:
     return replace(designed, verification=replace(designed.verification, **moves))
 
 
-def lacking(text: str, *facts: str) -> list[str]:
-    """Return the facts that a text does not tell."""
-    return [fact for fact in facts if fact not in text]
-
-
 def some(count: int, otherwise: float) -> np.ndarray:
     """Return a number for each of 64 moves, of which the first do not end."""
     return np.where(np.arange(64) < count, np.nan, otherwise)
@@ -201,21 +190,17 @@ def test_all_files_are_written_and_the_stages_load(
 
 
 @pytest.mark.slow
-def test_the_document_has_the_agreed_keys(
+def test_the_document_has_the_numbers_of_the_design(
     spec: Path, folder: Path, quick: None, designed: Design, capsys: pytest.CaptureFixture
 ) -> None:
     command(RIG, spec, out=folder, as_json=True, overwrite=True)
     shown = capsys.readouterr()
     document = _strict(shown.out)
     assert shown.err == ""
-    asked = "conclusion stage spec feasible needed machine_limit_hz without joint leaves front controller verification"
-    assert document.keys() == {*asked.split(), "files", "plug_ins", "relax"}
     assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
     assert document["files"][0] == str(folder / "design.toml")
     without, joint, leaves = document["without"], document["joint"], document["leaves"]
     assert without["corners"] == designed.without.population.count
-    corner = "masses_cart_kg masses_stage_kg friction_static_n friction_coulomb_n"
-    assert without["worst_corner"].keys() == {*corner.split()}
     assert joint["force_at_stroke_n"] == pytest.approx(joint["stiffness_n_per_m"] * joint["stroke_m"], rel=0.01)
     assert joint["least_static_friction_n"] == 1.0
     assert joint["highest_edge_hz"] < without["highest_edge_hz"]
@@ -253,96 +238,91 @@ def test_what_is_not_finite_is_null(designed: Design) -> None:
 
 
 @pytest.mark.slow
-def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snapshots) -> None:
-    folder, text = written
-    snapshots.check("design", "run", text)
-    snapshots.check("design", "page", Page((folder / "design.html").read_text(encoding="utf-8")).lines)
-    assert text.rstrip().endswith(f"next: friso check {folder / 'design.toml'}")
-    sentences = [line for line in text.split("\nwrote")[0].splitlines() if not line[:1].isdigit()]
-    assert max(map(len, sentences)) <= shutil.get_terminal_size().columns
+def test_the_summary_and_the_page(written: tuple[Path, str], snapshots: Snapshots) -> None:
+    page = Page((written[0] / "design.html").read_text(encoding="utf-8"))
+    snapshots.check("design", "run", written[1])
+    snapshots.check("design", "page", page.lines)
+    assert all(address.startswith("data:") for address in page.loads)
+    assert page.tags.count("img") == len(FIGURES)
 
 
-@pytest.mark.slow
-def test_an_isolator_that_is_not_needed_is_weighed(designed: Design, snapshots: Snapshots) -> None:
-    (_, first), *_ = verdicts(designed)
-    step = isolator_step(designed)
-    text = step.sentences
-    assert "0.3 to 0.85 N" in dict(step.facts).values()
-    snapshots.check("design", "isolator not needed", "\n".join([first, *text]))
+Changed = Callable[[Design], Any]
 
 
-@pytest.mark.slow
-def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapshots) -> None:
-    needed = replace(designed, without=replace(designed.without, edges=np.full(len(designed.without.edges), 60.0)))
-    (_, first), *_ = verdicts(needed)
-    assert lacking(first, "72.0 Hz", "1.2 times", "48.0 Hz") == []
-    step = isolator_step(needed)
-    assert len(step.sentences) < len(isolator_step(designed).sentences)  # nothing to compare it with
-    snapshots.check("design", "isolator needed", "\n".join([first, step.title, *step.sentences]))
+def of_leaves(designed: Design, excess: list[float]) -> Design:
+    return replace(
+        designed, fitted=replace(designed.fitted, choice=replace(designed.fitted.choice, excess=np.array(excess)))
+    )
 
 
-@pytest.mark.slow
-def test_the_joint_is_held_below_the_static_friction(designed: Design) -> None:
-    text = " ".join(joint_step(designed).sentences)
-    allowed = 1 / (1.1 * 1.1)  # [N]: friction over the safety factor and the stiffness error
-    stated = ("no less than 1 N", "factor of 1.1", "error of 10 %", f"{allowed:.3g} N", "stroke of 1 mm")
-    assert lacking(text, *stated) == []
-    unknown = joint_step(replace(designed, edges=replace(designed.edges, unknown=2))).sentences
-    assert "were stopped, which counts as hunting" in " ".join(unknown)
-    assert "were stopped" not in text
+def damped(designed: Design, margins: list[float]) -> Design:
+    damping = replace(designed.controller.damping, margins=np.array(margins))
+    return replace(designed, controller=replace(designed.controller, damping=damping))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("edges", "stated"),
-    [((0.0, 0.0), ("1.20 Hz", "144 Hz")), ((0.0, np.inf), ("144 Hz",)), ((0.0, 7.62), ("7.62 Hz",))],
-)
-def test_edges_in_words(designed: Design, edges: tuple[float, float], stated: tuple[str, ...]) -> None:
-    text = edge(Corners(designed.without.population, np.array(edges), (1.2, 144.0)))
-    assert lacking(text, *stated) == []
-
-
-@pytest.mark.slow
-def test_leaves_and_what_binds_them(designed: Design) -> None:
-    excess = np.array([0.985, 0.2, 0.1, 0.6, 0.99])
-    tight = replace(designed.fitted.choice, excess=excess)
-    designed = replace(designed, fitted=replace(designed.fitted, choice=tight))
-    text = " ".join(leaves_step(designed).sentences)
-    rows = requirement_rows(designed)
-    for name, *_, spare in rows:
-        assert (name in text) == spare.endswith("binds")
-    assert "confirms 3 of 3 geometries" in text
+def without_beams(designed: Design) -> Design:
     broken = replace(designed.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
-    other = " ".join(leaves_step(replace(designed, confirmed=(broken, *designed.confirmed[1:]))).sentences)
-    assert "confirms 2 of 3 geometries" in other
-    assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
-    assert [row[3] for row in rows] == ["98.5 %, binds", "20 %", "10 %", "60 %", "99 %, binds"]
-    loose = replace(designed.fitted, choice=replace(tight, excess=excess / 2))
-    spared = " ".join(leaves_step(replace(designed, fitted=loose)).sentences)
-    assert [name for name, *_ in rows if name in spared] == []
+    return replace(designed, confirmed=(broken, *designed.confirmed[1:]))
 
 
-@pytest.mark.slow
+def moved(designed: Design, joint: str, **outcomes: Any) -> Design:
+    """Return the design with other outcomes of the moves with a `joint` free or locked."""
+    return verified(designed, **{joint: replace(getattr(designed.verification, joint), **outcomes)})
+
+
+def edged(designed: Design, *edges: float) -> str:
+    return edge(Corners(designed.without.population, np.array(edges), (1.2, 144.0)))
+
+
+SWING = (np.arange(64) < 2) * np.arange(64) * 1e-3
+SAID: dict[str, Changed] = {
+    "isolator not needed": isolator_step,
+    "isolator needed": lambda one: isolator_step(
+        replace(one, without=replace(one.without, edges=np.full(len(one.without.edges), 60.0)))
+    ),
+    "edges given up": lambda one: joint_step(replace(one, edges=replace(one.edges, unknown=2))),
+    "no edge": lambda one: edged(one, 0.0, 0.0),
+    "no end": lambda one: edged(one, 0.0, np.inf),
+    "an edge": lambda one: edged(one, 0.0, 7.62),
+    "leaves that bind": lambda one: leaves_step(of_leaves(one, [0.985, 0.2, 0.1, 0.6, 0.99])),
+    "leaves that spare": lambda one: leaves_step(of_leaves(one, [0.5, 0.1, 0.05, 0.3, 0.5])),
+    "beams that failed": lambda one: leaves_step(without_beams(one)),
+    "damping is worth it": lambda one: controller_step(damped(one, [0.3, 0.58, 0.6])).sentences[-1],
+    "damping is not": lambda one: controller_step(damped(one, [0.57, 0.59, 0.6])).sentences[-1],
+    "moves that swing": lambda one: moves_step(
+        moved(one, "free", words=restless(2), settling=some(2, 2.0), swing=SWING)
+    ),
+    "moves that fail": lambda one: moves_step(
+        moved(one, "free", words=np.where(np.arange(64) > 3, "rests", "failed").astype(object))
+    ),
+    "a locked joint that swings": lambda one: moves_step(
+        moved(one, "locked", words=restless(20), settling=some(20, 3.0))
+    ),
+    "a locked joint that never rests": lambda one: brings(
+        moved(one, "locked", words=np.full(64, "swings"), settling=np.full(64, np.nan))
+    ),
+    "nothing to relax": lambda _: refusal(NoDesign("too tight")),
+    "something to relax": lambda _: refusal(NoDesign("too tight", RELAXED * 3)),
+}
+
+
+def test_words(designed: Design, snapshots: Snapshots) -> None:
+    """A case keeps what no case before it said."""
+    texts, before = [], set()
+    for name, changed in SAID.items():
+        said = changed(designed)
+        lines = [said] if isinstance(said, str) else [said.title, *said.sentences]
+        texts.append(f"{name}: " + "\n".join(line for line in lines if line not in before))
+        before |= {*lines}
+    snapshots.check("design", "sentences", "\n".join(texts))
+
+
 def test_the_window_of_the_crossover(designed: Design) -> None:
     above, below = upper(designed), lower(designed)
     assert [item.value for item in above] == sorted(item.value for item in above)
     assert {48.0, stiffest(designed)} <= {entry.value for entry in above}
     assert 1.2 * designed.edges.highest in {limit.value for limit in below}
     assert below[0].value < designed.controller.crossover <= above[0].value
-    text = " ".join(controller_step(designed).sentences)
-    for bound in (*above, *below):
-        assert f"{hertz(bound.value)} ({bound.reason})" in text
-
-
-@pytest.mark.slow
-def test_damping_that_is_worth_adding_or_not(designed: Design, snapshots: Snapshots) -> None:
-    texts = []
-    for margins in ([0.3, 0.58, 0.6], [0.57, 0.59, 0.6]):
-        damping = replace(designed.controller.damping, margins=np.array(margins))
-        other = replace(designed, controller=replace(designed.controller, damping=damping))
-        texts.append(controller_step(other).sentences[-1])
-    assert lacking(texts[0], "0.5 N·s/m", "0.58") == []
-    snapshots.check("design", "damping", "\n".join(texts))
 
 
 def restless(count: int) -> np.ndarray:
@@ -352,53 +332,13 @@ def restless(count: int) -> np.ndarray:
     return words
 
 
-@pytest.mark.slow
-def test_moves_that_swing_or_take_too_long(designed: Design, snapshots: Snapshots) -> None:
-    swing = (np.arange(64) < 2) * np.arange(64) * 1e-3
-    free = replace(designed.verification.free, words=restless(2), settling=some(2, 2.0), swing=swing)
-    other = verified(designed, free=free)
-    step = moves_step(other)
-    assert lacking(step.title, "64 moves", "2 do not", "1 swing", "1 creep") == []
-    assert lacking(" ".join(step.sentences), "95 %", "1.00 s", "Not met", "1 mm") == []
-    snapshots.check("design", "moves that swing", "\n".join([*step.sentences, verdicts(other)[-1][1]]))
-    lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
-    assert "4 moves" in " ".join(moves_step(verified(designed, free=lost)).sentences)
-
-
-@pytest.mark.slow
-def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapshots) -> None:
-    locked = replace(designed.verification.locked, words=restless(20), settling=some(20, 3.0))
-    other = verified(designed, locked=locked)
-    text = " ".join(moves_step(other).sentences)
-    assert lacking(text, "3.00 s", "95 %", "Of 64", "20 do not") == []
-    snapshots.check("design", "moves of a locked joint", "\n".join([text, verdicts(other)[-1][1]]))
-    never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))
-    assert not re.search(r"\d", settling(never))
-    assert "never" in brings(verified(designed, locked=never))
-
-
 # ---------------------------------------------------------------- figures and page
 
 
 @pytest.mark.slow
-def test_the_page_stands_alone_and_shows_all(designed: Design, folder: Path) -> None:
-    page = Page((folder / "design.html").read_text(encoding="utf-8"))
-    assert all(address.startswith("data:") for address in page.loads)
-    assert page.tags.count("img") == len(FIGURES)
-    for step in steps(designed):
-        assert all(sentence in page.text for sentence in (step.title, *step.sentences))
-    for _, sentence in verdicts(designed):
-        assert sentence in page.text
-    for words in ("Requirements", "safety.parasitic", "worst.toml", "[flexure]", designed.spec.name):
-        assert words in page.text
-    named = [name for step in steps(designed) for name in step.figures]
-    assert sorted(named) == sorted(FIGURES)
-
-
-@pytest.mark.slow
 def test_front_with_chosen_and_failed_points(designed: Design) -> None:
-    broken = replace(designed.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
-    other = replace(designed, confirmed=(broken, *designed.confirmed[1:]))
+    other = without_beams(designed)
+    broken = other.confirmed[0]
     (panel,) = _figures(other)["design_front"].panels
     by_label = {marker.label: marker for marker in panel.markers}
     assert [*by_label] == ["by beams", "beams failed", "chosen, by the beam model"]
@@ -419,7 +359,6 @@ def test_map_with_the_chosen_point_and_cells_of_all_kinds(designed: Design) -> N
     assert (field.codes[1, 1], field.codes[2, 2]) == (1.0, 0.0)
     assert np.isnan(field.codes[0, 0])
     assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (designed.controller.crossover, 1.0)
-    assert [line.label.split(":")[0] for line in panel.series] == ["edge of hunting at 1 mm", "the machine's limit"]
 
 
 @pytest.mark.slow
@@ -439,7 +378,6 @@ def test_settling_ends_where_moves_do_not_rest(designed: Design) -> None:
     figure = _figures(verified(designed, free=free, locked=replace(free, settling=some(64, 0.0))))["design_settling"]
     (panel,) = figure.panels
     assert panel.series[0].y.max() == 75.0
-    assert [line.label for line in panel.series] == ["joint free", "joint locked", "specified"]
     assert matplotlib_renderer.image(figure, "svg")
 
 
@@ -452,22 +390,14 @@ def test_no_design_says_what_to_relax(tmp_path: Path, capsys: Any, no_design: No
         command(RIG, SPEC, out=tmp_path / "out", as_json=as_json)
     shown = capsys.readouterr()
     assert left.value.exit_code == 2
-    assert lacking(shown.err, "from 10 to 8.12", "leaves.length", "no leaf springs meet the specification") == []
     assert not (tmp_path / "out").exists()
     if not as_json:
         assert shown.out == ""
         return
     document = _strict(shown.out)
-    assert document.keys() == {"conclusion", "stage", "spec", "feasible", "reason", "relax", "files", "plug_ins"}
     assert document["feasible"] is False
     length = {"key": "leaves.length", "from": 0.07, "to": 0.07421, "unit": "m"}
     assert document["relax"][1].items() >= length.items()
-
-
-def test_no_single_relaxation() -> None:
-    assert "too tight" in refusal(NoDesign("too tight"))
-    assert len(refusal(NoDesign("too tight", RELAXED * 3)).splitlines()) == 7
-    assert refused_document(friso.load(RIG), "spec", NoDesign("too tight"))["relax"] == []
 
 
 @pytest.mark.parametrize(
@@ -492,38 +422,6 @@ def test_files_of_no_design_are_not_overwritten(finished: list[str], folder: Pat
     assert taken.read_text() == "mine"
     with refused("--out"):
         command(folder / "design.toml", SPEC, out=folder)
-
-
-@pytest.mark.slow
-def test_overrides_are_of_the_stage(finished: list[str], folder: Path, quick: None, spec: Path, caplog: Any) -> None:
-    command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder, overwrite=True)
-    assert finished[-1] == "Another"
-    assert "[drive]" in caplog.text
-    with refused("controller.crosover"):
-        command(RIG, spec, set=['controller.crosover="8 Hz"'], out=folder, overwrite=True)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "status", "message"),
-    [((RIG, "bad.toml"), 2, "expected"), ((RIG, SPEC), 130, "interrupted"), ((), 2, "Missing argument")],
-)
-def test_exit_status(
-    arguments: tuple, status: int, message: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any
-) -> None:
-    def interrupt(stage: Stage, spec: Spec, progress: Progress, anyway: bool) -> Design:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(method, "design", interrupt)
-    monkeypatch.chdir(tmp_path)
-    Path("bad.toml").write_text(SPEC.read_text().replace("stainless 1.4310", "stainles"))
-    monkeypatch.setattr(sys, "argv", ["friso", "design", *map(str, arguments), "--out", "out"])
-    with pytest.raises(SystemExit) as left:
-        main()
-    shown = capsys.readouterr()
-    assert (left.value.code, shown.out) == (status, "")
-    assert message in shown.err
-    assert "Traceback" not in shown.err
-    assert not Path("out").exists()
 
 
 @pytest.mark.slow
@@ -562,9 +460,6 @@ def test_ctrl_c_keeps_the_leaves_and_the_crossover(
     assert answer.interrupted
     assert not answer.failure
     assert not answer.meets
-    said = answer.sentences()
-    assert said[0].startswith("Interrupted: this is the answer so far. The isolator was not tried in moves, and ")
-    assert ("is not known" in said[0]) is (during == "hunting_map")
     assert answer.document()["interrupted"]
     (file,) = answer.report(tmp_path / "design")
     assert file.name == "design-not-verified.toml"

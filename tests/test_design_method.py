@@ -9,12 +9,11 @@ import pytest
 from beyond_flip import CREEPING
 
 import friso
-from friso.design_method import method as method_module
 from friso.design_method.choice import Candidate, chosen, confirmed, evaluate_geometries, front
 from friso.design_method.controller import Modal, choose_controller, comfortable_below, dampings
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
-from friso.design_method.method import NoDesign, design, fit_leaves, leaves
-from friso.design_method.population import Corners, Population, corners, edges_over, rigid
+from friso.design_method.method import NoDesign, leaves
+from friso.design_method.population import Population, corners, edges_over, rigid
 from friso.design_method.prepare import prepared, with_leaves
 from friso.design_method.requirements import PARASITIC, LeafTask, relaxed_requirements, requirements
 from friso.design_method.settings import DesignSettings
@@ -30,7 +29,6 @@ from friso.leaf_springs.beams import BeamFailure
 from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
-from friso.questions.design.words import refusal
 from friso.stage import Stage
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -181,26 +179,6 @@ def test_no_leaves_no_design(base: Stage, monkeypatch: pytest.MonkeyPatch) -> No
         leaves(loaded(force_x="500 N"), base.flat(), 1.0)
 
 
-@pytest.mark.parametrize(("edge", "begins"), [(0.0, "No isolator is needed"), (1e3, "no design")])
-def test_where_there_is_no_design_it_is_said_whether_an_isolator_is_needed(
-    base: Stage, monkeypatch: pytest.MonkeyPatch, edge: float, begins: str
-) -> None:
-    """The edge of hunting [Hz] without isolator decides, also for a machine that cannot have leaf springs."""
-
-    def edges(_: object, population: Population, low: float, high: float, *others: object) -> Corners:
-        return Corners(population, np.full(population.count, edge), (low, high))
-
-    def no_leaves(*_: object) -> None:
-        raise NoDesign("no leaf springs")
-
-    monkeypatch.setattr(method_module, "edges_over", edges)
-    monkeypatch.setattr(method_module, "leaves", no_leaves)
-    with pytest.raises(NoDesign) as refused:
-        design(base, SPEC)
-    assert refusal(refused.value).startswith(begins)
-    assert "no leaf springs" in refusal(refused.value)
-
-
 # --- hunting and the controller ---------------------------------------------------------------------------------------
 
 
@@ -237,17 +215,6 @@ def test_corners_in_which_large_motions_may_run_away_are_not_certain() -> None:
     one = Population({"friction.static": np.array([3.0])}, 1)
     edges = edges_over(limited.flat(), one, 20.0, 40.0, 2)
     assert (edges.hunts, edges.unknown) == (False, 1)
-
-
-def test_corners_without_hunting_and_with_no_end() -> None:
-    part = Population({}, 3)
-    none = Corners(part, np.zeros(3), (1.0, 40.0))
-    assert not none.hunts
-    assert none.highest == 1.0
-    endless = Corners(part, np.array([0.0, np.inf, 3.0]), (1.0, 40.0), unknown=1)
-    assert endless.hunts
-    assert endless.worst == 1
-    assert np.isinf(endless.highest)
 
 
 def test_a_stage_that_never_hunts_has_no_edge(base: Stage) -> None:
@@ -315,17 +282,6 @@ def test_the_crossover_is_comfortable_and_damping_helps(guided: Stage) -> None:
     assert expected.damping.margins[worth] >= 0.95 * expected.damping.margins.max()
     assert np.all(np.diff(dampings(stage.flat())) > 0)
     assert expected.gains.k_p == pytest.approx(1.7 * (2 * np.pi * 40) ** 2 / np.sqrt(10), rel=1e-6)
-
-
-@pytest.mark.thorough
-def test_without_a_comfortable_crossover_there_is_no_design(
-    base: Stage, task: LeafTask, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from friso.design_method import method
-
-    monkeypatch.setattr(method, "comfortable_below", lambda ranges, highest: None)
-    with pytest.raises(NoDesign, match="modulus margin"):
-        fit_leaves(base, replace(task, crossover=40.0), candidates, corners(SPEC, base.flat()))
 
 
 # --- verification -----------------------------------------------------------------------------------------------------

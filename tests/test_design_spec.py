@@ -1,14 +1,12 @@
 """Test specifications: what is read, what is refused, and the machines that they allow."""
 
 import copy
-import os
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from refusals import refused
 
 import friso
 from friso.design_method.geometry import Geometry, Sheet, box, round_geometries, sheets
@@ -48,27 +46,6 @@ def test_the_example_is_read() -> None:
     assert changed("leaves", thickness="0.2 mm .. 0.35 mm").leaves.thickness == (0.2e-3, 0.25e-3, 0.3e-3, 0.35e-3)
     low, high = box(changed("leaves", length="70 mm"))
     assert (low[0], high[0]) == pytest.approx((7e-3, 70e-3))
-
-
-DAHL = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
-LOCKED = {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
-
-
-@pytest.mark.parametrize(
-    ("key", "asked"),
-    [
-        (None, lambda rig: load_spec(EXAMPLES / "none.toml")),
-        (None, lambda rig: load_spec(Path(os.devnull))),
-        ("friction.static", lambda rig: corners(load_spec(SPEC), rig.replace({"friction": DAHL}).flat())),
-        (None, lambda rig: prepared(rig.replace({"joint": LOCKED}), load_spec(SPEC))),
-        (None, lambda rig: prepared(rig.replace({"friction": {"model": "none"}}), load_spec(SPEC))),
-    ],
-)
-def test_files_and_stages_of_which_there_is_no_design_are_refused(
-    rig: friso.Stage, key: str | None, asked: Any
-) -> None:
-    with refused(key):
-        asked(rig)
 
 
 def test_corners_hold_the_ends_of_all_ranges(rig: friso.Stage) -> None:

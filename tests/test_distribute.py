@@ -3,8 +3,6 @@
 import os
 import shutil
 import subprocess
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -93,34 +91,6 @@ def test_a_scheduler_with_tls_is_reached_by_dask_s_configuration_alone(
     assert not [record for record in caplog.records if record.name == "friso"]
 
 
-def test_a_worker_uses_no_more_threads_than_it_was_given(rig: Stage, cluster: LocalCluster) -> None:
-    """A kernel that took all processors of the machine would show as more running threads than the worker has."""
-    with connected(cluster.scheduler_address) as crew:
-        study = Request(rig, {"controller.crossover": "2 Hz..16 Hz:300"}).study(rtol=1e-8)
-        counts: list[int] = []
-        pids = list(crew.executor._client.run(os.getpid).values())
-        stop = threading.Event()
-
-        def count() -> None:
-            while not stop.is_set():
-                for pid in pids:
-                    names = [
-                        (Path(entry) / "stat").read_text().rsplit(")", 1)[1].split()[0]
-                        for entry in Path(f"/proc/{pid}/task").iterdir()
-                    ]
-                    counts.append(names.count("R"))
-                time.sleep(0.002)
-
-        watcher = threading.Thread(target=count)
-        watcher.start()
-        run_in_memory([study], crew)
-        stop.set()
-        watcher.join()
-    busy = [n for n in counts if n]
-    assert busy
-    assert sum(n > 2 for n in busy) < 0.5 * len(busy)  # the computing thread, and now and then the one that talks
-
-
 @pytest.mark.thorough
 def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> None:
     study, path = Request(rig, AXES).study(rtol=1e-9), tmp_path / "a.zarr"
@@ -183,10 +153,7 @@ def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
     def close(done: int, total: int, what: str) -> None:
         scheduler.close()
 
-    with (
-        pytest.raises(RuntimeError, match="lost a block"),
-        connected(scheduler.scheduler_address) as crew,
-    ):
+    with pytest.raises(RuntimeError, match="lost a block"), connected(scheduler.scheduler_address) as crew:
         run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, close)
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from inside import friso_inside
 
-from friso.cli.common import print_table
 from friso.studies import doctor
 from friso.studies.settings import StudySettings
 
@@ -22,24 +21,6 @@ def test_this_machine_works(tmp_path: Path) -> None:
     }
     formats = {finding["subject"] for finding in document["findings"] if finding["subject"].endswith(" files")}
     assert formats <= {f"{name} files" for name in ("mat", "tdms", "uff", "lvm", "parquet", "workbook")}
-
-
-def test_a_long_text_in_a_table_leaves_room_for_the_names(capsys: pytest.CaptureFixture[str]) -> None:
-    print_table("", ["Result"], [("processor", ["packages " * 60])])
-    assert "processor" in capsys.readouterr().out
-
-
-def test_a_name_as_wide_as_the_terminal_leaves_room_for_the_others(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    name = "".join(chr(ord("A") + k % 26) for k in range(80))
-    print_table("", ["Unit", "Role"], [(name, ["um", "position"])])
-    lines = capsys.readouterr().out.splitlines()
-    first = "".join(line.split("│")[1].strip() for line in lines if line.startswith("│"))
-    assert first == name
-    assert max(map(len, lines)) <= 80
-    assert {"um", "position"} <= {*"".join(lines).split()}
 
 
 def test_no_folder_of_the_user_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,10 +6,8 @@ import base64
 import io
 import json
 import os
-import re
 import subprocess
 import sys
-import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -18,8 +16,6 @@ import matplotlib
 import matplotlib.image
 import numpy as np
 import pytest
-from fontTools import subset
-from fontTools.ttLib import TTFont
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -51,29 +47,17 @@ def test_what_cannot_be_drawn_is_refused(asked, message):
         asked()
 
 
-@pytest.mark.parametrize(
-    ("values", "unit", "factor", "text"),
-    [
-        ([0.0, 0.52e-3], "m", 1e6, "µm"),
-        ([-1.04e-3], "m", 1e3, "mm"),
-        ([0.09, -0.02], "m", 1e3, "mm"),
-        ([0.001], "m", 1e3, "mm"),
-        ([1000.0], "m", 1.0, "m"),
-        ([2e-13], "m", 1e9, "nm"),
-        ([20.0], "s", 1.0, "s"),
-        ([3600.0], "s", 1.0, "s"),
-        ([0.015], "m/s", 1e3, "mm/s"),
-        ([2400.0], "N/m", 1e-3, "kN/m"),
-        ([316.0], "N*s/m", 1.0, "N·s/m"),
-        ([0.5], "kg", 1.0, "kg"),
-        ([1e-6], "m^2", 1.0, "m²"),
-        ([0.0, np.nan, np.inf], "m", 1.0, "m"),
-        ([], "N", 1.0, "N"),
-        ([7.0], "", 1.0, ""),
-    ],
-)
-def test_prefix(values, unit, factor, text):
-    assert choose(np.array(values), unit) == (pytest.approx(factor), text)
+PREFIXED = """0 0.52e-3: m 1e6 µm; -1.04e-3: m 1e3 mm; 0.09 -0.02: m 1e3 mm; 0.001: m 1e3 mm; 2e-13: m 1e9 nm;
+20: s 1 s; 3600: s 1 s; 0.015: m/s 1e3 mm/s; 2400: N/m 1e-3 kN/m; 316: N*s/m 1 N·s/m; 0.5: kg 1 kg; 1e-6: m^2 1 m²;
+0 nan inf: m 1 m; : N 1 N; 1000: m 1 m"""
+
+
+def test_prefixes() -> None:
+    """Of values, their unit: the factor and the unit that they are shown in."""
+    for row in PREFIXED.split(";"):
+        values, shown = row.split(":")
+        unit, factor, text = shown.split()
+        assert choose(np.array(values.split(), float), unit) == (pytest.approx(float(factor)), text), row
 
 
 @given(st.floats(1e-9, 999.0))
@@ -83,23 +67,10 @@ def test_prefixed_lengths_read_between_one_and_a_thousand(value):
     assert 1 - 1e-8 <= value * factor < 1000 * (1 + 1e-8)
 
 
-@pytest.mark.parametrize(
-    ("value", "unit", "text"),
-    [
-        (1.04e-3, "m", "1.04 mm"),
-        (0.0, "m", "0 m"),
-        (None, "s", "–"),
-        (float("nan"), "s", "–"),
-        (1234.5, "s", "1234 s"),
-        (1e-15, "m", "< 0.00100 nm"),
-        (0.0496, "Hz", "0.0496 Hz"),
-    ],
-)
-def test_values_in_sentences(value: float | None, unit: str, text: str):
-    assert with_unit(value, unit) == text
-
-
 def test_ranges_and_shares_in_sentences():
+    sentences = {1.04e-3: "1.04 mm", 0.0: "0 m", None: "–", np.nan: "–", 1e-15: "< 0.00100 nm", 0.0496: "49.6 mm"}
+    assert [with_unit(value, "m") for value in sentences] == [*sentences.values()]
+    assert (with_unit(1234.5, "s"), with_unit(0.0496, "Hz")) == ("1234 s", "0.0496 Hz")
     assert pretty("m/s**2") == "m/s²"
     assert swing_with_unit(0.52e-3, 0.0, "m") == "±0.52 mm"
     assert swing_with_unit(0.345e-3, 1e-5, "m") == "±345 µm"
@@ -182,15 +153,6 @@ def test_both_renderers_write_the_same_labels_and_ranges():
                 assert paper.get_xlim() == pytest.approx(x.range)
 
 
-def test_colour_bar_and_units_of_a_map():
-    once = drawable(small_figure())
-    panel = once.panels[1]
-    assert panel.x.label == "Stiffness [kN/m]"
-    assert panel.y.label == "Stroke [mm]"
-    assert panel.maps[0].x[-1] == pytest.approx(4.0)
-    assert [p.x for p in drawable(once).panels] == [p.x for p in once.panels]
-
-
 @pytest.mark.slow
 def test_figures_drawn_in_threads_are_those_drawn_alone():
     kinds = [("png", True), ("svg", False), ("svg", True), ("png", False)]
@@ -251,22 +213,6 @@ def test_a_page_carries_what_plotly_draws_in_four_bytes_a_number():
             numbers = planes.reshape(4, -1).T.copy().view("<f4")
             shape = [int(size) for size in part[name]["shape"].split(",") if size] or -1
             assert np.array_equal(numbers.reshape(shape), np.asarray(trace[name], "<f4"), equal_nan=True)
-
-
-@pytest.mark.slow
-def test_fonts_of_a_pdf_hold_letters_alone():
-    """The letters' places are in the file, so the PDF needs no table of them.
-
-    The library that cuts fonts down is left as it was for others.
-    """
-    usual = subset.Options().drop_tables
-    pdf = matplotlib_renderer.image(small_figure(), "pdf")
-    packed = re.findall(rb"stream\r?\n(x.*?)endstream", pdf, re.DOTALL)
-    streams = [zlib.decompressobj().decompress(part) for part in packed]
-    fonts = [TTFont(io.BytesIO(stream)) for stream in streams if stream.startswith(b"\0\1\0\0")]
-    assert len(fonts) > 1
-    assert all("glyf" in font and not {"GPOS", "GSUB", "GDEF"} & {*font.keys()} for font in fonts)
-    assert subset.Options().drop_tables == usual
 
 
 def test_a_print_is_the_figure_without_its_heading() -> None:

@@ -16,7 +16,7 @@ import friso
 from friso.cli import main
 from friso.hunting import find_margin
 from friso.hunting.criteria import ATTRACTED, VERDICTS
-from friso.questions.check.draws import draws_details, draws_document, draws_figure, draws_rows, draws_sentences
+from friso.questions.check.draws import draws_document, draws_figure, draws_sentences
 from friso.shown.documents import plain_json
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Sample, draw
@@ -140,21 +140,6 @@ def draws(fates: Fates) -> Draws:
     return Draws(stage, drawn, 7, {"given": fates}, drawn.count)
 
 
-def test_ranges_of_what_hunts_are_told_first_with_what_narrows_them() -> None:
-    """Amplitude, period and edge from the least to the most; the key that the amplitude follows decides."""
-    count = 30
-    keys = {"friction.coulomb": np.linspace(0.5, 1.5, count), "friction.viscous": np.tile([1.0, 2.0], count // 2)}
-    swings = {"amplitudes": np.linspace(2.5e-4, 3e-4, count), "periods": np.linspace(1.4, 1.9, count)}
-    words, stable = np.array(["hunts"] * count, dtype=object), np.zeros(count, bool)
-    shown = draws(Fates(words, stable, **swings))
-    shown = replace(shown, sample=Sample(keys, count, 0, {}))
-    (first,) = draws_sentences(shown)
-    for text in ("500 to 600 µm peak to peak", "1.40 to 1.90 s", "all of 30"):
-        assert text in first
-    assert "measure friction.coulomb" in draws_details(shown)[0]
-    assert draws_document(shown, "given")["amplitude_m"] == [2.5e-4, 3e-4]
-
-
 def test_the_cure_holds_for_all_draws_over_a_step() -> None:
     """A bandwidth at which none hunts, but one does a little above, is no cure; an uncertain draw counts as hunting."""
     factors = np.array([0.8, 1.0, 1.1, 1.3, 1.4, 1.7, 2.2])
@@ -172,22 +157,18 @@ def test_the_cure_holds_for_all_draws_over_a_step() -> None:
 
 @pytest.mark.parametrize("case", ["locked", "free"])
 def test_each_case_has_its_own_bandwidths(rig: Stage, case: str) -> None:
-    """The drawn stages hunt with the joint locked, and do not with it free, which is a cure then."""
-    stage = rig.replace({"joint.locked": case == "locked"})
-    words = {"locked": "hunts", "free": "settles"}
-    judged = {name: Fates(np.array([word] * 9, dtype=object), np.zeros(9, bool)) for name, word in words.items()}
+    """The drawn stages hunt with the joint locked, and do not with it free; the case given is told as what it is."""
+    judged = {"locked": made(9, 0), "free": made(0, 9)}
     sample = Sample({"friction.coulomb": np.linspace(0.5, 1.5, 9)}, 9, 0, {})
     factors = np.array([0.5, 0.8, 1.0, 1.3, 2.0])
-    tried = {
-        "locked": DrawnBandwidths(factors, np.tile([1.0, 1.0, 1.0, 0.0, 0.0], (9, 1)), 8.0),
-        "free": DrawnBandwidths(factors, np.tile([1.0, 0.0, 0.0, 0.0, 0.0], (9, 1)), 8.0),
-    }
+    rows = {"locked": [1.0, 1.0, 1.0, 0.0, 0.0], "free": [1.0, 0.0, 0.0, 0.0, 0.0]}
+    tried = {name: DrawnBandwidths(factors, np.tile(row, (9, 1)), 8.0) for name, row in rows.items()}
     tried["given"], judged["given"] = tried[case], judged[case]
-    locked_says, free_says = draws_sentences(Draws(stage, sample, 0, judged, 9, tried))
-    assert "10.4 Hz, up to 16.0 Hz" in locked_says
-    assert "free the joint" in locked_says
-    assert "4.00 Hz to 6.40 Hz" in free_says
-    assert "Cure" not in free_says
+    shown = Draws(rig.replace({"joint.locked": case == "locked"}), sample, 0, judged, 9, tried)
+    assert draws_document(shown, "locked")["cure_hz"] == pytest.approx([10.4, 16.0])
+    assert draws_document(shown, "free")["edge_hz"] == pytest.approx([4.0, 6.4])
+    locked_says, free_says = draws_sentences(shown)
+    assert ("Cure" in locked_says, "Cure" in free_says) == (True, False)
 
 
 def test_bandwidths_of_draws_agree_with_the_margin_of_each_stage(rig: Stage) -> None:
@@ -239,22 +220,14 @@ def test_machines_without_integral_action_cannot_hunt(rig: Stage) -> None:
     assert off.min() <= abs(alone.offset) <= off.max()
 
 
-@pytest.mark.parametrize(
-    ("hunts", "says"),
-    [
-        ([1, 0, 0], "may hunt: none of 9 machines drawn does, but 9 of the 9 tried at other bandwidths do at 4.00 Hz."),
-        ([1, 1, 0], "may hunt: none of 9 machines drawn does, but 9 of the 9 tried at other bandwidths do at 8.00 Hz."),
-        ([0, 0, 0], "does not hunt: none of 9"),
-    ],
-)
-def test_hunting_that_begins_at_the_machines_own_controller_may_be_there(hunts: list[int], says: str) -> None:
+@pytest.mark.parametrize(("hunts", "may"), [([1, 0, 0], True), ([1, 1, 0], True), ([0, 0, 0], False)])
+def test_hunting_that_begins_at_the_machines_own_controller_may_be_there(hunts: list[int], may: bool) -> None:
     tried = DrawnBandwidths(np.array([0.5, 1.0, 1.3]), np.tile(np.array(hunts, float), (9, 1)), 8.0)
     shown = replace(draws(made(0, 9)), bandwidths={"given": tried})
-    assert says in draws_sentences(shown)[0]
-    assert shown.split("given") == says.startswith("may")
+    assert shown.split("given") == may
 
 
-def test_document_rows_and_sentences() -> None:
+def test_the_document_of_draws() -> None:
     shown = draws(made(6, 3, 1))
     document = json.loads(json.dumps(plain_json(draws_document(shown, "given")), allow_nan=False))
     verdicts = {"hunts": 6, "bistable": 0, "transient": 0, "settles": 3, "undecided": 1, "failed": 0}
@@ -262,24 +235,16 @@ def test_document_rows_and_sentences() -> None:
     assert (document["count"], document["seed"], document["left_out"]) == (10, 7, 5)
     assert document["hunts"]["probability"] == pytest.approx(2 / 3)
     assert document["separation"] == {"friction.coulomb": -1.0}
-    rows = dict(draws_rows(shown))
-    assert rows["Verdict hunts"] == ["6"]
-    assert rows["Decided by friction.coulomb"] == ["-1.00"]
-    says = " ".join(draws_sentences(shown))
-    assert "may hunt: 66.7 % (26.2 to 93.3 %) of 10 machines" in says
-    for words in ("1 of them not for certain", "friction.coulomb: smaller"):
-        assert words in says
-    details = " ".join(draws_details(shown))
-    for words in ("5 invalid draws", "3: a rule"):
-        assert words in details
-    assert "unstable" not in says
+    assert "may hunt: 66.7 % (26.2 to 93.3 %) of 10 machines" in draws_sentences(shown)[0]
     lost = draws(made(6, 3, unstable=2))
     text = draws_sentences(lost)[0]
-    assert "2 of 9" in text
     assert text.index("unstable") < text.index("may hunt")
     assert draws_document(lost, "given")["loop_unstable"] == 2
     unknown = plain_json(draws_document(draws(made(0, 0, 3)), "given"))
     assert unknown["hunts"] == {"probability": None, "low": 0.0, "high": 1.0}
+    words, swings = np.array(["hunts"] * 30, dtype=object), np.linspace(2.5e-4, 3e-4, 30)
+    swinging = draws(Fates(words, np.zeros(30, bool), amplitudes=swings, periods=np.linspace(1.4, 1.9, 30)))
+    assert draws_document(swinging, "given")["amplitude_m"] == [2.5e-4, 3e-4]
 
 
 def test_the_figure_holds_every_draw() -> None:
@@ -324,23 +289,6 @@ def test_check_draws(
     beside.write_text('keys = ["masses.cart"]\nmatrix = [[1]]')
     assert run(monkeypatch, "check", path, *options, "--overwrite") == 2
     assert "masses.cart" in rows_of(capsys.readouterr().err)["given"]
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("--draws", "8"),
-        ("--draws", "0", "--set", "masses.cart=1 kg +/- 1 %"),
-        ("--draws", "8", "--seed", "-1", "--set", "masses.cart=1 kg +/- 1 %"),
-    ],
-)
-def test_check_draws_refused(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
-) -> None:
-    assert run(monkeypatch, "check", Path(__file__).parents[1] / "examples" / "thesis_rig.toml", *options) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert rows_of(shown.err)
 
 
 @pytest.mark.slow

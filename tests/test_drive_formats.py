@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from patience import grows_with_the_square
 
 import friso
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
 from friso.drives.questions import UserAnswers
 from friso.drives.read import stage_from
-from friso.drives.xml_files import root_of
 from friso.errors import InputError
 
 MOVE = {"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "0.1 s"}
@@ -323,8 +323,37 @@ def test_no_damage_to_a_file_raises_anything_but_one_message(
         stage_from(path, None, ANSWERS[kind])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [*TEXTS, "stage"])
+@pytest.mark.parametrize("filler", [" ", "\t", '"', "1", "a.", "a(", "[", "=", "<a ", "/", "_"])
+def test_a_long_text_is_read_or_refused_in_a_time_like_its_length(tmp_path: Path, kind: str, filler: str) -> None:
+    """In a line of its own, before and behind a value, and in a comment."""
+    text = TEXTS[kind] if kind != "stage" else friso.example("lugre_stick_slip").read_text("utf-8")
+    place = text.index("=" if "=" in text else ":" if ":" in text else " ", len(text) // 3) + 1
+    path = tmp_path / "file.txt"
+
+    def read(length: int) -> None:
+        long = filler * length
+        for changed in (
+            f"{text}\n{long}\n",
+            f"{long}{text}",
+            f"{text[:place]}{long}{text[place:]}",
+            f"{text[:place]} 1{long}!{text[place:]}",
+            f"# {long} x\n{text}",
+        ):
+            with suppress(InputError):
+                if kind == "stage":
+                    friso.loads(changed)
+                else:
+                    path.write_text(changed, "utf-8")
+                    stage_from(path, None, ANSWERS[kind])
+
+    assert not grows_with_the_square(read, 10_000)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1", "nobody-knows"])
-def test_xml_counts_as_it_was_read_whatever_encoding_it_declares(encoding: str) -> None:
-    """The text has been decoded before."""
-    root = root_of(f'<?xml version="1.0" encoding="{encoding}"?><a b="ü"/>', "as a drive writes it")
-    assert root.get("b") == "ü"
+def test_xml_counts_as_it_was_read_whatever_encoding_it_declares(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "axis.xml"
+    path.write_text(f'<?xml version="1.0" encoding="{encoding}"?>{TEXTS["icub"].replace("torso", "ü")}', "utf-8")
+    read = stage_from(path, "joint_1", ANSWERS["icub"])
+    assert read.stage.flat()["controller.kp"] == pytest.approx(BY_HAND["icub"]["kp"])

@@ -29,9 +29,7 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.read import file_format, read_table
 from friso.interface.question import HUNTS, QUESTIONS
 from friso.progress import Progress
-from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.studies.metric import METRICS, MapFinding, Metric, Word
@@ -200,16 +198,6 @@ def test_a_metric_of_its_own_is_swept_drawn_and_told(
     assert json.loads(capsys.readouterr().out)["conclusion"].startswith("The actuator works hard")
     assert run(stage, "--x", crossovers, "--metric", "load", "--out", tmp_path / "no.zarr", command="map") == 2
     assert "--metric loaded" in capsys.readouterr().err
-
-
-def test_a_page_of_its_own_needs_no_template() -> None:
-    hold = Hold(Estimate.unknown("a", "N", "", "", 1.0), np.arange(3.0), np.ones(3))
-    (figure,) = HeldForce().figures(hold, (), "held")
-    rows = [("Held", ["2 N"])]
-    block = AnswerBlock(sentences=["It <holds>."], columns=["Force"], rows=rows, draw=lambda: [figure])
-    page = Report("hold", "A stage", [block], computed=", by hand").html()
-    assert "<title>A stage: friso hold</title>" in page
-    assert all(text in page for text in ("It &lt;holds&gt;.", "<td>2 N</td>", "Forces held", ", by hand."))
 
 
 QUESTION = {

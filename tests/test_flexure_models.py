@@ -69,19 +69,6 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
 THESIS = mechanism()
 
 
-def scaled(value: Any, factors: dict[str, float]) -> Any:
-    """Return a value with each number multiplied by the factor of its name."""
-    changed = {}
-    for item in fields(value):
-        now = getattr(value, item.name)
-        if isinstance(now, MovingBody):
-            changed[item.name] = scaled(now, factors)
-        else:
-            factor = factors.get(item.name, 1.0)
-            changed[item.name] = tuple(n * factor for n in now) if isinstance(now, tuple) else now * factor
-    return replace(value, **changed)
-
-
 def together(many: list[Mechanism]) -> Mechanism:
     """Many mechanisms as one of arrays."""
 
@@ -141,38 +128,6 @@ def test_a_plain_beam_is_what_exudyn_makes_of_it() -> None:
 
 
 # ---- closed forms
-
-
-@MANY
-@given(springs=mechanisms(), factor=st.floats(0.1, 10))
-def test_similar_mechanisms(springs: Mechanism, factor: float) -> None:
-    """Scaling all lengths scales stiffness by the factor, mass by its cube, frequency inversely; stress stays."""
-    lengths = dict.fromkeys(("length", "width", "thickness", "spacing", "centre", "actuation", "sensor"), factor)
-    large = scaled(springs, {**lengths, "mass": factor**3, "inertia": factor**5})
-    stroke = springs.length / 100
-    for name, power in (("drive_stiffness", 1), ("support_x", 1), ("support_y", 1), ("leaf_bending", -1)):
-        f = getattr(closed_forms, name)
-        assert f(large) == pytest.approx(factor**power * f(springs), rel=1e-9)
-    for name, power in (("support_x", 1), ("support_y", 1), ("max_stress", 0), ("shortening", 1)):
-        f = getattr(closed_forms, name)
-        assert f(large, factor * stroke) == pytest.approx(factor**power * f(springs, stroke), rel=1e-9)
-    assert closed_forms.buckling_load(large) == pytest.approx(factor**2 * closed_forms.buckling_load(springs), rel=1e-9)
-    assert closed_forms.leaf_torsion(large) == pytest.approx(closed_forms.leaf_torsion(springs) / factor, rel=1e-9)
-    assert closed_forms.lateral_load(large) == pytest.approx(factor**2 * closed_forms.lateral_load(springs), rel=1e-9)
-    assert closed_forms.modes(large)[0] == pytest.approx(closed_forms.modes(springs)[0] / factor, rel=1e-6)
-
-
-@pytest.mark.slow
-@MANY
-@given(springs=mechanisms(), force=st.floats(0.1, 10), density=st.floats(0.1, 10))
-def test_units_of_force_and_mass(springs: Mechanism, force: float, density: float) -> None:
-    other = scaled(springs, {"young": force, "density": density, "mass": density, "inertia": density})
-    assert closed_forms.stage_stiffness(other) == pytest.approx(force * closed_forms.stage_stiffness(springs), rel=1e-9)
-    ratio = np.sqrt(force / density)
-    assert closed_forms.modes(other)[0] == pytest.approx(ratio * closed_forms.modes(springs)[0], rel=1e-6)
-    assert first_interfering(other) == pytest.approx(ratio * first_interfering(springs), rel=1e-6)
-    (frequency, share), (f, m) = parasitic_mode(other), parasitic_mode(springs)
-    assert (frequency, share) == pytest.approx((ratio * f, m), rel=1e-6)
 
 
 @MANY

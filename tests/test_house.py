@@ -65,8 +65,6 @@ MODULES = {
 OFFERED = {"friso.hunting.criteria", "friso.hunting.measures"}
 """Modules within a room that belong to what it offers."""
 
-NARRATORS = {"found", "known", "told", "given", "each", "it"}
-"""Names that do not say what a value is."""
 
 LEFT = 38
 """Width of the column of names in the drawing of docs/architecture.md."""
@@ -130,41 +128,6 @@ def test_keys_are_imported_where_the_rules_of_tuning_are_the_subject() -> None:
 @pytest.mark.slow
 def test_the_name_of_a_type_stands_for_one_thing() -> None:
     assert {name: where for name, where in types().items() if len(where) > 1} == {}
-
-
-@pytest.mark.cases(slow=2)
-@pytest.mark.parametrize("folder", ["friso_thesis", "benchmarks", "tests", "friso"])
-def test_names_of_values_say_what_they_hold(folder: str) -> None:
-    named = []
-    for path in sorted((ROOT / folder).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            name = node.id if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) else None
-            name = node.arg if isinstance(node, ast.arg) else name
-            name = node.name if isinstance(node, ast.FunctionDef | ast.ClassDef) else name
-            if name in NARRATORS:
-                named.append(f"{path.relative_to(ROOT)}: {name}")
-    assert named == []
-
-
-@pytest.mark.slow
-def test_percentages_are_written_by_one_function() -> None:
-    """Percentages come from `quantities.percent` or `prefixes.percentage`, not from f-strings or hand-written text."""
-    by_hand = []
-    for name, source in sources().items():
-        for node in ast.walk(ast.parse(source)):
-            if isinstance(node, ast.JoinedStr) and any(map(is_percentage, node.values, [*node.values[1:], None])):
-                by_hand.append(name)
-    assert by_hand == []
-
-
-def is_percentage(value: ast.expr, behind: ast.expr | None) -> bool:
-    """Whether a part of an f-string, with the part behind it, is a share times 100, or formatted as such."""
-    if not isinstance(value, ast.FormattedValue):
-        return False
-    hundred = isinstance(value.value, ast.BinOp) and isinstance(value.value.op, ast.Mult)
-    hundred = hundred and "100" in ast.unparse(value.value).split()
-    sign = isinstance(behind, ast.Constant) and str(behind.value).startswith(" %")
-    return (hundred and sign) or (value.format_spec is not None and "%'" in ast.unparse(value.format_spec))
 
 
 def test_a_question_gives_its_blocks_in_one_place() -> None:

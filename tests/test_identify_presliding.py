@@ -13,6 +13,7 @@ from refusals import refused
 from rig_machines import EXAMPLE, built
 from scipy.integrate import solve_ivp
 from scipy.ndimage import gaussian_filter1d
+from snapshots import Snapshots
 
 import friso
 from friso.identification.experiments.presliding import Presliding, bristles_from_presliding
@@ -177,21 +178,22 @@ def test_noise_of_the_sensor_and_slow_motion_widen_the_intervals() -> None:
 
 @pytest.mark.cases(first=4)
 @pytest.mark.parametrize(
-    ("make", "words"),
+    "make",
     [
-        (lambda: shaken(noise=2e-7), "3.8e-07 m RMS, does not stand out from the noise"),
-        (lambda: shaken(step=5.5e-3), "up to 40.1 Hz: one in 0.00499 s or less is needed"),
-        (lambda: replace(shaken(), segments=(slice(0, 500),)), "500 samples"),
-        (lambda: record("x", DT, position=np.full(12000, 0.5), force=np.arange(12000.0)), "0 m RMS"),
-        (lambda: shaken(size=2e-5), "the bristles yield"),
-        (lambda: shaken(size=1e-4), "22 % of the friction is not explained"),
+        lambda: shaken(noise=2e-7),
+        lambda: shaken(step=5.5e-3),
+        lambda: replace(shaken(), segments=(slice(0, 500),)),
+        lambda: record("x", DT, position=np.full(12000, 0.5), force=np.arange(12000.0)),
+        lambda: shaken(size=2e-5),
+        lambda: shaken(size=1e-4),
     ],
+    ids=["noise", "slow", "short", "still", "slides", "slides far"],
 )
-def test_what_a_log_cannot_show_is_told(make: Callable[[], Log], words: str) -> None:
+def test_what_a_log_cannot_show_is_told(make: Callable[[], Log], snapshots: Snapshots, request: Any) -> None:
     """Where it slides, most of the force is inertia, which hides how little of the friction the model explains."""
     stiffness = bristles_from_presliding(make()).stiffness
     assert not stiffness.determined
-    assert words in stiffness.reason
+    snapshots.check("identify", f"bristles, {request.node.callspec.id}", stiffness.reason)
 
 
 def test_what_has_no_force_or_no_bristles_is_refused() -> None:
@@ -270,7 +272,7 @@ def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness() -> None:
     assert bristles.mass.holds(1.7)
     assert bristles.stiffness.half_width < 0.1 * bristles.stiffness.value
     blind = replace(log, signals={role: log.signals[role] for role in ("position", "force")})
-    assert "like that of the joint" in bristles_from_presliding(blind, between).stiffness.reason
+    assert not bristles_from_presliding(blind, between).stiffness.determined
 
 
 def test_the_jackknife_is_the_covariance_of_least_squares() -> None:
@@ -316,7 +318,6 @@ def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that
         assert not damping.determined
         assert damping.low == 0
         assert DAMPING + viscous <= damping.high < 1.05 * (DAMPING + viscous)
-        assert "387.7 to 412.7 N*s/m" in damping.reason
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,8 +24,7 @@ from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import record
 from friso.identification.readings.settings import ReadingSettings
 from friso.identification.sources import log_with_signals, read_all
-from friso.questions.identify.blocks import identify_document
-from friso.questions.identify.words import details, estimate_rows, headline, sentences
+from friso.questions.identify.question import IdentifyAnswer
 
 DT = 2e-3
 MASS, VISCOUS, COULOMB = 6.0, 20.0, 11.0
@@ -118,14 +116,14 @@ def test_what_needs_newtons_is_not_written_and_says_so(volts: tuple[Path, Identi
     assert identification.stage is None
     assert identification.estimates == ()
     files = read_all([path], Mapping(roles={"force": "command"}, experiment="moves"), path.parent)
-    lines = [text for _, text in headline(identification)]
-    assert any("N/V" in line and "V·s²/m" in line.replace(" ", "·") for line in lines)
-    assert any('--scale force="NUMBER N/V"' in line for line in lines)
-    rows = [" ".join(row.texts[:-1]) for row in estimate_rows(identification)]
-    lines = [*sentences(identification, []), *rows, *details(identification, files)]
-    assert not any(" N " in line or line.endswith(" N") for line in lines)
-    document: dict[str, Any] = identify_document(identification, files, [])
-    assert "mass_v_s2_per_m" in document["experiments"][0]["inverse_model"]
+    answer = IdentifyAnswer(identification, inputs=files, predictions=[], checked=None)
+    said = [
+        *answer.sentences(),
+        *answer.details(),
+        *(text for block in answer.tables() for row in block.rows for text in row[1]),
+    ]
+    assert not any(" N " in text or text.endswith(" N") for text in said)
+    assert "mass_v_s2_per_m" in answer.to_dict()["experiments"][0]["inverse_model"]
 
 
 def test_newtons_of_a_stage_and_moves_too_quick_for_one_are_refused(volts: tuple[Path, Identification]) -> None:
@@ -136,9 +134,6 @@ def test_newtons_of_a_stage_and_moves_too_quick_for_one_are_refused(volts: tuple
     log = axis()
     with refused("position"):
         identify([(record("hasty", 1e-3 * DT, position=log["position"], force=log["force"]), "moves")])
-
-
-# --- a time in another unit -------------------------------------------------------------------------------------------
 
 
 # --- what following the log costs -------------------------------------------------------------------------------------

@@ -77,8 +77,9 @@ def test_a_break_away_in_amperes_is_answered_in_amperes(break_away: Path, option
     A stage file in newtons asks for the scale.
     """
     rows = np.genfromtxt(break_away / "linear.csv", delimiter=",", skip_header=1)
-    csv(break_away / "amperes.csv", "time [s],position [m],current [A]", *(rows * [1, 1, 12.5]).T)
-    command = ("identify", "amperes.csv", "--as", "break-away", "--json", *options)
+    log = f"{unit}.csv"
+    csv(break_away / log, "time [s],position [m],current [A]", *(rows * [1, 1, 12.5]).T)
+    command = ("identify", log, "--as", "break-away", "--json", *options)
     answer = friso_inside(break_away, *command, "--out", f"answer_{unit}")
     assert answer.returncode == 0, answer.stderr
     document = json.loads(answer.stdout)

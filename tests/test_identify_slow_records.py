@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,11 +14,10 @@ from friso.identification.doubt import KeyCase, RaisedDoubt
 from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
 from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
-from friso.identification.experiments.moves import FALLING, _inverse_text
 from friso.identification.inverse_model import bandwidth_of, inverse_model
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.output_error.to_keys import _range, drawn_from
+from friso.identification.output_error.to_keys import drawn_from
 from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
@@ -73,23 +71,6 @@ def test_all_friction_at_the_highest_slow_speed_may_be_dry() -> None:
     assert {one.determined for one in (coulomb, rest, static)} == {False}
     assert coulomb.high == pytest.approx(COULOMB.high + viscous.high * 1e-3)
     assert (static.low, static.high) == pytest.approx((coulomb.low, 4 * coulomb.high))
-
-
-@pytest.mark.parametrize("bounded", [{1}, set()])
-def test_a_search_about_a_first_value_bounds_nothing(bounded: set[int]) -> None:
-    """The range of a mass is made from its start; that of static friction follows from a bounded Coulomb friction."""
-    parameters = [
-        FitParameter(MASS, "kg", 3.0, 0.6, 15.0, core=True),
-        FitParameter("friction.coulomb", "N", 8.0, 0.4, 40.0, core=True),
-        FitParameter(RATIO, "", 1.0, 1.0, 4.0, logarithmic=False, core=False),
-    ]
-    problem = SimpleNamespace(parameters=parameters)
-    inner = np.array([np.log(3.0), np.log(8.0), 1.0])
-    fit: Any = SimpleNamespace(
-        problem=problem, inner=inner, free=(0, 1), covariance=np.zeros((2, 2)), bounded=frozenset(bounded)
-    )
-    assert _range(fit, MASS) == (-np.inf, np.inf)
-    assert _range(fit, RATIO) == pytest.approx((8.0, 32.0) if bounded else (-np.inf, np.inf))
 
 
 @pytest.mark.parametrize(
@@ -214,17 +195,3 @@ def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
     assert friction_beyond({bias.name: bias}, curve, ramps(13.9)) is None
     assert friction_beyond(both, curve, ramps(11.5, more=3, backward=5)) is None
     assert friction_beyond(both, steeper, ramps(13.9)) is None
-
-
-def test_falling_friction_is_told_where_no_other_sign_is_possible() -> None:
-    """Noise puts viscous friction a little below zero."""
-    rng, phase = np.random.default_rng(5), 2 * np.pi * np.arange(6000) / 1000
-    position, acceleration = 0.02 * np.sin(phase), -0.02 * (2 * np.pi) ** 2 * np.sin(phase)
-    force = 20 * acceleration + 20 * np.tanh(50 * np.cos(phase)) + rng.standard_normal(len(phase))
-    model = inverse_model(record("moves", 1e-3, position=position, force=force))
-    viscous = next(one for one in model.estimates if one.name == "viscous")
-    for low, high, falls in ((-5.0, 4.0, False), (-5.0, -1.0, True)):
-        changed = replace(viscous, value=-0.5, low=low, high=high)
-        solution = {**model.solution, "viscous": changed.value}
-        others = tuple(changed if one is viscous else one for one in model.estimates)
-        assert (FALLING in _inverse_text(replace(model, estimates=others, solution=solution))) == falls

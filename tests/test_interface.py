@@ -96,14 +96,6 @@ def test_the_help_imports_no_stage_and_lists_every_command_once() -> None:
     assert "..." not in text.partition("Does it hunt?")[2]
 
 
-@pytest.mark.cases(first=3)
-@pytest.mark.parametrize("name", [*commands()])
-def test_what_a_command_does_is_said_in_one_line(name: str) -> None:
-    """The list of commands shows the first line of the help."""
-    first, *rest = (commands()[name].help or "").splitlines()
-    assert rest[:1] == [""], first
-
-
 @pytest.fixture(scope="module")
 def response() -> Answer:
     return friso.simulate(STICK_SLIP, sample_time="10 ms")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 from pathlib import Path
+from typing import Any
 
 import log_files
 import numpy as np
@@ -13,14 +14,20 @@ import pytest
 from inside import friso_inside
 
 import friso
-from friso.identification.contents import log_content
-from friso.identification.logs.mapping import Mapping, from_options
-from friso.interface.output_folder import OutputFolder
-from friso.questions.logs.words import next_command, sparkline
 
 TIME = 1e-3 * np.arange(1200)
 FORCE = 30 * np.sin(2 * np.pi * 3 * TIME) * np.exp(-2 * TIME)  # nothing repeats: a log of moves
 M = {"time": TIME, "force": FORCE, "position": np.cumsum(np.cumsum(FORCE / 20)) * 1e-6}
+
+
+def content(path: Path, **options: Any) -> Any:
+    """What a log holds."""
+    return friso.logs(path, **options).result[0]
+
+
+def command(path: Path, **options: Any) -> str:
+    """The command that identifies from a log, or nothing."""
+    return " ".join(friso.logs(path, **options).next_steps([])).replace(str(path), "LOG")
 
 
 @pytest.fixture
@@ -33,54 +40,48 @@ def test_channels_ranges_rates_and_roles(tmp_path: Path) -> None:
     names = ["time [s]", "position [mm]", "force [N]", "temp"]
     force = np.where(np.arange(1200) == 5, np.nan, M["force"])
     path = log_files.write_text(tmp_path / "a.csv", names, [M["time"], M["position"] * 1e3, force, np.full(1200, 21.5)])
-    content = log_content(path, Mapping())
-    by_name = {channel.name: channel for channel in content.channels}
-    assert content.kind == "moves"
-    assert not content.gaps
+    held = content(path)
+    by_name = {channel.name: channel for channel in held.channels}
+    assert held.kind == "moves"
+    assert not held.gaps
     assert by_name["time"].role == "time"
     assert by_name["position"].role == "position"
     assert by_name["position"].range == pytest.approx((1e3 * M["position"].min(), 1e3 * M["position"].max()))
     assert by_name["position"].sample_rate == pytest.approx(1000)
     assert by_name["force"].missing == 1
     assert by_name["temp"].role == ""
-    assert next_command(content) == f"friso identify {path}"
+    assert command(path) == "friso identify LOG"
 
 
 def test_the_course_of_a_channel(tmp_path: Path) -> None:
     ramp = np.arange(1200.0)
     path = log_files.write_text(tmp_path / "a.csv", ["time [s]", "position [mm]"], [M["time"], ramp])
-    course = log_content(path, Mapping()).channels[1].course()
-    assert course == pytest.approx(50 * np.arange(24) + 24.5)
-    assert sparkline(course)[0] == "▁"
-    assert sparkline(course)[-1] == "█"
-    assert sparkline(np.array([1.0, np.nan, 1.0])) == "▁ ▁"
+    assert content(path).channels[1].course() == pytest.approx(50 * np.arange(24) + 24.5)
 
 
 @pytest.mark.slow
 def test_what_is_open_and_the_command_for_it(bare: Path) -> None:
-    content = log_content(bare, Mapping())
-    assert {gap.key for gap in content.gaps} == {"position", "force", "time"}
-    command = next_command(content)
+    assert {gap.key for gap in content(bare).gaps} == {"position", "force", "time"}
+    proposed = command(bare)
     for option in ("--map position=x", "--map force=u", "--unit t=s", "--unit x=mm", "--unit u=N"):
-        assert option in command
-    options = from_options(["position=x", "force=u"], ["t=s", "x=mm", "u=N"])
-    assert log_content(bare, options).kind == "moves"
+        assert option in proposed
+    options = {"map": {"position": "x", "force": "u"}, "unit": {"t": "s", "x": "mm", "u": "N"}}
+    assert content(bare, **options).kind == "moves"
     path = log_files.write_text(bare, ["q", "x [mm]", "f"], [M["time"], M["position"], M["force"]])
-    content = log_content(path, from_options(["force=f"], ["f=N"], dt="1 ms"))
-    assert next_command(content) == f'friso identify {path} --map force=f --unit f=N --dt "0.001 s"'
+    said = command(path, map={"force": "f"}, unit={"f": "N"}, dt="1 ms")
+    assert said == 'friso identify LOG --map force=f --unit f=N --dt "0.001 s"'
 
 
 def test_a_log_that_no_option_completes_has_no_command(tmp_path: Path) -> None:
     """A force alone, of which no option makes a position. Beside a velocity nothing is open."""
     time = ["time [s]"]
     alone = log_files.write_text(tmp_path / "a.csv", [*time, "force [N]"], [M["time"], M["force"]])
-    content = log_content(alone, Mapping())
-    (gap,) = content.gaps
+    (gap,) = content(alone).gaps
     assert gap.expected.endswith("export the log with position")
-    assert next_command(content) is None
+    assert command(alone) == ""
     names = [*time, "v_ist [m/s]", "F_ist [N]"]
     speed = log_files.write_text(tmp_path / "b.csv", names, [M["time"], np.gradient(M["position"], 1e-3), M["force"]])
-    assert not log_content(speed, Mapping()).gaps
+    assert not content(speed).gaps
 
 
 def test_a_multisine_in_volts_needs_no_newtons(tmp_path: Path) -> None:
@@ -93,18 +94,15 @@ def test_a_multisine_in_volts_needs_no_newtons(tmp_path: Path) -> None:
     path = log_files.write_text(
         tmp_path / "a.csv", ["time [s]", "pos [mm]", "input [V]"], [1e-3 * np.arange(8 * count), place, volts]
     )
-    content = log_content(path, Mapping())
-    assert [gap.example for gap in content.gaps] == ["--map force=input"]
-    assert log_content(path, from_options(["force=input"])).kind == "frequency"
+    assert [gap.example for gap in content(path).gaps] == ["--map force=input"]
+    assert content(path, map={"force": "input"}).kind == "frequency"
 
 
 def test_a_frequency_response(tmp_path: Path) -> None:
     columns = [np.arange(1.0, 101.0), np.arange(1.0, 101.0) ** -2, np.full(100, -180.0)]
     path = log_files.write_text(tmp_path / "frf.csv", ["f [Hz]", "mag [m/N]", "phase [deg]"], columns)
-    content = log_content(path, Mapping())
-    assert content.kind == "frequency"
-    assert content.response is not None
-    assert content.response.frequency.size == 100
+    held = content(path)
+    assert (held.kind, held.response.frequency.size) == ("frequency", 100)
 
 
 @pytest.mark.slow
@@ -144,7 +142,7 @@ def test_one_bad_file_does_not_hide_the_others(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     if full:
-        monkeypatch.setattr(OutputFolder, "write", no_space)
+        monkeypatch.setattr("friso.interface.output_folder.OutputFolder.write", no_space)
     (tmp_path / "empty.csv").write_text("")
     done = friso_inside(tmp_path, "logs", "empty.csv", "bare.csv", "--out", "out")
     assert done.returncode == 2
@@ -158,9 +156,9 @@ def test_the_only_channel_of_times_that_rises_is_the_clock(tmp_path: Path) -> No
     path, values = tmp_path / "a.csv", [M["position"] * 1e3, M["force"]]
     for name, sign, kind in (("Sekunde", 1, "moves"), ("Uhrzeit", 1, "moves"), ("Sekunde", -1, "")):
         names = [f"{name} [ms]", "pos [mm]", "force [N]"]
-        content = log_content(log_files.write_text(path, names, [sign * 1e3 * M["time"], *values]), Mapping())
-        assert content.kind == kind
-        assert (content.channels[0].role == "time") == (sign > 0)
+        held = content(log_files.write_text(path, names, [sign * 1e3 * M["time"], *values]))
+        assert held.kind == kind
+        assert (held.channels[0].role == "time") == (sign > 0)
 
 
 @pytest.mark.slow
@@ -170,21 +168,19 @@ def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
     No sample time is invented.
     """
 
-    def command(names: list[str], *values: np.ndarray) -> str:
-        path = log_files.write_text(tmp_path / "a.csv", names, [*values], "," if names else " ")
-        return (next_command(log_content(path, Mapping())) or "").replace(str(path), "LOG")
+    def proposed(names: list[str], *values: np.ndarray) -> str:
+        return command(log_files.write_text(tmp_path / "a.csv", names, [*values], "," if names else " "))
 
     noise = 1e-6 * np.random.default_rng(1).standard_normal(M["time"].size)
     plain, time = [M["position"], M["position"] + noise, M["force"]], M["time"]
-    counted = command([], np.arange(time.size), *plain)
+    counted = proposed([], np.arange(time.size), *plain)
     assert all(text in counted for text in ('position="column 3"', 'force="column 4"', '--dt "NUMBER ms"'))
-    assert '--map time="column 1"' in command([], time, *plain)
-    assert (
-        command(["t [s]", "n_soll [rpm]", "n_ist [rpm]", "M [Nm]"], time, *plain) == "friso identify LOG --axis rotary"
-    )
+    assert '--map time="column 1"' in proposed([], time, *plain)
+    rotary = proposed(["t [s]", "n_soll [rpm]", "n_ist [rpm]", "M [Nm]"], time, *plain)
+    assert rotary == "friso identify LOG --axis rotary"
     names = ["Time", "header.stamp.secs", "header.stamp.nsecs", "position_0", "effort_0"]
     stamps = [1e9 + time, 1e9 + np.floor(time), 1e9 * (time % 1)]
-    assert "header" not in command(names, *stamps, M["position"], M["force"])
+    assert "header" not in proposed(names, *stamps, M["position"], M["force"])
 
 
 def test_the_command_asks_for_the_constant_of_a_motor(tmp_path: Path) -> None:
@@ -192,10 +188,8 @@ def test_the_command_asks_for_the_constant_of_a_motor(tmp_path: Path) -> None:
     time = np.arange(400) * 1e-3
     columns = {"Time [s]": time, "SetPos [mm]": np.sin(9 * time), "ActPos [mm]": np.sin(9 * time), "Current [A]": time}
     pd.DataFrame(columns).to_csv(file, index=False)
-    (command,) = friso.logs(file).next_steps([])
-    assert "--scale force=" in command
-    (command,) = friso.logs(file, scale={"force": "35 N/A"}).next_steps([])
-    assert command.count("--scale") == 1
+    assert "--scale force=" in command(file)
+    assert command(file, scale={"force": "35 N/A"}).count("--scale") == 1
 
 
 def test_of_a_large_text_a_sample_is_read_and_its_rows_are_estimated(tmp_path: Path) -> None:
@@ -204,15 +198,13 @@ def test_of_a_large_text_a_sample_is_read_and_its_rows_are_estimated(tmp_path: P
     path = tmp_path / "large.csv"
     frame = pd.DataFrame({"time [s]": time, "position [mm]": np.cumsum(np.cumsum(force)) * 1e-6, "force [N]": force})
     frame.to_csv(path, index=False)
-    content = log_content(path, Mapping())
-    position = content.channels[1]
-    assert content.sampled
+    held = content(path)
+    position = held.channels[1]
+    assert held.sampled
     assert position.values.size < time.size / 2
     assert position.count == pytest.approx(time.size, rel=0.05)
     assert position.duration == pytest.approx(120, rel=0.05)
-    assert content.kind == "moves"
-    whole = log_content(
-        log_files.write_text(tmp_path / "small.csv", [*frame], [frame[n][:5000] for n in frame]), Mapping()
-    )
+    assert held.kind == "moves"
+    whole = content(log_files.write_text(tmp_path / "small.csv", [*frame], [frame[n][:5000] for n in frame]))
     assert not whole.sampled
     assert whole.channels[1].count == 5000

@@ -18,7 +18,7 @@ import psutil
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from patience import LIMIT
+from patience import LIMIT, grows_with_the_square
 from refusals import refused
 from scipy.io import savemat
 from systems import posix
@@ -702,20 +702,6 @@ def test_a_column_of_forty_thousand_digits_is_left_out(tmp_path: Path, column: i
     others = {name: k for k, name in enumerate(("time", "position", "force")) if k != column}
     assert read.keys() == others.keys()
     assert all(np.array_equal(read[name], [float(row[k]) for row in rows]) for name, k in others.items())
-
-
-LONG = 30_000
-
-
-def grows_with_the_square(read: Callable[[int], object]) -> bool:
-    """Tell whether reading takes much more than four times as long, on the processor, where a text is so."""
-
-    def seconds(length: int) -> float:
-        begin = time.process_time()
-        read(length)
-        return time.process_time() - begin
-
-    return min(seconds(4 * LONG) for _ in range(2)) > 10 * max(0.01, *(seconds(LONG) for _ in range(3)))
 
 
 @pytest.mark.parametrize("filler", [" ", "\t", '"', ",", ";", "#", "/", "[", "(", "a(", "1", "*", "-", "µ"])

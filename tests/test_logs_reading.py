@@ -376,11 +376,7 @@ def test_jitter_is_interpolated_and_told(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @settings(max_examples=200, deadline=None)
-@given(
-    st.floats(3, 40) | st.floats(1.4, 3),
-    st.floats(0, 1),
-    st.lists(st.integers(50, 1950), max_size=8),
-)
+@given(st.floats(3, 40) | st.floats(1.4, 3), st.floats(0, 1), st.lists(st.integers(50, 1950), max_size=8))
 def test_stamps_with_few_digits_are_those_of_a_uniform_clock(period: float, begin: float, lost: list[int]) -> None:
     few = lost if period >= 3 else []  # a step of coarser stamps may hide a lost sample
     clock = np.delete(period * np.arange(2000) + begin, few)

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -19,10 +18,7 @@ from refusals import rows_of
 from systems import posix
 
 import friso as friso_api
-from friso.errors import StoreError
-from friso.questions.map.study import refuse_overwriting, stored_study
 from friso.shown.pages import Report
-from friso.studies.metric import with_usual
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 SMALL = ("--x", "controller.crossover=4 Hz..12 Hz:5", "--y", "joint.stroke=0 m..1 mm:4")
@@ -126,35 +122,6 @@ def _interruptible() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.mark.cases(first=4)
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("--x", "controller.crosover=1 Hz..2 Hz:3"),
-        ("--x", "controller.crossover=2 Hz..1 Hz:3"),
-        ("--x", "joint.stroke=0 m..1 mm:3:log"),
-        ("--x", "joint.stroke=0 m..1 mm:3", "--y", "joint.stroke=0 m..1 mm:3"),
-        ("--x", "controller.crossover=1 Hz..2 Hz:100000", "--y", "joint.stroke=0 m..1 mm:10000"),
-        ("--x", "controller.crossover=1 Hz..2 Hz:1000000000"),
-        (*SMALL, "--out", RIG),
-        (*SMALL, "--out", RIG / "below.zarr"),
-        (*SMALL, "--rtol", "loose"),
-        (*SMALL, "--samples", "8"),
-        (*SMALL, "--workers", "0"),
-        ("--x", "controller.crossover=4 Hz..8 Hz", "--samples", "9"),
-        (*SMALL, "--workers", "1", "--scheduler", "tcp://127.0.0.1:9"),
-    ],
-)
-def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple) -> None:
-    before = RIG.read_bytes()
-    done = friso_inside(tmp_path, "map", RIG, *arguments)
-    assert done.returncode == 2
-    assert rows_of(done.stderr)
-    assert done.stdout == ""
-    assert list(tmp_path.iterdir()) == []
-    assert RIG.read_bytes() == before
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("numbers", [("5", "0"), ("0",), ("a", "b"), ("-1", "0")])
 def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str, ...]) -> None:
@@ -217,9 +184,6 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(
     assert (done.returncode, "--out figures" in done.stderr) == (2, True)
     assert friso_inside(tmp_path, "map", "b.zarr", "--out", "figures").returncode == 0
     assert (tmp_path / "b.html").read_text() == "mine, under a name that was friso's"
-    study, _ = stored_study(tmp_path / "b.zarr", None, None)
-    with pytest.raises(StoreError, match="another study"):  # before the figure, which is not all that would be lost
-        refuse_overwriting(replace(study, rtol=1e-7), tmp_path / "b.zarr", overwrite=False)
 
 
 @pytest.mark.slow
@@ -272,16 +236,6 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
 
 
 @pytest.mark.slow
-def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:
-    shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
-    other = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--out", "a.zarr")
-    assert friso_inside(tmp_path, *other).returncode == 2
-    assert friso_inside(tmp_path, *other, "--overwrite").returncode == 0
-    with xr.open_zarr(tmp_path / "a.zarr") as stored:
-        assert stored.outcome.shape == (2,)
-
-
-@pytest.mark.slow
 def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     made = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--metric", "peaks", "--out", "a.zarr")
     assert friso_inside(tmp_path, *made).returncode == 0
@@ -303,14 +257,6 @@ def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(mapped: tuple[Pa
         assert done.returncode == 2
         assert "amplitude" in rows_of(done.stderr)["given"]
         assert "('" not in done.stderr
-    more = tmp_path / "b.zarr"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("friso.questions.map.study.with_usual", lambda metric: (*with_usual(metric), "verdict"))
-        small = ("--x", "controller.crossover=4 Hz, 5 Hz", "--out", more)
-        assert friso_inside(tmp_path, "map", RIG, *small).returncode == 0
-    done = friso_inside(tmp_path, "map", RIG, *small, "--metric", "peaks", "--overwrite")
-    assert done.returncode == 0, done.stderr
-    assert "verdict" in xr.open_zarr(more)
 
 
 def test_a_map_says_that_it_leaves_out_a_drive_that_makes_the_loop_unstable() -> None:

@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import to_hex
 from pages import Page, packed_values
 from snapshots import Snapshots
 
 import friso
-from friso.axis import ROTARY, speaking_of
 from friso.questions.map.cells import axes_of
 from friso.questions.map.figures import MOST_SLICES, map_figure, map_panel, marked_figure
 from friso.questions.map.findings import headline, statement
 from friso.questions.map.question import SweepAnswer
-from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of, no_number, quantity
+from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.colours import painted, ramp, scale
-from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, drawable, legend_entries, pick
-from friso.shown.drawing.figure import Category, Cloud, Figure, Map, Markers
+from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, drawable, pick
+from friso.shown.drawing.figure import Category, Cloud, Figure, Map
 from friso.studies.study import Request
 
 CROSSOVER, STROKE, LOCKED = "controller.crossover", "joint.stroke", "joint.locked"
@@ -98,25 +92,6 @@ def categories_shown(field: Map | Cloud) -> list[list[Category | None]]:
 # ---------------------------------------------------------------- words
 
 
-def test_axes_are_written_in_the_words_of_an_engineer():
-    runs = made_up({DAMPING: np.geomspace(0.1, 1e3, 5), STROKE: np.linspace(0, 1e-3, 3)}, log=(DAMPING,))
-    panel = drawable(map_figure(runs, "peaks")).panels[0]
-    assert (panel.x.label, panel.y.label) == ("Limiter damping [N·s/m]", "Joint stroke [mm]")
-    assert (panel.x.log, panel.y.log) == (True, False)
-    assert [quantity(key) for key in ("mass", "controller.kp")] == ["Mass", "Kp"]
-
-
-def test_the_number_of_runs_stands_on_the_figure():
-    figure = map_figure(plain(), "peaks")
-    first, runs = figure.note.splitlines()
-    assert (numbers(first), numbers(runs)) == ([75], [20, 1e-4, 15, 5])
-    on_paper = " ".join(text.get_text() for text in matplotlib_renderer.render(figure).texts)
-    assert runs in on_paper
-    assert runs in plotly_renderer.render(figure).layout.annotations[0].text.replace("<br>", " ")
-    not_made = statement(troubled(), "outcome").splitlines()[1]
-    assert numbers(not_made) == [18, 1e-4, 13, 4, 1, 1, 1]
-
-
 # ---------------------------------------------------------------- cells
 
 
@@ -132,39 +107,7 @@ def test_cells_without_number_are_told_apart_and_never_zero():
     everything = [QUIET, *ramp(11), *(category.colour for category in categories if category.label != "rests")]
     assert len(set(everything)) == len(everything)
     never = only_map(map_figure(troubled(), "settling_time_10um"))
-    category = categories_shown(never)[1][1]
-    assert category is not None
-    assert "10 µm" in category.label
-    assert category.colour == never.categories[-1].colour
-    assert categories_shown(only_map(map_figure(plain(), "period")))[0][0].label == "no period"
-    assert no_number("settling_time").label == "does not stay within 1 µm"
-    with speaking_of(ROTARY):
-        assert no_number("settling_time").label == "does not stay within 1 µrad"
-
-
-def test_outcomes_have_their_own_colours_in_the_order_of_severity():
-    runs = troubled()
-    runs["outcome"][3, 0] = "strange"
-    field = only_map(map_figure(runs, "outcome"))
-    names = [category.label for category in field.categories]
-    assert names == ["swings", "rests", "failed", "invalid", "not run", "strange"]
-    shown = [[category.label for category in row] for row in categories_shown(field)]
-    expected = np.where(runs.outcome.values == "", "not run", runs.outcome.values).T
-    assert shown == expected.tolist()
-    categories = legend_entries(map_figure(runs, "outcome"))
-    assert [category.label for category in categories] == names
-    assert not field.has_numbers
-
-
-def test_peaks_have_one_colour_per_count():
-    runs = plain()
-    runs["peaks"][0, 0] = 30
-    drawn = scale(only_map(map_figure(runs, "peaks")))
-    assert (drawn.low, drawn.high, len(drawn.colours)) == (-0.5, 30.5, 31)
-    assert drawn.colours[0] == QUIET
-    assert len(set(drawn.colours)) == 31
-    mesh = matplotlib_renderer.render(map_figure(plain(), "peaks")).axes[0].collections[0]
-    assert [to_hex(mesh.to_rgba(float(count))) for count in range(4)] == [QUIET, *ramp(3)[::-1]]
+    assert categories_shown(never)[1][1] == never.categories[-1]
 
 
 def test_amplitudes_over_many_decades_are_logarithmic_and_end_above_the_noise():
@@ -190,33 +133,8 @@ def test_cells_without_a_measure_of_what_attracts_say_why(snapshots: Snapshots):
     snapshots.check("map", "what attracts", "\n".join([*sorted(labels), statement(runs, "multiplier")]))
 
 
-def test_variables_may_be_missing():
-    runs = plain()[["peak_to_peak"]]
-    runs["peak_to_peak"][1, 1] = np.nan
-    assert categories_shown(only_map(map_figure(runs, "peak_to_peak")))[1][1].label == "no value"
-    assert 20 in numbers(statement(runs, "peaks"))
-    by_status = troubled().drop_vars("outcome")
-    assert categories_shown(only_map(map_figure(by_status, "peaks")))[1][0] is FAILED
-
-
 def words_map(**options: Any) -> Any:
     return map_panel(made_up({LOCKED: [True, False], STROKE: [0.0, 1e-3]}), **options)
-
-
-@pytest.mark.parametrize(
-    ("asked", "message"),
-    [
-        (lambda: map_figure(plain()[["peak_to_peak"]], "peaks"), "metric: got 'peaks', expected one of peak_to_peak"),
-        (lambda: map_figure(plain(), marker={STROKE: 1e-3}), "joint.stroke, expected a value of controller.crossover"),
-        (lambda: words_map(marker={LOCKED: "maybe", STROKE: 0.0}), "got 'maybe', expected one of locked, free"),
-        (lambda: map_panel(plain().expand_dims({LOCKED: [True]})), "got runs over joint.locked, .*, expected two axes"),
-        (lambda: replace(only_map(map_figure(plain(), "peaks")), codes=np.zeros(2)), r"\(2,\), expected .*\(5, 4\)"),
-        (lambda: Cloud(np.zeros(2), np.zeros(2), np.zeros(3), "Peaks", ""), "expected one length"),
-    ],
-)
-def test_what_cannot_be_shown_is_refused(asked: Any, message: str):
-    with pytest.raises(ValueError, match=message):
-        asked()
 
 
 # ---------------------------------------------------------------- axes
@@ -233,7 +151,6 @@ def test_logarithmic_cells_are_centred_by_ratio():
     corners = np.asarray(axes.collections[0].get_coordinates())
     assert corners[0, :, 0] == pytest.approx(cell_edges(values, log=True))
     assert corners[:, 0, 1] == pytest.approx([-0.5, 0.5, 1.5])
-    assert axes.get_xlim() == pytest.approx((corners[0, 0, 0], corners[0, -1, 0]))
     assert plotly_renderer.render(figure).layout.xaxis.type == "log"
 
 
@@ -247,16 +164,12 @@ def test_unsorted_axes_are_drawn_in_order_and_words_as_cells():
     assert panel.x.words == ("locked", "free")
     assert panel.y.words == ("0 N·s/m", "1 N·s/m", "10 N·s/m")  # the logarithm has no zero
     assert not panel.y.log
-    paper = matplotlib_renderer.render(figure).axes[0]
-    assert [text.get_text() for text in paper.get_xticklabels()] == ["locked", "free"]
-    assert plotly_renderer.render(figure).layout.yaxis.ticktext == panel.y.words
 
 
 def test_the_evaluation_point_is_marked():
     figure = map_figure(plain(), marker={CROSSOVER: 8.0, STROKE: 3e-4, "masses.cart": 1.2})
     point = drawable(figure).panels[0].markers[0]
     assert (point.x.tolist(), point.y.tolist()) == ([8.0], [pytest.approx(0.3)])
-    assert [item.label for item in legend_entries(figure) if isinstance(item, Markers)] == ["evaluation point"]
     outside = map_figure(plain(), marker={CROSSOVER: 40.0, STROKE: 3e-4}).panels[0]
     assert outside.x.limits == pytest.approx((-1.5, 40.0))
     assert words_map(marker={LOCKED: False, STROKE: 0.0}).markers[0].x.tolist() == [1.0]
@@ -271,16 +184,6 @@ def bars(figure: Figure) -> list[str]:
     return on_page
 
 
-def test_two_maps_side_by_side_keep_their_own_scales():
-    cut = made_up({CROSSOVER: [1.0, 6.0], STROKE: [0.0, 1e-3], LOCKED: [True, False]}).isel({LOCKED: 1})
-    first, second = map_panel(cut, "peaks"), map_panel(cut, title="A")
-    assert (first.title, second.title) == ("Counted peaks, Joint free", "A")
-    assert np.array_equal(first.maps[0].z, cut.peaks.values.T)
-    other = plain()
-    other["peaks"][0, 0] = 9
-    assert len(bars(Figure("both", "Both", "", (first, map_panel(other, "peaks")), columns=2))) == 2
-
-
 # ---------------------------------------------------------------- more and fewer axes
 
 
@@ -289,10 +192,6 @@ def test_further_axes_become_slices_on_one_scale():
     runs = made_up({**axes, "mass": np.arange(1.0, 8)})
     figure = map_figure(runs, "peaks", marker={CROSSOVER: 6.0, STROKE: 0.0, LOCKED: False})
     assert len(figure.panels) == 8 <= MOST_SLICES
-    titles = [panel.title for panel in figure.panels]
-    assert titles[:2] == ["Joint locked, Mass 1", "Joint locked, Mass 3"]
-    assert figure.caption == "Not shown: Mass 2, 4, 6."
-    assert figure.caption in figure.note
     assert [bool(panel.markers) for panel in figure.panels] == [False] * 4 + [True] * 4
     second = runs.isel({LOCKED: 0, "mass": 2})
     assert np.array_equal(figure.panels[1].maps[0].z, second.peaks.transpose(STROKE, CROSSOVER).values)
@@ -343,7 +242,6 @@ def test_samples_are_points_over_the_first_two_keys():
     cloud = panel.clouds[0]
     assert cloud.x.tolist() == sampled().mass.values.tolist()
     assert categories_shown(cloud)[0][3] == INVALID
-    assert figure.caption == "Sampled as well: X."
     assert len(panel.markers) == 1
     assert [axis.key for axis in axes_of(sampled())] == ["mass", STROKE, "x"]
 
@@ -381,19 +279,12 @@ def test_both_renderers_draw_the_same(figure):
         assert len(matplotlib_renderer.image(figure, form)) > 1000
 
 
-@pytest.mark.slow
-def test_a_large_map_is_a_picture_inside_a_vector_file():
-    runs = made_up({CROSSOVER: np.linspace(1, 16, 150), STROKE: np.linspace(0, 1e-3, 150)})
-    assert b"data:image/png" in matplotlib_renderer.image(map_figure(runs, "peaks"), "svg")
-    assert b"data:image/png" not in matplotlib_renderer.image(map_figure(plain(), "peaks"), "svg")
-
-
 # ---------------------------------------------------------------- page
 
 
 def page_of(runs: xr.Dataset, metric: str = "peaks", store: str = "map.zarr") -> str:
     """The page of made-up runs in a store."""
-    study = Request(RIG, {STROKE: ([0.0, 1e-3], "m")}).study([])
+    study = Request(RIG, {STROKE: ["0 mm", "1 mm"]}).study()
     parts = {"stage": RIG, "study": study, "metric": metric, "store": Path(store), "exports": (), "edges": None}
     return SweepAnswer(runs, **parts).page().html()
 
@@ -446,10 +337,7 @@ def test_the_page_opens_offline_and_says_what_it_shows():
     assert all(address.startswith("data:image/png;base64,") for address in parsed.loads)
     assert "default-src 'none'" in page
     assert not re.findall(r"https?://[^\"'<> ]*", page.replace(plotly_renderer.script(), ""))
-    lines = ["1 to 16 Hz, 4 values", "0 to 1 mm, 5 values", "step budget used up"]
-    lines += ["13 swing, 4 rest, 1 failed, 1 invalid, 1 not run", "relative tolerance 0.0001", 'name = "Thesis rig"']
-    assert all(text in parsed.text for text in lines)
-    assert "shows at most" not in parsed.text
+    assert "step budget used up" in parsed.text
 
 
 @pytest.mark.slow
@@ -487,33 +375,6 @@ def test_names_states_and_words_cannot_inject_markup():
     figure = map_figure(runs(EVIL), "peaks")
     assert "<img src=x" not in json.dumps(packed_values(plotly_renderer.fragment(figure)))
     assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
-
-
-SCRIPT = """
-import hashlib, sys
-sys.path.insert(0, {tests!r})
-import test_map_views as t
-for figure in t.EVERY.values():
-    print(hashlib.sha256(t.matplotlib_renderer.image(figure, "svg")).hexdigest())
-print(hashlib.sha256(t.page_of(t.troubled()).encode()).hexdigest())
-"""
-
-
-@pytest.mark.thorough
-def test_files_are_the_same_bytes_in_every_process(request, tmp_path, printed):
-    environment = {"PYTHONHASHSEED": "7", "HOME": str(tmp_path), "PYTHONPATH": str(request.config.rootpath)}
-    environment |= {"MPLCONFIGDIR": matplotlib.get_cachedir()}  # the list of fonts takes seconds to make
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT.format(tests=str(request.path.parent))],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=300,
-    )
-    here = [matplotlib_renderer.image(figure, "svg") for figure in EVERY.values()]
-    here.append(page_of(troubled()).encode())
-    assert done.stdout.split() == [hashlib.sha256(content).hexdigest() for content in here]
 
 
 # ---------------------------------------------------------------- what a map says first
@@ -568,18 +429,27 @@ def test_words_samples_and_verdicts_have_their_sentence(snapshots: Snapshots) ->
     runs = made_up({LOCKED: [True, False], CROSSOVER: np.linspace(1, 16, 4)})
     runs["outcome"] = (runs.outcome.dims, [["swings"] * 4, ["rests"] * 4])
     text = [headline(runs, "outcome")]
-    assert numbers(text[0]) == [50]
     runs["verdict"] = (runs.outcome.dims, [["settles"] * 4, ["settles", "bistable", "hunts", "settles"]])
     text += [headline(runs, "verdict"), *statement(runs, "verdict").splitlines()[-2:]]
-    assert numbers(text[1]) == [12, 11, 12, 6]
-    assert numbers(text[2])[-3:] == [1, 1, 6]
-    assert numbers(text[3]) == [1]
     drawn = sampled()
     drawn["outcome"] = (drawn.outcome.dims, np.where(drawn["mass"] < drawn["mass"].median(), "swings", "creeps"))
-    text.append(headline(drawn, "outcome"))
-    assert numbers(text[-1])[0] == 50
     nothing = troubled()
     nothing["outcome"][:] = "invalid"
-    text.append(headline(nothing, "outcome"))
-    assert numbers(text[-1]) == []
+    text += [headline(drawn, "outcome"), headline(nothing, "outcome"), statement(troubled(), "outcome")]
     snapshots.check("map", "headlines", "\n".join(text))
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        lambda: map_figure(plain()[["peak_to_peak"]], "peaks"),
+        lambda: map_figure(plain(), marker={STROKE: 1e-3}),
+        lambda: words_map(marker={LOCKED: "maybe", STROKE: 0.0}),
+        lambda: map_panel(plain().expand_dims({LOCKED: [True]})),
+        lambda: replace(only_map(map_figure(plain(), "peaks")), codes=np.zeros(2)),
+        lambda: Cloud(np.zeros(2), np.zeros(2), np.zeros(3), "Peaks", ""),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(asked: Any) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        asked()

@@ -14,7 +14,6 @@ import sympy as sp
 from inside import friso_inside
 
 import friso
-from friso.drives.arithmetic import number_in
 from friso.drives.conversions import conversions
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
@@ -60,12 +59,7 @@ CONTROL = {
     "inertia": 1e-4,
     "vel_limit": 10.0,
 }
-MOTOR = {
-    "torque_constant": 0.04,
-    "current_lim": 20.0,
-    "torque_lim": float("inf"),
-    "current_control_bandwidth": 1000.0,
-}
+MOTOR = {"torque_constant": 0.04, "current_lim": 20.0, "torque_lim": float("inf"), "current_control_bandwidth": 1000.0}
 
 
 def ini(folder: Path, gains: dict[str, Any], unit: str = "mm", joint: str = "TYPE = LINEAR") -> Path:
@@ -320,29 +314,6 @@ def test_an_odrive_exerts_the_force_of_its_torque(tmp_path: Path) -> None:
     assert force * 5e-3 == pytest.approx(torque * 2 * np.pi)  # work in a turn
 
 
-@pytest.mark.parametrize(
-    ("text", "number"),
-    [
-        *(
-            ("8.27 / 170", 8.27 / 170),
-            ("-(1.5 + .5) * 2e3", -4000.0),
-            ("2*math.pi*100", 200 * np.pi),
-            ("7", 7.0),
-            ("2**13", 8192.0),
-        ),
-        *((text, np.inf) for text in ("inf", "float('inf')", 'float("inf")', "math.inf")),
-        *(
-            (text, None)
-            for text in ("8.27 / kv", "0.16 Nm", "1 / 0", "2 ** 9999", "True", "0x10", "1_0", "1,5", "", "'3'")
-        ),
-        *((text, None) for text in ("__import__('os')", "f(1)", "1 if 2 else 3", "(" * 150, "9" * 201, "1\\", "1j")),
-        *((text, None) for text in ("(-8)**0.5", "2 * (-8)**(1/3) + 1", "-(-8)**0.5", "9**9**9**9", "0**-1")),
-    ],
-)
-def test_arithmetic_of_numbers_is_worked_out_and_nothing_else(text: str, number: float | None) -> None:
-    assert number_in(text) == (None if number is None else pytest.approx(number))
-
-
 def lines(folder: Path, **changes: str) -> Path:
     """Lines for odrivetool; changes are texts of controller.config and of motor.config."""
     settings = {
@@ -359,6 +330,28 @@ def lines(folder: Path, **changes: str) -> Path:
     path = folder / "lines.txt"
     path.write_text("".join(f"odrv0.axis0.{key} = {text}\n" for key, text in settings.items() if text))
     return path
+
+
+ARITHMETIC = {
+    "8.27 / 170": 8.27 / 170,
+    "(1.5 + .5) * 2e3": 4e3,
+    "2*math.pi*100": 200 * np.pi,
+    "7": 7.0,
+    "2**13": 8192.0,
+}
+NONE = "8.27 / kv|0.16 Nm|1 / 0|2 ** 9999|True|0x10|1_0|1,5|'3'|__import__('os')|f(1)|1 if 2 else 3|1\\|1j|(-8)**0.5"
+NONE += "|2 * (-8)**(1/3) + 1|-(-8)**0.5|9**9**9**9|0**-1|" + "(" * 150 + "|" + "9" * 201
+
+
+def test_arithmetic_of_numbers_is_worked_out_and_nothing_else(tmp_path: Path) -> None:
+    for text, number in ARITHMETIC.items():
+        flat = stage_from(lines(tmp_path, controller__pos_gain=text), None, HELD).stage.flat()
+        assert flat["controller.kv"] == pytest.approx(number), text
+    for text in NONE.split("|"):
+        with pytest.raises(InputError):
+            stage_from(lines(tmp_path, controller__pos_gain=text), None, HELD)
+    for text in ("inf", "float('inf')", 'float("inf")', "math.inf"):
+        stage_from(lines(tmp_path, controller__vel_limit=text), None, HELD)
 
 
 def test_a_script_for_an_odrive_says_what_its_arithmetic_and_its_symbols_make(tmp_path: Path) -> None:

@@ -49,19 +49,6 @@ if __name__ == "__main__":
     print(run.position.values[-1])
 """
 
-SEVERAL = """
-import friso
-from friso.engine import building
-from friso.engine.kernel import KernelRequest, kernels
-from friso.equations.structure import structure
-
-if __name__ == "__main__":
-    building.usable_cores = lambda: 1
-    STAGE
-    form = structure(stage.flat())
-    print(len(kernels([KernelRequest(form, variational) for variational in (False, True)])))
-"""
-
 
 def run(folder: Path, source: str, **more: str) -> str:
     (folder / "script.py").write_text(source.replace("STAGE", STAGE))
@@ -80,12 +67,6 @@ def test_a_law_of_ones_own(place: str, tmp_path: Path) -> None:
         (tmp_path / "oil_film.py").write_text(LAW)
     text = run(tmp_path, LAW + SCRIPT if place == "script" else "import oil_film\n" + SCRIPT)
     assert float(text) == pytest.approx(-3.286906e-4, rel=1e-5)
-
-
-@pytest.mark.slow
-def test_one_process_builds_several_kernels_of_a_law_of_a_script(tmp_path: Path) -> None:
-    """The process registers the law once."""
-    assert run(tmp_path, LAW + SEVERAL).strip() == "2"
 
 
 def test_friso_s_own_laws_are_no_plug_ins() -> None:

@@ -5,10 +5,8 @@ import signal
 import subprocess
 import sys
 import textwrap
-import threading
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
@@ -17,9 +15,7 @@ from patience import LIMIT
 from systems import posix
 
 from friso.stage import Stage
-from friso.studies import execute
 from friso.studies.execute import processes
-from friso.studies.settings import StudySettings
 from friso.studies.store import Store
 from friso.studies.study import Request, cells_of
 from friso.studies.sweep import run_in_memory, run_in_store, sweep
@@ -80,28 +76,6 @@ with processes(1) as crew:
 """
 
 
-def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The other workers end as well."""
-    waited: list[object] = []
-    real = execute.wait
-
-    def wait(*arguments: Any, **named: Any) -> Any:
-        waited.append(named.get("timeout"))
-        return real(*arguments, **named)
-
-    monkeypatch.setattr(execute, "wait", wait)
-    study = Request(rig, AXES).study(rtol=1e-12)
-    with processes(2) as crew:
-        workers = [*crew.executor._processes.values()]  # pyright: ignore[reportAttributeAccessIssue]
-        workers[0].kill()
-        with pytest.raises(RuntimeError, match="lost a block"):
-            list(crew.compute(crew.jobs([study])))
-    assert StudySettings.current().block_timeout not in waited
-    for worker in workers:
-        worker.join(LIMIT)
-        assert not worker.is_alive()
-
-
 @pytest.mark.slow
 @posix
 @pytest.mark.parametrize("kill", [False, True])
@@ -121,19 +95,3 @@ def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> 
     with suppress(psutil.NoSuchProcess):
         worker.wait(LIMIT)
     assert not [*tmp_path.glob("friso-kernels-*")]
-
-
-@pytest.mark.slow
-@posix
-def test_ctrl_c_ends_the_blocks_in_flight(rig: Stage) -> None:
-    """The worker, too, ends at once instead of after minutes."""
-    axes = {"controller.crossover": "2 Hz..16 Hz:200", "joint.stroke": "0.1 mm..1 mm:200"}
-    with processes(1) as crew:
-        study = Request(rig, axes).study(rtol=1e-12)
-        jobs = crew.compute([(study, tuple(slice(0, size) for size in study.shape))])
-        timer = threading.Timer(3.0, lambda: os.kill(os.getpid(), signal.SIGINT))
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
-            next(jobs)
-        jobs.close()
-        assert crew.executor.submit(os.getpid).result(LIMIT)

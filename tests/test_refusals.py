@@ -113,7 +113,7 @@ def ask(row: Row, folder: Path) -> None:
         if isinstance(value, list):
             return [given(item) for item in value]
         if isinstance(value, str) and value.startswith("@"):
-            return path if value == "@file" else stage_of(value[1:])
+            return path if value == "@file" else path_of(value[1:]) if "/" in value else stage_of(value[1:])
         return value
 
     getattr(friso, row["ask"])(**given(row["with"]))

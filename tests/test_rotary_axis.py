@@ -2,7 +2,6 @@
 
 import json
 import re
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +12,6 @@ from inside import friso_inside
 
 import friso
 from friso.axis import LINEAR, ROTARY, AxisKind
-from friso.design_method.prepare import outline
-from friso.errors import InputError, StageError
 from friso.intervals import UncertainValue
 from friso.stage import Stage, numeric_keys
 from friso.stage.plausible import implausible_values
@@ -85,15 +82,6 @@ def test_the_numbers_are_those_of_a_linear_axis_in_other_units(pair: tuple[Stage
     changed = turntable.replace(changes)
     assert [changed.flat()[key] for key in changes] == pytest.approx([3.0, np.radians(0.1), 1e5, 1.2])
     assert isinstance(changed.friction.static, UncertainValue)  # type: ignore[union-attr]
-
-
-def test_leaf_springs_guide_along_a_line(pair: tuple[Stage, Stage]) -> None:
-    """The design refuses an axis that turns with a specification and without; no specification is written."""
-    with pytest.raises(StageError, match="leaf springs on an axis"):
-        rotary(friso.load(EXAMPLES / "thesis_leaves.toml"))
-    for asks in (friso.design, outline, partial(friso.design, spec=EXAMPLES / "specs" / "thesis.toml")):
-        with pytest.raises(InputError, match="leaf springs guide along a line"):
-            asks(pair[1])
 
 
 @pytest.mark.parametrize(

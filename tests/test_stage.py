@@ -14,7 +14,6 @@ from systems import posix
 
 from friso.errors import InputError
 from friso.interface.inputs import stage_of
-from friso.platform import paths
 from friso.quantities import Quantity, Value, any_sign, positive
 from friso.stage import Stage, load, loads, numeric_keys, parse_set, save, violations
 
@@ -222,7 +221,7 @@ def test_save_refuses_what_may_not_be_written(tmp_path: Path, rig: Stage, monkey
         save(rig, file, overwrite=True)
     with refused():
         save(rig, tmp_path / "missing" / "rig.toml")
-    monkeypatch.setattr(paths, "name_refused", lambda path: f"{path.name} is a device")
+    monkeypatch.setattr("friso.platform.paths.name_refused", lambda path: f"{path.name} is a device")
     with pytest.raises(InputError, match=r"con\.toml is a device"):
         save(rig, tmp_path / "con.toml")
     assert ([*tmp_path.iterdir()], file.read_text()) == ([file], "mine")

@@ -125,8 +125,7 @@ scalars = st.one_of(
 @pytest.mark.slow
 @settings(max_examples=300)
 @given(
-    st.sampled_from(TEXTS),
-    st.lists(st.tuples(st.floats(0, 1), st.integers(0, 12), snippets), min_size=1, max_size=3),
+    st.sampled_from(TEXTS), st.lists(st.tuples(st.floats(0, 1), st.integers(0, 12), snippets), min_size=1, max_size=3)
 )
 def test_text_mutations(text: str, edits: list[tuple[float, int, str]]) -> None:
     for place, length, new in edits:

@@ -12,7 +12,6 @@ from refusals import refused
 
 import friso
 from friso.stage import Stage
-from friso.studies.axes import Samples
 from friso.studies.metric import usual_metrics, with_usual
 from friso.studies.study import Request, study_of
 from friso.studies.sweep import sweep
@@ -87,20 +86,20 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
 @pytest.mark.usefixtures("own_bandwidth")
 def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     ranges = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "10 um..1 mm:log"}
-    runs = sweep(rig, {"joint.locked": [True, False]}, Samples(ranges, 16))
+    runs = sweep(rig, {"joint.locked": [True, False]}, friso.Samples(ranges, 16))
     assert runs.outcome.dims == ("joint.locked", "sample")
     assert runs["joint.stroke"].dims == ("sample",)
     assert (runs["joint.stroke"] < 1e-4).sum() == 8  # even in the logarithm
     index = (1, 5)
     case = friso.check(study_of(runs).cell_stage(index), rtol=study_of(runs).rtol)["given"]
     assert case.largest_force == runs.largest_force.values[index]
-    again = Request(rig, {}, Samples(ranges, 16)).study()
+    again = Request(rig, {}, friso.Samples(ranges, 16)).study()
     assert np.array_equal(again.axes[0].values, runs["controller.crossover"].values)
-    other = Request(rig, {}, Samples(ranges, 16, seed=1)).study()
+    other = Request(rig, {}, friso.Samples(ranges, 16, seed=1)).study()
     assert not np.array_equal(other.axes[0].values, again.axes[0].values)
-    latin = Request(rig, {}, Samples(ranges, 10, "latin")).study().axes[0].values
+    latin = Request(rig, {}, friso.Samples(ranges, 10, "latin")).study().axes[0].values
     assert sorted(np.floor((latin - 2) / 1.4)) == list(range(10))
-    own = Samples({"controller.crossover": ["4 Hz", "4 Hz"], "joint.stroke": (np.array([0.1, 1.0]), "mm")})
+    own = friso.Samples({"controller.crossover": ["4 Hz", "4 Hz"], "joint.stroke": (np.array([0.1, 1.0]), "mm")})
     assert Request(rig, {}, own).study().axes[1].values.tolist() == pytest.approx([1e-4, 1e-3])
 
 
@@ -128,10 +127,7 @@ def test_only_the_metrics_asked_for_are_kept(rig: Stage) -> None:
 
 @pytest.mark.slow
 @settings(max_examples=40)
-@given(
-    shape=st.lists(st.integers(1, 15), min_size=1, max_size=4),
-    target=st.integers(1, 300),
-)
+@given(shape=st.lists(st.integers(1, 15), min_size=1, max_size=4), target=st.integers(1, 300))
 def test_blocks_cover_every_cell_once(shape: list[int], target: int) -> None:
     stage = friso.load(EXAMPLES / "thesis_rig.toml")
     keys = ("controller.crossover", "controller.alpha", "controller.beta", "friction.static")
@@ -151,9 +147,9 @@ def test_blocks_cover_every_cell_once(shape: list[int], target: int) -> None:
 
 def test_a_dataset_holds_its_study(rig: Stage) -> None:
     axes = {"controller.crossover": "4 Hz..8 Hz:2", "joint.locked": [True, False]}
-    runs = sweep(rig, axes, samples=Samples({"joint.stroke": "0.1 mm..1 mm"}, 2), metrics=["peaks"])
+    runs = sweep(rig, axes, samples=friso.Samples({"joint.stroke": "0.1 mm..1 mm"}, 2), metrics=["peaks"])
     study = study_of(runs)
-    made_of = Samples({"joint.stroke": "0.1 mm..1 mm"}, 2)
+    made_of = friso.Samples({"joint.stroke": "0.1 mm..1 mm"}, 2)
     made = Request(rig, axes, made_of).study(metrics=["peaks"])
     assert not made.differences(study, runs.attrs["equations"])
     others = {"controller.crossover": "4 Hz..9 Hz:2", "joint.locked": [False]}
@@ -200,7 +196,7 @@ STROKE, TWO = {"joint.stroke": "0 m..1 mm"}, {"controller.alpha": [0.1, 0.2]}
 )
 def test_what_makes_no_study_is_refused(rig: Stage, asked: dict) -> None:
     with refused():
-        sweep(rig, **{**asked, **({"samples": Samples(*asked["samples"])} if "samples" in asked else {})})
+        sweep(rig, **{**asked, **({"samples": friso.Samples(*asked["samples"])} if "samples" in asked else {})})
 
 
 @pytest.mark.slow

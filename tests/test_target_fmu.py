@@ -19,7 +19,6 @@ from test_targets import COMPILERS, STRICT, TRAPS, machined, needs_compiler, swi
 import friso
 from friso.drives.target import TARGETS, Parcel
 from friso.drives.targets import fmu
-from friso.errors import InputError
 from friso.questions.export.parcel import packed
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, which runs FMUs, is not installed")
@@ -87,11 +86,6 @@ def test_sources_compile_without_a_warning(folder: Path, tmp_path: Path) -> None
             command = [compiler, *STRICT, TRAPS[compiler], "-c", *(path.name for path in sources.glob("*.c"))]
             done = subprocess.run(command, cwd=sources, capture_output=True, text=True)
             assert done.returncode == 0, done.stderr
-
-
-def test_archives_are_identical_from_the_same_input(folder: Path) -> None:
-    for name, content in TARGETS["fmu"].files(parcel()).items():
-        assert (folder / name).read_bytes() == (content if isinstance(content, bytes) else content.encode())
 
 
 @runs_here
@@ -186,18 +180,6 @@ def test_two_coupled_fmus_hunt_as_friso_s_machine(tmp_path: Path, version: str) 
     np.testing.assert_allclose(swing_of(np.array(measured) - reference), theirs, rtol=1e-3)
 
 
-def test_without_a_compiler_sources_are_written_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A compiler that refuses everything, as the empty shell of macOS does, is none."""
-    monkeypatch.setattr(fmu, "COMPILERS", (sys.executable,))
-    for name in ("_binary", "_compiler"):
-        monkeypatch.setattr(fmu, name, getattr(fmu, name).__wrapped__)
-    assert "Not compiled" in TARGETS["fmu"].remark()
-    model = fmu._models(parcel())[0]
-    names = zipfile.ZipFile(fmu.BytesIO(fmu._archive(parcel(), model, "3"))).namelist()
-    assert not any(name.startswith("binaries") for name in names)
-    assert {"sources/axis.c", "sources/fmi3.c", "sources/buildDescription.xml", "modelDescription.xml"} <= {*names}
-
-
 @pytest.mark.parametrize(("system", "processor", "names"), [
     ("darwin", "arm64", ["aarch64-darwin"]),
     ("darwin", "x86_64", ["darwin64", "x86_64-darwin"]),
@@ -222,12 +204,6 @@ def test_an_fmu_keeps_its_clock() -> None:
     for model in fmu._models(parcel()):
         assert "drive.sample_time" not in {one.name for one in model.variables}
     assert "drive.sample_time" in {str(one) for one in parcel().program.parameters}
-
-
-@pytest.mark.parametrize("name", ["model", "fmi2", "fmi3", "math"])
-def test_names_of_the_interface_are_refused(name: str) -> None:
-    with pytest.raises(InputError, match=f'"{name}", a word of FMI'):
-        TARGETS["fmu"].check_names(name, parcel().program)
 
 
 @pytest.mark.parametrize(("changes", "answers", "powers"), [

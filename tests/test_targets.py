@@ -28,9 +28,7 @@ from target_stages import CONTROLLERS, EXAMPLES, MACHINES, stage_of
 
 import friso
 from friso.drives.program import Program
-from friso.drives.settings import TargetSettings
 from friso.drives.target import TARGETS, CodeTarget, Parcel
-from friso.drives.targets.difference import biquads
 from friso.errors import InputError
 from friso.frequency.loops import controller_over_period, samples_controller
 from friso.frequency.parts import RATED, STAGE
@@ -167,16 +165,6 @@ def test_every_kind_of_stage_leaves_friso() -> None:
             assert off <= parcel.tolerance, name
             count += all(TARGETS[target].files(parcel) for target in TARGETS)
     assert count > 40
-
-
-def test_another_parser_reads_the_structured_text(tmp_path: Path) -> None:
-    """The parser blark, which knows TwinCAT's words, reads function block and program."""
-    parse = pytest.importorskip("blark.parse", reason="blark, a parser of structured text, is not installed")
-    parcel = parcel_of("cascade", "rigid_lugre")
-    with TargetSettings(text_samples=5).in_use():
-        folder = written(tmp_path / "st", "st", parcel)
-    for name in ("FB_axis.st", "FB_axis.TcPOU", "PRG_axis_test.st", "PRG_axis_test.TcPOU"):
-        assert [part.exception for part in parse.parse(folder / name) if part.exception] == []
 
 
 @pytest.mark.slow
@@ -339,8 +327,9 @@ def test_the_system_of_python_control(control: str) -> None:
 
 @pytest.mark.parametrize("control", ["van_dijk_notch", "adrc", "transfer_function"])
 def test_biquads_have_the_response_of_the_state_space(control: str) -> None:
-    linear = parcel_of(control, "rigid_lugre").linear
-    sections = biquads(linear)
+    parcel = parcel_of(control, "rigid_lugre")
+    linear, document = parcel.linear, json.loads(TARGETS["difference"].files(parcel)["axis.json"])
+    sections = {name: np.array(rows) for name, rows in document["biquads"].items()}
     assert {"reference_position", "position"} <= sections.keys()
     z = np.exp(1j * np.array([0.01, 0.3, 2.0]))[:, None, None] ** -np.arange(3)
     for name, rows in sections.items():
@@ -399,20 +388,20 @@ def check_of(verdict: str, **more: Any) -> Any:
     )
 
 
+WARNS = {"settles": False, "transient": False} | dict.fromkeys(
+    ("hunts", "bistable", "undecided", "none", "failed"), True
+)
+RIGID = friso.load(EXAMPLES / "ball_screw_axis.toml").replace({"friction": None})
+
+
 @pytest.mark.parametrize(
     ("check", "warns"),
     [
-        (check_of("settles"), False),
-        (check_of("transient"), False),
-        (check_of("hunts"), True),
-        (check_of("bistable"), True),
-        (check_of("undecided"), True),
-        (check_of("none"), True),
-        (check_of("failed"), True),
+        *((check_of(verdict), warns) for verdict, warns in WARNS.items()),
         (check_of("settles", certain=False, reason="too much work"), True),
         (check_of("settles", failure="the run stopped"), True),
         (check_of("settles", stage=SimpleNamespace(states_friction=False, unknown_keys=())), True),
-        (check_of("settles", stage=friso.load(EXAMPLES / "ball_screw_axis.toml").replace({"friction": None})), False),
+        (check_of("settles", stage=RIGID), False),
     ],
 )
 def test_only_a_sure_verdict_leaves_without_a_warning(check: Any, warns: bool) -> None:

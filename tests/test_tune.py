@@ -11,8 +11,8 @@ from warnings import catch_warnings
 
 import numpy as np
 import pytest
-from refusals import refused
 from scipy.optimize import brentq
+from snapshots import Snapshots
 from variants import maxwell, release, van_dijk
 from variants import stage as variant
 
@@ -20,7 +20,6 @@ import friso
 from benchmarks.tune import performance_of
 from friso import Stage, load, loads
 from friso.app import questions
-from friso.cli.asking import Shown, show
 from friso.design_method.prepare import isolated
 from friso.engine.allowance import allowance
 from friso.engine.simulate import simulate
@@ -32,28 +31,9 @@ from friso.frequency.crossover import bandwidths_at, loop_bandwidth, loop_bandwi
 from friso.frequency.family import controller_response
 from friso.hunting import check_given, find_margin
 from friso.hunting.measures import measured_run
-from friso.progress import Progress
-from friso.questions.check.isolator_words import isolator_sentence
-from friso.questions.tune.blocks import tune_document
-from friso.questions.tune.figures import drawn_stages, tune_figures
-from friso.questions.tune.gain_words import gain_lines
-from friso.questions.tune.present_words import DOUBTS, as_it_is
 from friso.questions.tune.question import TuneAnswer
-from friso.questions.tune.words import (
-    answer,
-    assumptions,
-    changes,
-    explained,
-    failing,
-    price,
-    rows,
-    slowest_time,
-    unseen,
-    why_unmet,
-)
-from friso.remedies import method
-from friso.remedies import search as search_module
-from friso.remedies import verified as verified_module
+from friso.questions.tune.words import unseen
+from friso.remedies import verified
 from friso.remedies.caps import SpeedCap, speed_cap
 from friso.remedies.catalogue import BANDWIDTH, Remedy, of_key, remedies, suggestion
 from friso.remedies.least import ChangeSize, change_size, least_factors
@@ -62,17 +42,6 @@ from friso.remedies.method import Advice, pairs, tune
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.settings import RemedySettings, settings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
-from friso.remedies.verified import (
-    NO_VARIABLES,
-    Performance,
-    RemedyOutcome,
-    confirmed,
-    missed_parts,
-    moving,
-    unsettled_parts,
-)
-from friso.shown.drawing import matplotlib_renderer
-from friso.shown.drawing.prefixes import NOTHING, with_unit
 from friso.stage.controllers import controller_of
 from friso.stage.correlations import Correlations
 
@@ -83,9 +52,9 @@ MOVE_RTOL = RemedySettings.current().move_rtol
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6, further=74)
 
 
-def unmet_goals(confirmation: Any, measured: Performance, goal: Goal) -> tuple[str, ...]:
+def unmet_goals(confirmation: Any, measured: verified.Performance, goal: Goal) -> tuple[str, ...]:
     """Return all parts of the goal that a stage misses or may miss."""
-    return (*unsettled_parts(confirmation, measured, goal), *missed_parts(measured, goal))
+    return (*verified.unsettled_parts(confirmation, measured, goal), *verified.missed_parts(measured, goal))
 
 
 def points_of(shares: Any, **columns: Any) -> TriedPoints:
@@ -100,14 +69,6 @@ def search_of(remedy: Remedy, goal: Goal, machines: Fleet, *points: TriedPoints,
     search = Search(remedy, goal, machines, machines, remedy.stage, TINY, lambda label: None, [*points])
     vars(search).update(behaviour)
     return search
-
-
-def session_of(tuning: Advice, *outcomes: RemedyOutcome, **parts: Any) -> Any:
-    """Return a search for remedies of a stage in the middle of its work."""
-    made: dict[str, Any] = {"stage": tuning.stage, "drive": tuning.stage, "goal": tuning.goal, "budget": TINY}
-    made |= dict.fromkeys(("machines", "fresh", "unseen", "further"), tuning.machines)
-    made |= {"report": lambda *label: None, **parts}
-    return method._Session(**made, outcomes=[*outcomes])
 
 
 def every(batch: np.ndarray) -> np.ndarray:
@@ -220,7 +181,7 @@ def test_ways_are_what_may_be_changed(rigid: Stage) -> None:
     assert names["controller"][:2] == ["bandwidth", "gains"]
 
 
-def test_friction_of_any_law_counts(tuning: Advice) -> None:
+def test_friction_of_any_law_counts() -> None:
     """Friction counts under a law from outside friso, and on a motor alone, where it holds no cart at a joint."""
     own = variant(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk("12 Hz"))
     assert breakaway(own.flat()) == least_breakaway(own.flat()) == pytest.approx(2.82)
@@ -235,11 +196,6 @@ def test_friction_of_any_law_counts(tuning: Advice) -> None:
     assert "integral limit" in names
     assert "isolator" not in names
     assert breakaway(free.flat()) == sliding(free.flat()) + at_motor - free.flat()["motor_friction.coulomb"] == at_motor
-    no_isolator = [
-        any("No isolator was tried" in line for line in assumptions(replace(tuning, stage=stage, goal=Goal())))
-        for stage in (free, screw)
-    ]
-    assert no_isolator == [True, False]
 
 
 def test_the_weaker_direction_breaks_away_first() -> None:
@@ -358,25 +314,6 @@ def test_a_light_mode_that_rises_above_0_db_is_where_the_loop_last_crosses_it(ri
     assert bandwidths_at(stage, [1.0]) == pytest.approx([loop_bandwidth(stage)], rel=1e-3)
 
 
-@pytest.mark.cases(first=1)
-@pytest.mark.parametrize("free", [False, True])
-def test_a_search_tries_the_bandwidth_at_its_limit(free: bool, machines: Fleet) -> None:
-    """The limit is tried even if the bandwidth is not proportional to the controller's key."""
-    rig = load(EXAMPLES / "thesis_rig.toml").replace({"parasitic": None, "joint.locked": not free})
-    stage = Stage(**{**rig.as_written(), "controller": {"kind": "adrc", "bandwidth": "3 Hz"}})
-    goal = Goal(bandwidth_limit=40.0)
-    tried: list[np.ndarray] = []
-
-    def measured(batch: np.ndarray, *how: Any) -> TriedPoints:
-        tried.append(batch)
-        return points_of(batch)
-
-    search = search_of(remedies(stage, goal)[0], goal, machines, measured=measured)
-    search.optimise()
-    bandwidths = [loop_bandwidth(search.remedy.tuned(share)) for share in tried[0]]
-    assert min(np.abs(np.array(bandwidths) / 40 - 1)) < 3e-3
-
-
 @pytest.mark.parametrize("kind", [*CONTROLLERS])
 def test_other_structures_are_stages(rigid: Stage, kind: str) -> None:
     """Each structure differs from the present one, and the thesis's rules have the gains of Eq. 7."""
@@ -458,37 +395,9 @@ def test_a_smaller_factor_may_lie_below(rigid: Stage, machines: Fleet) -> None:
     assert len(cut.points.shares) == 0
 
 
-@pytest.mark.parametrize(("share", "first"), [(1.0, 1.3), (0.99, settings.fastest_unasked)])
-def test_of_the_bandwidth_the_least_factor_is_verified_first_and_without_one_the_soonest(
-    rigid: Stage, machines: Fleet, tuning: Advice, monkeypatch: pytest.MonkeyPatch, share: float, first: float
-) -> None:
-    variable, search = factors_searched(
-        rigid, machines, lambda factors: factors > 1.3, share=lambda batch: np.full(len(batch), share)
-    )
-    session, taken = session_of(tuning), list[float]()
-    monkeypatch.setattr(session, "_begun", lambda remedy: search)
-    monkeypatch.setattr(session, "_ended", lambda _, points: taken.append(float(variable.at(next(points))[0])))
-    session.tries(search.remedy)
-    assert taken == [pytest.approx(first, rel=0.1)]
-
-
-def test_more_work_than_was_counted_is_no_more_than_all_of_it() -> None:
-    """Work beyond the count also ends within one remedy: the next one continues from where that should have ended."""
-    steps: list[tuple[int, int]] = []
-    report = method._Report(lambda done, total, label: steps.append((done, total)), 10)
-    for share in (2, 3, 50):
-        report.begins(share)
-        for _ in range(3):
-            report("one more")
-    assert [done for done, _ in steps] == [1, 2, 2, 3, 4, 5, 6, 7, 8]
-    report.begins(50)
-    report("another")
-    assert steps[-1] == (10, 10)
-
-
-def working(remedy: Remedy, tuned: Stage) -> RemedyOutcome:
+def working(remedy: Remedy, tuned: Stage) -> verified.RemedyOutcome:
     """Return the outcome of a remedy that works, without measurements."""
-    return RemedyOutcome(remedy, tuned, None, None, ())
+    return verified.RemedyOutcome(remedy, tuned, None, None, ())
 
 
 @pytest.mark.slow
@@ -507,14 +416,6 @@ def test_the_answer_does_not_hunt(tuning: Advice, works: Any) -> None:
     assert settled_margin(works.stage.flat()) >= tuning.goal.margin
 
 
-def test_what_does_not_change_is_as_before(tuning: Advice) -> None:
-    present = tuning.present
-    assert price(present, tuning, buys_joint=False).count("same") == 2
-    assert f"{present.least_margin(tuning.goal):.2f} as before" in price(present, tuning, buys_joint=False)
-    of_none = replace(tuning, present=replace(present, stiffness=0.0))
-    assert f"acts of {with_unit(present.stiffness, 'N/m')}" in price(present, of_none, buys_joint=False)
-
-
 @pytest.mark.slow
 def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
     """Before the integral acts, a controller is nowhere softer.
@@ -526,7 +427,7 @@ def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
     cascade, screw = load(EXAMPLES / "twincat_cascade.toml"), load(EXAMPLES / "ball_screw_axis.toml")
 
     def stiffness(stage: Stage) -> float:
-        return moving(stage, draw_fleet(stage, Correlations(), 1, 1), Goal(), stage).stiffness
+        return verified.moving(stage, draw_fleet(stage, Correlations(), 1, 1), Goal(), stage).stiffness
 
     for stage in (rigid, cascade):
         softest = np.abs(controller_response(stage.flat(), np.geomspace(0.1, 1e3, 500))).min()
@@ -539,30 +440,6 @@ def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
     assert 1 / stiffness(behind) == pytest.approx(1 / 220e3 + 1 / 35e6)
 
 
-@pytest.mark.parametrize(("drive", "counts"), [({"encoder_noise": "1 nm"}, False), ({"delay": "50 us"}, True)])
-def test_it_is_said_for_what_the_drive_of_the_file_counts(tuning: Advice, drive: dict, counts: bool) -> None:
-    lines = explained(replace(tuning, as_built={"drive": drive}))
-    assert any("counts for the margin alone" in line for line in lines) == counts
-
-
-def test_a_least_change_before_an_interrupt_is_that_so_far(tuning: Advice) -> None:
-    """It is the least of the changes that work: no smaller one is sought but of the bandwidth."""
-    whole = replace(tuning, interrupted=False)
-    for advice, so_far in ((tuning, " so far"), (whole, "")):
-        line = next(line for line in answer(advice) if "controller.crossover" in line)
-        assert f"the cheapest change that works{so_far} (" in line
-
-
-def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning: Advice) -> None:
-    """For every machine it is unknown whether a limit cycle attracts it, which does not mean that one does."""
-    dithered = rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}})
-    outcome = RemedyOutcome(Remedy.settled_on("dither", dithered), dithered, tuning.present, None, ("hunting",))
-    advice = replace(tuning, outcomes=(*tuning.outcomes, outcome))
-    assert failing(advice)[-1].startswith("dither: not sure to work: its dither")
-    name, (works, *_) = rows(advice)[-1]
-    assert (name, works) == ("dither", "not sure")
-
-
 def test_looking_further_ends_where_it_takes_too_much_work(
     rigid: Stage, machines: Fleet, goal: Goal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -571,7 +448,7 @@ def test_looking_further_ends_where_it_takes_too_much_work(
 
     def points() -> Iterator[np.ndarray]:
         while True:
-            moves_of_points(AS_IS(rigid), NO_VARIABLES, machines, goal)
+            moves_of_points(AS_IS(rigid), verified.NO_VARIABLES, machines, goal)
             yield np.zeros(0)
 
     with allowance() as once:
@@ -596,7 +473,7 @@ def test_machines_are_left_out_once_too_many_are_attracted(rigid: Stage, monkeyp
         every = np.ones((1, some.count), bool)
         return Attraction(every, every, every)
 
-    monkeypatch.setattr(verified_module, "attraction", attracted)
+    monkeypatch.setattr(verified, "attraction", attracted)
     fleet = draw_fleet(rigid, Correlations(), 40, 1)
     fast = rigid.replace({"controller.crossover": "20 Hz"})
     measured = performance_of(fast, fleet, Goal(), fast)
@@ -605,44 +482,15 @@ def test_machines_are_left_out_once_too_many_are_attracted(rigid: Stage, monkeyp
     assert measured.moves.settling.shape == measured.attraction.clear.shape == (1, 10)
 
 
-def test_the_answer_names_what_to_change(tuning: Advice, works: Any) -> None:
-    """With k_p = m omega^2 sqrt(alpha) of van Dijk's rules, at the crossover that works."""
-    (change,) = changes(tuning.stage, works.stage)
-    assert change.startswith("controller.crossover = ")
-    assert change in answer(tuning)[1]
-    assert tuning.size(works.outcome).keys == 1
-    (_, own), (_, best) = rows(tuning)  # gains do not work, so that they have no row
-    assert (own[-1], best[-1]) == (NOTHING, change.partition(" (was ")[0])
-    assert [line.split(":")[0] for line in failing(tuning)] == ["gains"]
-    locked = load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True})
-    assert changes(locked, locked.replace({"joint.locked": False})) == ["joint.locked = false (was true)"]
-    flat = works.stage.flat()
-    gain = flat["controller.tuned_mass"] * (2 * np.pi * flat["controller.crossover"]) ** 2 * 0.1**0.5
-    assert f"k_p = {float(f'{gain:.4g}'):.10g} N/m" in gain_lines(tuning)[0]
-
-
-def test_the_answer_as_files(tuning: Advice, undrawn: None) -> None:
-    files = TuneAnswer(replace(tuning, as_built={"drive": {"sample_time": "50 us"}})).files()
-    assert files["tuned.toml"] == files["tuned-bandwidth.toml"]
-    assert loads(str(files["tuned.toml"])).flat()["drive.sample_time"] == 5e-5
-    assert answer(tuning)[1].split(".")[0] in str(files["tune.html"])
-    document = tune_document(tuning)
-    assert document["ways"]["bandwidth"]["works"] == "works"
-    assert document["as_is"]["slowest_twentieth_s"] is None
-    low, high = document["ways"]["bandwidth"]["slowest_twentieth_interval_s"]
-    assert low <= document["ways"]["bandwidth"]["slowest_twentieth_s"]
-    assert high is None  # of few machines
-
-
 @pytest.mark.slow
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
     """Settings with which only some moves settle are none either: 11.5 Hz is too close to the edge of 9.75 Hz."""
     near = rigid.replace({"controller.crossover": "11.5 Hz"})
-    measured, confirmation = performance_of(near, tuning.machines, goal, near), confirmed(near, goal)
+    measured, confirmation = performance_of(near, tuning.machines, goal, near), verified.confirmed(near, goal)
     assert {"distance", "hunting"} <= {*unmet_goals(confirmation, measured, goal)}
     assert confirmation.verdict == "settles"
-    assert confirmed(rigid.replace({"controller.crossover": "9 Hz"}), goal).doubts == ("verdict", "distance")
-    assert confirmed(rigid, goal).doubts == ("verdict", "distance", "window")
+    assert verified.confirmed(rigid.replace({"controller.crossover": "9 Hz"}), goal).doubts == ("verdict", "distance")
+    assert verified.confirmed(rigid, goal).doubts == ("verdict", "distance", "window")
 
 
 @pytest.mark.slow
@@ -655,54 +503,17 @@ def test_the_distance_from_hunting_is_that_from_its_edge(rigid: Stage, goal: Goa
     assert edge is not None
     assert edge.crossover is not None
     ends = edge.crossover / edge.factor * np.array([edge.factor * 0.995, edge.quiet * 1.005]) * goal.distance
-    near, far = (confirmed(rigid.replace({"controller.crossover": f"{end} Hz"}), goal) for end in ends)
+    near, far = (verified.confirmed(rigid.replace({"controller.crossover": f"{end} Hz"}), goal) for end in ends)
     assert (near.doubts, far.doubts) == (("distance",), ())
-
-
-def test_what_attracts_is_surveyed_only_where_the_rest_of_the_goal_is_met(
-    rigid: Stage, machines: Fleet, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A survey of a machine that hunts takes longest, and that it misses the goal is known from its move."""
-    surveyed: list[int] = []
-    real = verified_module.attraction
-
-    def counted(remedy: Remedy, shares: np.ndarray, some: Fleet, goal: Goal, at_once: bool) -> Attraction:
-        surveyed.append(some.count)
-        return real(remedy, shares, some, goal, at_once=at_once)
-
-    monkeypatch.setattr(verified_module, "attraction", counted)
-    assert performance_of(rigid, machines, Goal(within=1e-9), rigid).share(Goal()).probability == 0
-    assert not surveyed
-    near = rigid.replace({"controller.crossover": "11.5 Hz"})
-    measured = performance_of(near, machines, Goal(), near)
-    parts = measured.meets(Goal())
-    assert sum(surveyed) == np.count_nonzero(parts["settling"])
-    assert 0 < sum(surveyed) < machines.count
-    assert np.array_equal(measured.share(Goal()).probability, np.mean(parts["settling"] & parts["hunting"]))
 
 
 def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Stage, goal: Goal) -> None:
     limit = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "integral limit")
     points = TriedPoints(np.zeros((1, 1)), *np.full((8, 1), np.inf))
-    closest = RemedyOutcome(limit, None, None, None, (), points)
+    closest = verified.RemedyOutcome(limit, None, None, None, (), points)
     assert [pair.name for pair in pairs([closest], goal)] == ["integral limit, and bandwidth"]
     assert not pairs([closest, working(Remedy.settled_on("bandwidth", rigid), rigid)], goal)
     assert pairs([closest, working(Remedy.settled_on("isolator", rigid, buys_joint=True), rigid)], goal)
-
-
-def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, capsys: pytest.CaptureFixture[str]) -> None:
-    assert tuning.interrupted
-    assert [result.certainty for result in tuning.outcomes] == ["works", "unsure"]
-    first = answer(tuning)[0]
-    before: list[str] = []
-
-    def write(progress: Progress) -> list[Path]:
-        before.append(capsys.readouterr().out)
-        return []
-
-    with pytest.raises(KeyboardInterrupt):  # status 130, whatever was found
-        show(TuneAnswer(tuning), Shown(), write)
-    assert " ".join(before[0].split()).startswith(" ".join(first.split()))
 
 
 @pytest.mark.parametrize(("work", "certainty"), [(RemedySettings().search_work, "does not work"), (1e5, "given up")])
@@ -714,27 +525,8 @@ def test_a_search_that_is_cut_says_so_and_not_that_nothing_works(
         search = search_of(remedies(rigid, goal)[0], goal, machines)
         search.optimise()
     tried = search.points if search.tried else tuning.outcomes[0].points
-    outcome = RemedyOutcome(search.remedy, None, None, None, (), tried, cut=search.cut)
+    outcome = verified.RemedyOutcome(search.remedy, None, None, None, (), tried, cut=search.cut)
     assert outcome.certainty == certainty
-    (line,) = failing(replace(tuning, goal=goal, outcomes=(outcome,)))
-    assert certainty in line
-    assert ("others may work" in line) == search.cut
-
-
-def test_settings_that_were_not_looked_at_leave_it_open(tuning: Advice, works: Any) -> None:
-    """Some gains met the goal on the machines of the search, but only one of 59 had been surveyed.
-
-    "Does not work" was said, although settings that are 13 % faster work.
-    """
-    outcome = RemedyOutcome(Remedy("gains", tuning.stage, ()), None, None, None, ())
-    some, none = (
-        failing(replace(tuning, outcomes=(replace(outcome, points=points),)))[0]
-        for points in (points_of([[0.0]] * 2), points_of([[0.0]] * 2, margin=np.zeros(2)))
-    )
-    assert some.startswith("gains: none was found")
-    assert none.startswith("gains: does not work")
-    missed = replace(works.outcome, stage=None, measured=None)
-    assert "none was found" in failing(replace(tuning, outcomes=(missed,)))[0]
 
 
 def test_a_share_that_few_machines_leave_open_is_measured_on_more(rigid: Stage) -> None:
@@ -749,52 +541,6 @@ def test_a_share_that_few_machines_leave_open_is_measured_on_more(rigid: Stage) 
     further = measured.with_further(rigid, fleet, goal, rigid)
     assert further.count == 103
     assert not further.further.any()  # it hunts
-
-
-def test_what_changes_nothing_costs_nothing(tuning: Advice, works: Any) -> None:
-    """The present stage is measured on the same machines as the remedy that works, none of which is its own."""
-    seed, moves = tuning.seed + RemedySettings.current().unseen_seed, tuning.goal.moves
-    unseen = draw_fleet(tuning.stage, Correlations(), TINY.fresh + 1, seed, moves).take(np.arange(1, TINY.fresh + 1))
-    before, after = (
-        moves_of_points(AS_IS(stage), NO_VARIABLES, unseen, tuning.goal, rtol=MOVE_RTOL)
-        for stage in (tuning.stage, works.stage)
-    )
-    assert np.array_equal(tuning.present.moves.force, before.force)
-    assert np.array_equal(works.measured.moves.settling, after.settling)
-    assert (tuning.machines.sizes < tuning.machines.moves.largest).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("doubt", "work", "verified"),
-    [("given up", 1e9, 1), ("distance", 1e9, RemedySettings().most_tries), ("distance", 1.0, 1)],
-)
-def test_no_other_point_is_verified_once_one_took_too_long(
-    rigid: Stage,
-    machines: Fleet,
-    tuning: Advice,
-    monkeypatch: pytest.MonkeyPatch,
-    doubt: str,
-    work: float,
-    verified: int,
-) -> None:
-    """Three points of a cascade's heavy loop took three times as long as a check may take before it gives up.
-
-    Machines with elements of friction took as long without a check.
-    """
-    session = session_of(tuning, tuning.outcomes[0])
-    unsure = RemedyOutcome(AS_IS(rigid), rigid, tuning.present, confirmed(rigid, tuning.goal), (doubt,))
-    measured: list[Moves] = []
-
-    def verify(search: Search, shares: np.ndarray) -> RemedyOutcome:
-        measured.append(moves_of_points(AS_IS(rigid), NO_VARIABLES, machines, tuning.goal))
-        return unsure
-
-    monkeypatch.setattr(session, "_verified", verify)
-    with RemedySettings(verifying_work=work).in_use():
-        session._ended(search_of(AS_IS(rigid), tuning.goal, machines), iter([np.zeros(0)] * 9))
-        assert len(measured) == verified
-        assert session.outcomes == [unsure]
 
 
 def test_moves_fill_their_range_evenly_and_are_what_the_stage_makes(rigid: Stage) -> None:
@@ -819,31 +565,6 @@ def test_moves_fill_their_range_evenly_and_are_what_the_stage_makes(rigid: Stage
 ACCELERATIONS = {"lowest_acceleration": "1 m/s^2", "highest_acceleration": "10 m/s^2"}
 
 
-STEP = {"kind": "step", "size": "2 mm", "duration": "4 s"}
-RELEASE = {"kind": "release", "displacement": "2 mm", "duration": "4 s"}
-REFUSED: list[tuple[str | None, Callable[[Stage], object]]] = [
-    ("moves.largest", lambda rig: rig.replace({"moves": {"smallest": "10 mm", "largest": "1 mm"}})),
-    ("moves.smallest", lambda rig: rig.replace({"moves": {"smallest": "0 mm", "largest": "2 mm"}})),
-    (
-        "moves.highest_acceleration",
-        lambda rig: rig.replace({"moves": {"smallest": "1 mm", "largest": "2 mm", "lowest_acceleration": "1 m/s^2"}}),
-    ),
-    (None, lambda rig: tune(rig, Goal(moves=MoveRange(1e-3, 1e4)), budget=TINY)),
-    (None, lambda rig: tune(rig.replace({"motion": {"kind": "hold", "duration": "1 s"}}))),
-    (None, lambda rig: tune(rig.replace({"motion": {"kind": "ramp", "velocity": "1 mm/s", "duration": "1 s"}}))),
-    *(
-        ("margin", lambda rig, margin=margin: friso.tune(rig, margin=margin))
-        for margin in ("1.2", "0", "a half", "nan")
-    ),
-]
-
-
-@pytest.mark.parametrize(("key", "asked"), REFUSED)
-def test_what_cannot_be_searched_is_refused(rigid: Stage, key: str | None, asked: Callable[[Stage], object]) -> None:
-    with refused(key):
-        asked(rigid)
-
-
 @pytest.mark.parametrize(
     ("missed", "held"),
     [
@@ -865,7 +586,7 @@ def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: A
     """
     sizes = np.geomspace(1e-5, 1e-1, 102)[1:-1]
     moves = Moves(*(np.where(np.isin(np.arange(100), missed), np.inf, 1.0)[None] for _ in range(3)))
-    measured = Performance(moves, np.ones((1, 100)), Attraction.none(100), 1.0, 1.0, np.zeros(0, bool), sizes)
+    measured = verified.Performance(moves, np.ones((1, 100)), Attraction.none(100), 1.0, 1.0, np.zeros(0, bool), sizes)
     assert measured.held_moves(Goal()) is None  # nobody knows yet which machines hunt
     between = replace(measured, moves_drawn=MoveRange(1e-5, 1e-1), is_surveyed=True).held_moves(Goal())
     ends = {0: 1e-5, 99: 1e-1}
@@ -876,91 +597,23 @@ def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: A
 DRIVE = {"sample_time": "1 ms", "delay": "3 ms", "current_bandwidth": "40 Hz .. 400 Hz"}
 
 
-@pytest.mark.thorough
-def test_what_is_uncertain_of_the_drive_is_the_same_on_all_machines_and_says_so(rigid: Stage) -> None:
-    stage = rigid.replace({"drive": DRIVE, "friction.static": "20 N +/- 2 N"})
-    pair = Correlations(("friction.static", "drive.current_bandwidth"), np.array([[1.0, 0.3], [0.3, 1.0]]))
-    advice = tune(stage, Goal(joint=False), correlations=pair, budget=TINY, chosen=[])
-    assert advice.correlations is pair
-    assert any("drive.current_bandwidth" in line for line in assumptions(advice))
-
-
-def test_sensitivities_and_gains_are_those_behind_the_drive_as_built(tuning: Advice) -> None:
+def test_sensitivities_are_those_behind_the_drive_as_built(tuning: Advice, works: Any) -> None:
     stage = tuning.stage.replace({"drive": {**DRIVE, "current_bandwidth": "200 Hz", "travel_per_turn": "10 mm"}})
     advice = replace(tuning, as_built={"drive": stage.as_written()["drive"]})
-    (figure,) = tune_figures(advice)
-    for (own, _, _), series in zip(drawn_stages(advice), figure.panels[2].series, strict=False):
+    (figure,) = TuneAnswer(advice).figures()
+    for own, series in zip((tuning.stage, works.stage), figure.panels[2].series, strict=False):
         alone = draw_fleet(own, Correlations(), 1, 1)
-        margin = modulus_margins(AS_IS(own), NO_VARIABLES, alone, stage)[0, 0]
+        margin = modulus_margins(AS_IS(own), verified.NO_VARIABLES, alone, stage)[0, 0]
         assert 1 / np.nanmax(series.y) == pytest.approx(margin, rel=2e-3)
-    (gains,) = (line for line in gain_lines(advice) if "N*m/rad" in line)
-    assert "bandwidth" in gains
-
-
-@pytest.mark.slow
-def test_what_decides_is_drawn_and_named(tuning: Advice, works: Any) -> None:
-    """Nine lines were drawn over each other."""
-    moves = works.measured.moves
-    later = replace(works.measured, moves=replace(moves, settling=moves.settling + 1))
-    way = partial(replace, works.outcome.remedy)
-    larger = tuning.stage.replace({"controller.crossover": "60 Hz", "controller.beta": 3})
-    outcomes = [
-        works.outcome,
-        replace(works.outcome, remedy=way(name="slow and large"), stage=larger, measured=later),
-        replace(works.outcome, remedy=way(name="isolator", buys_joint=True), measured=later),
-        replace(works.outcome, remedy=way(name="isolator and gains", buys_joint=True), stage=larger),
-    ]
-    advice = replace(tuning, outcomes=tuple(outcomes), goal=replace(tuning.goal, margin=0.6))
-    labels = ["as it is", works.outcome.remedy.name, "isolator", "isolator and gains"]
-    (figure,) = tune_figures(advice)
-    response, settling, loops = figure.panels
-    for panel in (response, settling, loops):
-        assert [series.label for series in panel.series][:4] == labels
-    assert loops.series[-1].y[0] == pytest.approx(1 / 0.6)
-    assert response.x.limits == (0.0, pytest.approx(3 * later.slowest(tuning.goal)))
-    assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
-
-
-def test_a_way_that_the_app_takes_over_keeps_the_machine_as_built(
-    tuning: Advice, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    advice = replace(tuning, as_built={"drive": {"sample_time": "1 ms", "delay": "3 ms"}})
-    monkeypatch.setattr(questions.KEPT, "answer", lambda *question: TuneAnswer(advice))
-    monkeypatch.setattr(questions, "_lines", lambda *question: {})
-    asked: Any = SimpleNamespace(chosen=lambda *names: {}, machine=None)
-    (part,) = questions.tune(asked, cast("Any", None))
-    for way, outcome in zip(part["ways"], advice.working, strict=True):
-        assert outcome.stage is not None
-        assert loads(way["toml"]) == advice.complete(outcome.stage)
-        assert "3 ms" in way["toml"]
 
 
 LIMITER = {"limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
-
-DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
 
 
 def test_a_force_that_is_not_finite_warns_of_nothing() -> None:
     """With a force limit below 1 N the library's overflow warning appeared on the user's screen."""
     with catch_warnings(action="error"):
         assert np.isfinite(points_of([0.0], force=[np.inf]).cost(Goal(force_limit=0.2))).all()
-
-
-def test_reasons_say_nothing_of_settings_that_were_left_out_before(tuning: Advice) -> None:
-    """One setting settles without the margin, the other has the margin and does not settle."""
-    late = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
-    points = points_of([0.0] * 2, **late, margin=[0.4, 0.6], nearness=[1.0, 0.0])
-
-    def reason(some: TriedPoints, **parts: Any) -> str:
-        outcome = RemedyOutcome(AS_IS(tuning.stage), None, None, None, (), points=some, **parts)
-        return why_unmet(outcome, replace(tuning, goal=Goal()))
-
-    assert "0.5" in reason(points)
-    assert "0.5" not in reason(points.take(np.array([1])))
-    kept = points_of([0.0] * 2)
-    assert "2 settings tried 2 meet the rest" in reason(kept, attracted=24)
-    assert "none surely meets it" in reason(kept, attracted=24)
-    assert "none surely meets it" not in reason(kept, cut=True)  # none was surveyed: nothing is said of these
 
 
 @pytest.mark.cases(first=7)
@@ -981,19 +634,6 @@ def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machine
     looks = {"clear": clear, "share": every, "_closer": lambda point: []}
     assert [*search_of(AS_IS(rigid), Goal(), machines, points_of(shares, settling=1 + shares), **looks).surveyed()]
     assert np.diff(np.sort(attracted)).min() > 0.03
-
-
-def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_machines(
-    machines: Fleet, rigid: Stage
-) -> None:
-    """The settings that settle soonest lie at the edge of the margin: 92 % of fresh machines met the goal with them,
-    98 % with a crossover lower by 4 %, and the remedy was said not to be sure."""
-    shares = np.linspace(0, 1, 201)
-    looks = {"clear": lambda batch: np.ones(len(batch), bool), "_closer": lambda point: []}
-    looks["share"] = lambda batch: 0.92 + 0.5 * batch[:, 0]
-    search = search_of(AS_IS(rigid), Goal(), machines, points_of(shares, settling=1 + shares), **looks)
-    enough = (Goal().surely(machines.count) - 0.92) / 0.5  # not reached by the first of those that are looked at
-    assert enough <= next(search.surveyed())[0] < enough + 0.1
 
 
 def test_points_next_to_one_beyond_the_edge_of_what_works_are_tried(machines: Fleet, rigid: Stage) -> None:
@@ -1030,19 +670,16 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     flat = tried.stage.flat()
     assert (tried.settles, none.settles) == (True, False)
     assert flat["joint.stiffness"] * flat["joint.stroke"] < flat["friction.static"]
-    assert with_unit(flat["joint.stiffness"], "N/m") in isolator_sentence(tried)
-    assert "it would not hunt" in isolator_sentence(tried)
-    assert "would not surely stop hunting" in isolator_sentence(none)
     assert suggestion(load(EXAMPLES / "thesis_rig.toml")) is None
 
 
-def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: Any) -> tuple[Any, Performance]:
+def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: Any) -> tuple[Any, verified.Performance]:
     """A stage that settles, and machines of which some fail a part of the goal."""
     ok = {name: np.array([k not in failing.get(name, ()) for k in range(machines)])[None] for name in PARTS}
     moves = Moves(np.where(ok["settling"], 0.1, np.inf), np.full((1, machines), 0.1), np.where(ok["force"], 1.0, 99.0))
     margin = np.where(ok["margin"], 0.6, 0.1)
     survey = Attraction(~ok["hunting"], np.ones((1, machines), bool), np.ones((1, machines), bool))
-    measured = Performance(moves, margin, survey, 0.6, 1e6, is_surveyed=True)
+    measured = verified.Performance(moves, margin, survey, 0.6, 1e6, is_surveyed=True)
     return SimpleNamespace(doubts=given_up, unstable=()), measured
 
 
@@ -1066,83 +703,11 @@ def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     assert (unknown.low, unknown.high) == (0.0, surveyed.share(Goal()).high)
 
 
-def test_a_time_that_may_be_never_has_its_lower_end() -> None:
-    """For 100 machines, the interval of the slowest twentieth is from the 90th to the 100th."""
-    words = [slowest_time(made_up(100, settling=range(late))[1], Goal()) for late in (0, 1, 6, 11)]
-    assert words == ["100 ms", "100 ms (100 ms or longer)", "100 ms or longer, possibly never", "never"]
-
-
 def test_a_stage_of_which_it_is_not_known_what_attracts_it_is_a_doubt(rigid: Stage, goal: Goal) -> None:
     assert unmet_goals(*made_up(given_up=("given up",)), FORCE_LIMITED) == ("given up",)
     with RemedySettings(confirming_work=1e6).in_use():
-        given_up = confirmed(rigid, goal)
+        given_up = verified.confirmed(rigid, goal)
     assert (given_up.doubts, given_up.verdict) == (("given up",), "failed")
-    assert {"given up", "together"} <= DOUBTS.keys()
-
-
-def test_what_works_alone_is_not_tried_together(tuning: Advice, works: Any) -> None:
-    """Gains and isolator each worked, and both together took a quarter of all work to settle no sooner."""
-    listed = {remedy.name: remedy for remedy in remedies(tuning.stage, Goal())}
-
-    def alone(*names: str) -> list[RemedyOutcome]:
-        return [replace(works.outcome, remedy=listed[name]) for name in names]
-
-    for names, left_out in (
-        (("gains", "isolator"), True),
-        (("isolator",), False),
-        (("gains", "integral limit"), False),
-    ):
-        session = session_of(tuning, *alone(*names))
-        assert session._combines(listed["isolator and gains"]) == left_out
-
-
-@pytest.mark.slow
-def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) -> None:
-    """The answer was "as it is: never (0 %)" for a stage without a limit cycle, 12 % of whose moves were too slow."""
-    assert as_it_is(tuning) in explained(tuning)
-    assert as_it_is(tuning).startswith("As it is: a limit cycle, and ")
-    quiet = check_given(tuning.stage.replace({"controller.crossover": "12 Hz"}))
-    hunting = replace(quiet.judgement.hunting, certain=False)
-    doubtful = replace(quiet, judgement=replace(quiet.judgement, hunting=hunting))
-
-    def says(*unmet: str, within: float | None = None, case: Any = quiet, drawn: Any = None, **failing: Any) -> str:
-        present, goal = made_up(50, **failing)[1], replace(FORCE_LIMITED, settle=within)
-        present = replace(present, moves_drawn=drawn or present.moves_drawn)
-        return as_it_is(replace(tuning, case=case, goal=goal, present=present, unmet=unmet))
-
-    late, missed = says("settling", within=2.0, settling=range(6)), says("settling", settling=range(6))
-    assert "no limit cycle, but 12 % of 50 moves do not settle within 2.00 s" in late
-    assert "before the return or the end of the run" in missed
-    two = says("margin", "force", margin=range(5), force=range(10, 20))
-    assert "10 % of 50 machines have less modulus margin than 0.5 and 20 % of 50 moves take more force than 10" in two
-    attracted = says("hunting", settling=range(10), hunting=range(5, 20))
-    assert "25 % of the machines that meet the rest hunt or may hunt" in attracted
-    assert "6 % of 50 machines and moves miss one part" in says("together", margin=range(3))
-    sized = says("settling", settling=range(6), drawn=MoveRange(1e-3, 5e-3, (1.0, 3.0)))
-    assert "12 % of 50 moves of 1.00 to 5.00 mm with 1.00 to 3.00 m/s² do not settle" in sized
-    assert DOUBTS["distance"] in says("distance")
-    assert "perhaps a limit cycle, but" in says("certain", case=doubtful)
-
-
-@pytest.mark.slow
-def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet_the_goal(
-    rigid: Stage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The stage's moves met the goal, but no limit cycle had been searched for yet."""
-    checks: list[Stage] = []
-
-    def interrupted(stage: Stage) -> Any:
-        if not checks:
-            checks.append(stage)
-            raise KeyboardInterrupt
-        return check_given(stage)
-
-    monkeypatch.setattr("friso.remedies.method.checked", interrupted)
-    monkeypatch.setattr("friso.remedies.method.missed_parts", lambda measured, goal: ())
-    advice = tune(rigid, Goal(), budget=TINY, chosen=["gains"])
-    assert advice.interrupted
-    assert advice.needed
-    assert not any("meets the goal as it is" in line for line in answer(advice))
 
 
 def test_costs_order_settings() -> None:
@@ -1153,35 +718,6 @@ def test_costs_order_settings() -> None:
     columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf, np.inf], "margin": [0.6, 0.6, 0.4, 0.6, 0.6]}
     points = points_of([0.0] * 5, **columns, bandwidth=[8.0] * 5, nearness=[1.0, 1.0, 1.0, 0.75, 0.25])
     assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3, 4]
-
-
-@pytest.mark.slow
-def test_points_given_up_early_are_those_that_no_search_would_have_kept(
-    rigid: Stage, goal: Goal, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The best point and the way to it are the same as with all moves of all points, which needs more runs."""
-    fleet = draw_fleet(rigid, Correlations(), TINY.machines, 1)
-    gains = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "gains")
-    counted: list[int] = []
-
-    def moves(remedy: Remedy, shares: np.ndarray, few: Fleet, *rest: Any, **named: Any) -> Moves:
-        counted.append(len(shares) * few.count)
-        return moves_of_points(remedy, shares, few, *rest, **named)
-
-    monkeypatch.setattr(search_module, "moves_of_points", moves)
-    best, runs = [], []
-    for bounded in (True, False):
-        search = search_of(gains, goal, fleet, budget=replace(TINY, generations=6))
-        whole = search.measured
-        if not bounded:
-            vars(search)["measured"] = lambda shares, most=0.0, whole=whole: whole(shares)
-        counted.clear()
-        search.optimise()
-        points = search.points
-        best.append(points.shares[points.cost(goal).argmin()])
-        runs.append(sum(counted))
-    assert np.array_equal(*best)
-    assert runs[0] < runs[1]
 
 
 def test_a_search_goes_on_while_all_points_are_as_bad(rigid: Stage, goal: Goal, machines: Fleet) -> None:
@@ -1200,23 +736,6 @@ def test_a_search_goes_on_while_all_points_are_as_bad(rigid: Stage, goal: Goal, 
         search_of(gains, goal, machines, measured=measured, budget=replace(TINY, generations=6, refined=1)).optimise()
         counts.append(len(tried))
     assert counts[0] > counts[1]
-
-
-@pytest.mark.cases(first=1)
-@pytest.mark.parametrize(("margins", "kept"), [([0.6, 0.0, 0.5], [0, 2, 0]), ([0.6, 0.3, 0.5], [0, 1, 2])])
-def test_a_rare_machine_does_not_stand_for_a_twentieth(
-    rigid: Stage, monkeypatch: pytest.MonkeyPatch, margins: list[float], kept: list[int]
-) -> None:
-    """A machine that is far less robust than all but a few is left out; others are not."""
-    drawn = draw_fleet(rigid, Correlations(), 3, 1)
-
-    def of(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float) -> np.ndarray:
-        return np.array([margins if machines.count == drawn.count else [0.5] * machines.count])
-
-    monkeypatch.setattr(method, "modulus_margins", of)
-    with RemedySettings(machine_factor=1).in_use():
-        machines = method.machines_of_search(rigid, Correlations(), Budget(machines=3), 1, Goal(), rigid)
-        assert np.array_equal(machines.sizes, drawn.sizes[kept])
 
 
 @pytest.mark.parametrize(
@@ -1261,17 +780,6 @@ def test_once_a_speed_works_others_stay_near_it_and_a_stated_limit_stands() -> N
     assert SpeedCap(10.0, "stated").above(2.0) == SpeedCap(10.0, "stated")
 
 
-@pytest.mark.parametrize(("place", "says"), [("motor", "188 µm"), ("load", "")])
-def test_what_an_encoder_at_the_motor_does_not_see_is_said(place: str, says: str) -> None:
-    """The load's friction, 3 N, winds a transmission of 16 kN/m; the motor's own friction does not."""
-    law = {"model": "lugre", "static": 3.0, "coulomb": 2.0, "stribeck_velocity": 1e-3, "stribeck_exponent": 2.0}
-    law |= {"bristle_stiffness": 1e5, "bristle_damping": 100.0, "viscous": 1.0}
-    flat = {f"{table}.{key}": value for table in ("friction", "motor_friction") for key, value in law.items()}
-    text = unseen({**flat, "transmission.stiffness": 1.6e4, "encoder.position": place})
-    assert says in text
-    assert bool(text) == bool(says)
-
-
 def test_tuned_numbers_are_in_the_units_of_the_file_and_others_stay_as_they_are_written() -> None:
     """What is typed as 1 A/mm is answered in A/mm."""
     stage = Stage(
@@ -1283,7 +791,6 @@ def test_tuned_numbers_are_in_the_units_of_the_file_and_others_stay_as_they_are_
     flat = stage.flat()
     tuned = stage.with_rounded({"controller.kp": flat["controller.kp"] * 1.23456, "controller.kd": 1375.0}, 4)
     assert tuned.as_written()["controller"] == {**stage.as_written()["controller"], "kp": "1.235 A/mm"}
-    assert changes(stage, tuned) == ["controller.kp = 1.235 A/mm (was 1 A/mm)"]
 
 
 def test_the_speed_of_the_controller_comes_first_however_many_keys_spell_it(tuning: Advice, works: Any) -> None:
@@ -1297,3 +804,107 @@ def test_the_speed_of_the_controller_comes_first_however_many_keys_spell_it(tuni
         for remedy, numbers in ((slow, small), (quick, large))
     ]
     assert replace(tuning, outcomes=(*outcomes,)).working[0].remedy.name == BANDWIDTH
+
+
+def test_the_answer_changes_the_bandwidth_alone_and_is_that_so_far(tuning: Advice, works: Any) -> None:
+    document = TuneAnswer(tuning).to_dict()
+    assert document["interrupted"]
+    assert (document["least_change"], document["ways"]["gains"]["works"]) == ("bandwidth", "unsure")
+    way = document["ways"]["bandwidth"]
+    assert (way["works"], way["keys_changed"], way["doubts"]) == ("works", 1, [])
+    (change,) = way["changes"]
+    assert change.startswith("controller.crossover = ")
+    low, high = way["slowest_twentieth_interval_s"]
+    assert low <= way["slowest_twentieth_s"]
+    assert high is None  # of few machines
+    assert document["as_is"]["slowest_twentieth_s"] is None
+    assert (TuneAnswer(tuning).failure, TuneAnswer(replace(tuning, outcomes=())).failure != "") == ("", True)
+    assert TuneAnswer(tuning).next_steps([Path("tuned.toml")]) == ["friso export tuned.toml"]
+
+
+def test_the_answer_s_stage_is_a_file_with_the_drive_as_built(tuning: Advice, works: Any, undrawn: None) -> None:
+    files = TuneAnswer(replace(tuning, as_built={"drive": {"sample_time": "50 us"}})).files()
+    assert files["tuned.toml"] == files["tuned-bandwidth.toml"]
+    flat = loads(str(files["tuned.toml"])).flat()
+    assert flat.items() > works.stage.flat().items()
+    assert flat["drive.sample_time"] == 5e-5
+
+
+def unmade(tuning: Advice, points: TriedPoints, **parts: Any) -> Advice:
+    """Return an advice of which one remedy was tried in vain."""
+    outcome = verified.RemedyOutcome(Remedy("gains", tuning.stage, ()), None, None, None, (), points, **parts)
+    return replace(tuning, outcomes=(outcome,))
+
+
+def missing(tuning: Advice, **failing: Any) -> Advice:
+    """Return an advice on a stage without a limit cycle, of whose machines some fail a part of the goal."""
+    quiet = check_given(tuning.stage.replace({"controller.crossover": "12 Hz"}))
+    return replace(
+        tuning, case=quiet, goal=FORCE_LIMITED, present=made_up(50, **failing)[1], unmet=(*failing, "together")
+    )
+
+
+LATE = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
+TOLD: dict[str, Callable[[Advice], Advice]] = {
+    "interrupted": lambda tuning: tuning,
+    "behind a drive": lambda tuning: replace(tuning, interrupted=False, as_built={"drive": {"delay": "50 us"}}),
+    "too late or of little margin": lambda tuning: unmade(
+        tuning, points_of([0.0] * 2, **LATE, margin=[0.4, 0.6], nearness=[1.0, 0.0])
+    ),
+    "attracted": lambda tuning: unmade(tuning, points_of([0.0] * 2), attracted=24),
+    "given up": lambda tuning: unmade(tuning, points_of([0.0] * 2), cut=True),
+    "without margin": lambda tuning: unmade(tuning, points_of([0.0] * 2, margin=np.zeros(2))),
+    "parts that are missed": lambda tuning: missing(tuning, settling=range(6), margin=range(5), force=range(10, 20)),
+    "machines that may hunt": lambda tuning: missing(tuning, settling=range(10), hunting=range(5, 20)),
+}
+
+
+@pytest.mark.cases(first=6)
+@pytest.mark.parametrize("case", TOLD)
+def test_words(case: str, tuning: Advice, snapshots: Snapshots) -> None:
+    """A case after the first keeps what the first does not say."""
+    said, first = (
+        TuneAnswer(advice).sentences() + TuneAnswer(advice).details() for advice in (TOLD[case](tuning), tuning)
+    )
+    snapshots.check("tune", case, "\n".join(line for line in said if case == "interrupted" or line not in first))
+
+
+@pytest.mark.slow
+def test_what_decides_is_drawn(tuning: Advice, works: Any) -> None:
+    moves = works.measured.moves
+    later = replace(works.measured, moves=replace(moves, settling=moves.settling + 1))
+    bought = replace(works.outcome, remedy=replace(works.outcome.remedy, name="isolator", buys_joint=True))
+    outcomes = (works.outcome, replace(bought, measured=later))
+    ((response, settling, loops),) = (
+        figure.panels
+        for figure in TuneAnswer(replace(tuning, outcomes=outcomes, goal=replace(tuning.goal, margin=0.6))).figures()
+    )
+    for panel in (response, settling, loops):
+        assert [series.label for series in panel.series][:3] == ["as it is", works.outcome.remedy.name, "isolator"]
+    assert loops.series[-1].y[0] == pytest.approx(1 / 0.6)
+    assert response.x.limits == (0.0, pytest.approx(3 * later.slowest(tuning.goal)))
+
+
+def test_a_way_that_the_app_takes_over_keeps_the_machine_as_built(
+    tuning: Advice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    advice = replace(tuning, as_built={"drive": {"sample_time": "1 ms", "delay": "3 ms"}})
+    monkeypatch.setattr(questions.KEPT, "answer", lambda *question: TuneAnswer(advice))
+    monkeypatch.setattr(questions, "_lines", lambda *question: {})
+    asked: Any = SimpleNamespace(chosen=lambda *names: {}, machine=None)
+    (part,) = questions.tune(asked, cast("Any", None))
+    for way, outcome in zip(part["ways"], advice.working, strict=True):
+        assert outcome.stage is not None
+        assert loads(way["toml"]) == advice.complete(outcome.stage)
+        assert "3 ms" in way["toml"]
+
+
+@pytest.mark.parametrize(("place", "says"), [("motor", "188 µm"), ("load", "")])
+def test_what_an_encoder_at_the_motor_does_not_see_is_said(place: str, says: str) -> None:
+    """The load's friction, 3 N, winds a transmission of 16 kN/m; the motor's own friction does not."""
+    law = {"model": "lugre", "static": 3.0, "coulomb": 2.0, "stribeck_velocity": 1e-3, "stribeck_exponent": 2.0}
+    law |= {"bristle_stiffness": 1e5, "bristle_damping": 100.0, "viscous": 1.0}
+    flat = {f"{table}.{key}": value for table in ("friction", "motor_friction") for key, value in law.items()}
+    text = unseen({**flat, "transmission.stiffness": 1.6e4, "encoder.position": place})
+    assert says in text
+    assert bool(text) == bool(says)

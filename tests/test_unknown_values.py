@@ -8,8 +8,6 @@ import pytest
 from inside import friso_inside
 
 import friso
-from friso.design_method.method import NoDesign
-from friso.questions.design.blocks import refused_document
 from friso.stage import Stage
 from friso.studies.laws.conversion import convert
 
@@ -121,9 +119,3 @@ def test_the_command_line_reads_the_list(guessed: Stage, tmp_path: Path) -> None
     assert "condition" not in json.loads(
         friso_inside(tmp_path, "simulate", path, "--set", f"{KEY}=2e5 N/m", "--out", "known", "--json").stdout
     )
-
-
-def test_a_refused_design_is_conditional(guessed: Stage) -> None:
-    document = refused_document(guessed, "spec.toml", NoDesign("no leaf spring is soft enough"))
-    assert document["conclusion"].startswith(f"If {KEY}")
-    assert not refused_document(guessed.replace({"unknown": ""}), "", NoDesign("why"))["conclusion"].startswith("If")

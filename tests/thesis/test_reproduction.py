@@ -2,10 +2,9 @@
 
 import json
 import re
-import sys
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import is_dataclass, replace
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
@@ -15,28 +14,25 @@ from typing import Any, BinaryIO, cast, get_type_hints
 import numpy as np
 import pytest
 import xarray as xr
+from inside import friso_inside
 from made_maps import Cells, made
-from pages import Page
 from patched import patched
-from refusals import refused
 from rig_evidence import HUNTS, grid, loops, moves, rail_runs, standstill, traces
 from rig_evidence import cycles as rail_cycles
 from snapshots import Snapshots
 
 import friso
-from friso.cli import main
 from friso.cli.command import COMMANDS
 from friso.equations.motion import size
 from friso.hunting import find_margin
-from friso.interface.output_folder import UNFINISHED, write
+from friso.interface.output_folder import UNFINISHED
 from friso.shares import share
 from friso.studies.study import _DECISIVE
 from friso_thesis.questions.reproduce.document import reproduce_document
 from friso_thesis.questions.reproduce.figures import reproduction_figures
-from friso_thesis.questions.reproduce.page import COLOURS, claims_markdown, reproduce_files, reproduce_html
+from friso_thesis.questions.reproduce.page import COLOURS, reproduce_files, reproduce_html
 from friso_thesis.questions.reproduce.questions import QUESTIONS
 from friso_thesis.questions.reproduce.summary import summary_sheet
-from friso_thesis.questions.reproduce.words import SHORT_FORM, details, in_order, met, reasons, short
 from friso_thesis.studies import kept_work
 from friso_thesis.studies.kept_work import keep_arrays, kept_arrays
 from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS
@@ -59,17 +55,6 @@ from friso_thesis.studies.thesis.claims import (
 )
 from friso_thesis.studies.thesis.cycles import Edge, Surveyed, map_cycles, survey
 from friso_thesis.studies.thesis.evidence import RESPONSES
-from friso_thesis.studies.thesis.experiments import (
-    _RUNS,
-    EXPERIMENTS,
-    GRID,
-    MOVES,
-    ON_RAILS,
-    STANDSTILL,
-    TRACES,
-    Experiments,
-)
-from friso_thesis.studies.thesis.experiments import BUILT as LOOPS_BUILT
 from friso_thesis.studies.thesis.judges import design_rules
 from friso_thesis.studies.thesis.judges.identified_in_time import force_swings
 from friso_thesis.studies.thesis.judges.rig_hunting import judged_move, judged_standstill
@@ -77,13 +62,12 @@ from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
 from friso_thesis.studies.thesis.kept import SOURCES, Kept, kept_findings, put_together, taken_apart
 from friso_thesis.studies.thesis.laws import conclusions_by_law
 from friso_thesis.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
-from friso_thesis.studies.thesis.plausible import PARTS, _in_space, plausible, work_of
+from friso_thesis.studies.thesis.plausible import PARTS, _in_space, plausible
 from friso_thesis.studies.thesis.reading import OTHERWISE, OWN, others_of, read_as, reading, words_read
 from friso_thesis.studies.thesis.reproduce import Reproduction, _changed, reproduce
-from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import FORCE_NOISE, OPEN, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES, rig_gains, thesis_rig
-from friso_thesis.studies.thesis.verdicts import not_covered, verdict
+from friso_thesis.studies.thesis.verdicts import verdict
 
 ROOT = Path(__file__).parents[2]
 
@@ -115,15 +99,18 @@ TABLE_3 = {
 def made_rig() -> Iterator[None]:
     """The experiments on the rig as built take longer than all else: their evidence is made up here."""
     made = {
-        LOOPS_BUILT: loops(),
-        MOVES: moves((HUNTS, 0, 0, 0)),
-        GRID: grid(1, 1, 0),
-        ON_RAILS: rail_cycles(),
-        TRACES: traces(),
+        experiments.BUILT: loops(),
+        experiments.MOVES: moves((HUNTS, 0, 0, 0)),
+        experiments.GRID: grid(1, 1, 0),
+        experiments.ON_RAILS: rail_cycles(),
+        experiments.TRACES: traces(),
     }
-    runs = {name: lambda stage, mechanism=item: mechanism for name, item in {**made, STANDSTILL: standstill()}.items()}
+    runs = {
+        name: lambda stage, mechanism=item: mechanism
+        for name, item in {**made, experiments.STANDSTILL: standstill()}.items()
+    }
     experiments._experiment.cache_clear()  # invented results are cached like real ones, here and after this file
-    with patched({experiments: {"_RUNS": {**_RUNS, **runs}}}):
+    with patched({experiments: {"_RUNS": {**experiments._RUNS, **runs}}}):
         yield
     experiments._experiment.cache_clear()
 
@@ -169,16 +156,13 @@ def test_the_packaged_rigs_are_the_examples() -> None:
     assert rig_with_drive(thesis_rig()).flat() == friso.load(ROOT / "examples" / "thesis_drive.toml").flat()
 
 
-def test_the_noise_of_fig_28_is_an_unstated_value() -> None:
+def test_the_noise_of_fig_28_is_an_unstated_value(snapshots: Snapshots) -> None:
     """Peaks grow with the noise: a tenth of the printed ones meet the thesis with ten times the noise of rounding."""
     small = standstill(1e-8, 1e-7)
     assert judged_standstill(small).pattern == (False, True, True)
-    assert "With 10 times that of rounding it is met" in judged_standstill(small).parts[0].why
     assert judged_standstill(small, 10.0).pattern == (True, True, True)
     between = judged_standstill(small, 10**0.5)  # between two noises, in logarithms
-    assert "peaks 0.032 and 0.32 um" in between.parts[0].number
-    assert between.table is not None
-    assert len(between.table.rows) == 3
+    snapshots.check("reproduce", "between two noises", "\n".join(part.number for part in between.parts))
     evidence = Evidence({}, {}, identified=cast(Any, SimpleNamespace(standstill=small)), force_noise=10.0)
     assert registered()["F28"].judge(evidence).judgement == "holds"
     assert baseline().values[FORCE_NOISE] == 1.0
@@ -188,7 +172,7 @@ def test_open_values_are_drawn_from_their_ranges() -> None:
     for value in OPEN:
         assert value.low < value.high
         assert value.low <= value.baseline <= value.high
-        assert value.only_in in EXPERIMENTS or any(value.touches(study) for study in STUDIES.values())
+        assert value.only_in in experiments.EXPERIMENTS or any(value.touches(study) for study in STUDIES.values())
         for scale in ("even", "log")[: 1 + (value.low > 0)]:
             ends = [replace(value, scale=scale).at(share) for share in (0.0, 1.0)]
             assert ends == pytest.approx([value.low, value.high])
@@ -219,30 +203,21 @@ def test_joint_draws_are_stages_that_change_everything_at_once() -> None:
 # --- reading maps -----------------------------------------------------------------------------------------------------
 
 
-def test_limits() -> None:
+def test_maps_are_read_by_their_ends_trends_and_free_squares() -> None:
     values = np.array([1.0, 2.0, 3.0, 4.0])
     hunts = np.array([[1, 1, 0, 0], [1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=bool)
     assert ends(values, hunts).tolist() == [2.5, 3.5, 1.0, 4.0]
     assert begins(values, hunts).tolist() == [1.0, 1.0, 4.0, 1.5]
     left = np.array([[100, 100, 100], [100, 100, 100], [0.1, 1e-12, 0.0], [0.1, 1e-12, 0.0]])
     assert ends(values, left > 1, left).tolist() == pytest.approx([2 + 2 / 3, 2.5, 2.5])  # gone at once: anywhere there
-
-
-def test_trend() -> None:
-    x = np.arange(5.0)
-    assert trend(x, x**3) == pytest.approx(1)
-    assert trend(x, -x) == pytest.approx(-1)
-    assert np.isnan(trend(x, np.ones(5)))
-    assert np.isnan(trend(x[:2], x[:2]))
-
-
-def test_free_square() -> None:
-    hunts = np.ones((10, 10), dtype=bool)
-    hunts[2:5, 3:6] = False
-    assert free_square(hunts, np.ones_like(hunts)) == pytest.approx(0.09)
-    invalid = np.ones_like(hunts)
-    invalid[3, 4] = False
-    assert free_square(hunts, invalid) == pytest.approx(1 / 99)
+    trends = [trend(values, y) for y in (values**3, -values, np.ones(4))] + [trend(values[:2], values[:2])]
+    assert trends == pytest.approx([1, -1, np.nan, np.nan], nan_ok=True)
+    square = np.ones((10, 10), dtype=bool)
+    square[2:5, 3:6] = False
+    valid = np.ones_like(square)
+    assert free_square(square, valid) == pytest.approx(0.09)
+    valid[3, 4] = False
+    assert free_square(square, valid) == pytest.approx(1 / 99)
 
 
 # --- judges on made maps ----------------------------------------------------------------------------------------------
@@ -334,41 +309,29 @@ FAILS: Mapping[str, Case] = {
 }
 
 
-def test_every_judge_of_maps_is_tried_both_ways() -> None:
-    """Judges of other evidence have tests of their own."""
-    assert HOLDS.keys() == FAILS.keys()
-    assert HOLDS.keys() <= registered().keys()
+@pytest.mark.parametrize("claim", sorted(HOLDS.keys() | FAILS.keys()))
+def test_judges_recognise_what_holds_and_what_does_not(claim: str, snapshots: Snapshots) -> None:
+    judge = registered()[claim].judge
+    holds, fails = judge(Evidence(*HOLDS[claim])), judge(Evidence(*FAILS[claim]))
+    assert holds.judgement == "holds"
+    snapshots.check("reproduce", f"numbers of {claim}", "\n".join(part.number for part in (*holds.parts, *fails.parts)))
+    assert fails.judgement in ("differs", "holds in part"), fails
+    assert len([part for part in fails.parts if not part.holds]) >= min(2, len(fails.parts) - 1), fails
 
 
-@pytest.mark.parametrize("claim", HOLDS)
-def test_judges_recognise_what_holds(claim: str) -> None:
-    finding = registered()[claim].judge(Evidence(*HOLDS[claim]))
-    assert finding.judgement == "holds", finding
+def test_a_limit_is_lower_by_more_than_what_is_the_same_and_one_peak_moves() -> None:
+    judged = [registered()["F16B"].judge(Evidence(crossover_pair(6, soft), {})).judgement for soft in (5.8, 4.4)]
+    assert judged == ["differs", "holds"]
+    assert registered()["F5"].judge(Evidence({}, {"locked": cell(1)})).parts[0].holds
+    assert by_peak_count(made("control", lambda a, b: 1 + 0 * a * b))["keeps_moving"].all()
 
 
-@pytest.mark.parametrize("claim", FAILS)
-def test_judges_recognise_what_does_not(claim: str) -> None:
-    finding = registered()[claim].judge(Evidence(*FAILS[claim]))
-    assert finding.judgement in ("differs", "holds in part"), finding
-    assert len([part for part in finding.parts if not part.holds]) >= min(2, len(finding.parts) - 1), finding
-
-
-def test_a_limit_is_lower_by_more_than_what_is_the_same() -> None:
-    judge = registered()["F16B"].judge
-    assert judge(Evidence(crossover_pair(6, 5.8), {})).judgement == "differs"
-    assert judge(Evidence(crossover_pair(6, 4.4), {})).judgement == "holds"
-
-
-def test_f14b_names_the_stripe_and_its_dampings() -> None:
+def test_f14b_names_the_stripe_and_its_dampings(snapshots: Snapshots) -> None:
     """A band of longer strokes that keeps moving, above strokes at which the stage rests, is reported separately."""
     striped = made("isolator-damping", lambda d, s: 6 * ((s < 1e-4) | ((d > 50) & (s > 2e-4) & (s < 4e-4))))
     judge = registered()["F14B"].judge
     part = judge(Evidence({"isolator-damping": striped}, {"locked": cell()})).parts[0]
-    assert "a stripe that keeps moving at strokes of 0.22 to 0.32 mm, damping 79 to 10000 N s/m" in part.number
-    plain = judge(Evidence(*HOLDS["F14B"]))
-    assert "stripe" not in plain.parts[0].number
-    assert plain.table is not None
-    assert [row[0] for row in plain.table.rows][::5] == ["0.01 to 0.1 N s/m", "1000 to 10000 N s/m"]
+    snapshots.check("reproduce", "a stripe", part.number)
 
 
 def test_f21_tells_how_the_force_itself_oscillates(thorough_study: Reproduction) -> None:
@@ -402,19 +365,8 @@ def test_a_verdict_that_another_reading_turns_says_so() -> None:
         assert own.judgement != becomes
         item = verdict(claims()[0], "1", own, readings=findings)
         assert item.reread[read].judgement == becomes
-        assert f"{read}: {becomes}" in item.dependence
         assert all(other.pattern != own.pattern for other in item.reread.values())
     assert reading() == OWN
-
-
-def test_every_word_is_read_otherwise() -> None:
-    """Each word is changed by itself, in both directions."""
-    for word in fields(OWN):
-        own = getattr(OWN, word.name)
-        others = [other for other in OTHERWISE.values() if getattr(other, word.name) != own]
-        values = [getattr(other, word.name) for other in others]
-        assert min(values) < own < max(values)
-        assert all(replace(other, **{word.name: own}) == OWN for other in others)
 
 
 @pytest.mark.parametrize("claim", ["F5", "F14B", "F16A"])
@@ -428,15 +380,6 @@ def test_only_words_that_a_judge_reads_are_read_otherwise(claim: str) -> None:
     for name in OTHERWISE.keys() - others.keys():
         with read_as(OTHERWISE[name]):
             assert judge(evidence) == own, name
-
-
-def test_the_long_strokes_are_those_of_the_reading() -> None:
-    """Whose limit is the same."""
-    evidence = Evidence(crossover_pair(8.0, 4.0), {})
-    with read_as(replace(OWN, long=0.75)):
-        few = registered()["F16A"].judge(evidence)
-    assert "upper 25 %" in few.parts[0].criterion
-    assert few.pattern == registered()["F16A"].judge(evidence).pattern
 
 
 # --- verdicts ---------------------------------------------------------------------------------------------------------
@@ -472,7 +415,7 @@ def test_judgements_of_parts(parts: tuple[Part, ...], judgement: str) -> None:
     assert Finding(parts).judgement == judgement
 
 
-def test_draws_that_are_open_decide_nothing() -> None:
+def test_draws_that_are_open_decide_nothing(snapshots: Snapshots) -> None:
     """A claim that too few draws decide is not decided enough; a draw in which no criterion fails is undecided if one
     is open."""
 
@@ -480,25 +423,19 @@ def test_draws_that_are_open_decide_nothing() -> None:
         return _in_space(registered()["S41"], [(draw(k), one) for k, one in enumerate(draws)], {})
 
     holds, fails, open_ = Finding((YES,)), Finding((OPEN_PART, NO)), Finding((OPEN_PART,))
+    said = []
     for count, word in ((0, "not decided enough"), (6, "not decided enough"), (7, "holds")):
         item = verdict(claims()[0], "", holds, space=space_of(*[holds] * count, *[open_] * (51 - count)))
         assert item.judgement == word
-        assert ("at least 7 are needed" in item.dependence) == (word != "holds")
+        said.append(item.dependence)
+    turned = verdict(claims()[0], "", holds, others={"a grid": Finding((NO,))}, undrawn="the rail")
+    snapshots.check("reproduce", "dependence", "\n".join([*said, turned.dependence]))
     assert verdict(claims()[0], "", open_, space=space_of(*[holds] * 16)).judgement == "not decided yet"
     assert verdict(claims()[0], "", fails, space=space_of(*[holds] * 16)).judgement == "depends"
     space = space_of(holds, open_, Finding((NO,)))
     assert (space.count, space.undecided, space.misses) == (1, 1, 1)
     assert space.holds == share(np.array([True, False]), np.ones(2, bool), 0.05 / 3)  # three looks
     assert space_of(Finding((NO, OPEN_PART))).misses == 1
-
-
-def test_an_undecided_part_says_why() -> None:
-    beside_another = Finding((BEYOND, YES))
-    assert beside_another.pattern == (None, True)
-    item = verdict(claims()[0], "1", beside_another)
-    assert (item.judgement, item.reason) == ("holds", "")
-    assert reasons(item) == ["Criterion 1: Simulation cannot decide this."]
-    assert ("Reason", BEYOND.beyond) in details(item)
 
 
 def test_a_number_beside_its_threshold_is_undecided() -> None:
@@ -512,17 +449,6 @@ def test_the_count_judges_and_what_attracts_stands_beside() -> None:
     assert item.judgement == "holds"
     assert item.attracts is not None
     assert item.attracts.judgement == "holds in part"
-    assert ("Criterion 2, by what attracts", "does not agree: number 1") in details(item)
-
-
-def test_reasons_say_to_which_criteria_they_belong() -> None:
-    why = "Friction hardly moves the line. Cables may."
-    parts = (replace(NO, why=why), YES, replace(NO, why=why), replace(NO, why="Other."))
-    item = verdict(claims()[0], "1", Finding(parts))
-    assert reasons(item) == ["Criteria 1 and 3: Friction hardly moves the line.", "Criterion 4: Other."]
-    alone = verdict(claims()[0], "1", Finding(parts[:1]))
-    assert reasons(alone) == ["Friction hardly moves the line."]
-    assert ("Reason", why) in details(alone)
 
 
 def test_the_interval_of_the_share_decides_the_word(thorough_study: Reproduction) -> None:
@@ -537,7 +463,6 @@ def test_the_interval_of_the_share_decides_the_word(thorough_study: Reproduction
 
     def judged(holds: bool, held: int, draws: int, undrawn: str = "") -> str:
         item = verdict(claims()[0], "5", finding(holds), None, of_draws(held, draws), undrawn=undrawn)
-        assert item.robust == ("No choice of the unstated values" in item.dependence)
         assert item.robust == (item.judgement == "differs" and not held and not undrawn)
         return item.judgement
 
@@ -560,7 +485,6 @@ def test_another_method_is_mentioned_where_it_turns_a_part() -> None:
     others = {"a grid": finding(True), "a tolerance": finding(False)}
     judged = verdict(claims()[0], "5", finding(False), others=others)
     assert judged.turned.keys() == {"a grid"}
-    assert "With a grid a criterion is judged otherwise" in judged.dependence
 
 
 def test_limits_do_not_depend_on_the_number_of_points() -> None:
@@ -587,7 +511,6 @@ def test_one_cell_with_one_peak_is_told_as_such() -> None:
     still = runs.assign(outcome=runs["outcome"].where(runs["peaks"] != 1, "rests"))
     part = registered()["F11B"].judge(Evidence({"system": by_peak_count(still)}, {})).parts[0]
     assert part.holds
-    assert "1 cell of at most 1 counted peaks" in part.number
 
 
 def test_trends_are_judged_over_all_cells_too() -> None:
@@ -596,7 +519,6 @@ def test_trends_are_judged_over_all_cells_too() -> None:
     parts = registered()["F12B"].judge(Evidence({"control": control}, {})).parts
     assert not parts[0].holds
     assert not parts[1].holds
-    assert "not of all" in parts[0].why
 
 
 def test_the_locked_limit_is_that_of_the_mass_of_the_abstract() -> None:
@@ -616,7 +538,6 @@ def test_paths_longer_than_the_rig_do_not_decide_alone() -> None:
 
     block = part(lambda a, t: 6 * (a * t**2 > 0.16))
     assert not block.holds
-    assert "% of the paths fit" in block.number
     shares = [part(lambda a, t: 6 + 0 * a * t, **more).number.split(" %")[0] for more in ({}, {"cruise_ratio": 1.0})]
     assert float(shares[0]) > float(shares[1])
 
@@ -635,26 +556,12 @@ def test_claims_asked_for_have_a_page_and_conclusions_of_their_own() -> None:
     document = reproduce_document(asked)
     judged = {entry["id"] for entry in document["claims"]}
     assert judged == {"E1", "S35"}
-    assert document["conclusion"] == "Of 2 claims of the thesis 2 hold."
-    files = reproduce_files(asked)
-    page = str(files["reproduction.html"])
-    assert [
-        claim.id for claim in claims() if (f"| {claim.id} |" in str(files["claims.md"])) != (claim.id in judged)
-    ] == []
-    assert "not computed" not in page.replace("not computed in this run", "")
-    alone = replace(asked, verdicts=asked.verdicts[:1])
-    assert reproduce_document(alone)["conclusion"] == "Claim E1 of the thesis holds."
-    assert [claim for claim in judged if f'id="claim-{claim}"' not in page] == []
-    assert "default-src 'none'" in page
+    assert {entry["judgement"] for entry in document["claims"]} == {"holds"}
+    written = {claim for claim in ("E1", "S35", "F5") if f"| {claim} |" in str(reproduce_files(asked)["claims.md"])}
+    assert written == judged
     with patched({module("laws"): {"kept_laws": lambda rig: ((None,), {})}}):
         by_law = conclusions_by_law(asked)
     assert [item.claim.id for item in by_law.conclusions] == ["E1"]
-
-
-def test_one_peak_moves_everywhere() -> None:
-    """F5 and the maps call the same a cycle: one peak counted."""
-    assert registered()["F5"].judge(Evidence({}, {"locked": cell(1)})).parts[0].holds
-    assert by_peak_count(made("control", lambda a, b: 1 + 0 * a * b))["keeps_moving"].all()
 
 
 def test_every_open_question_has_a_command_and_its_file() -> None:
@@ -716,12 +623,6 @@ def runs_of(peaks: list[float], sizes: list[float], words: list[str]) -> xr.Data
     return by_peak_count(xr.Dataset({"peaks": ("x", peaks), "peak_to_peak": ("x", sizes), "outcome": ("x", words)}))
 
 
-def test_lasting_hunting() -> None:
-    words = ["swings", "rests", "swings", "invalid"]
-    runs = runs_of([5.0, 3.0, 0.0, np.nan], [1e-3, 1e-9, 1e-3, np.nan], words)
-    assert runs.keeps_moving.values.tolist() == [True, True, False, False]
-
-
 def test_runs_read_by_what_attracts() -> None:
     """A cell with an uncertain attractor is left out; the frequency of a cycle is known if a move ended in it."""
     runs = runs_of([5.0, 3.0, 0.0, 2.0], [1e-3] * 4, ["swings", "rests", "rests", "swings"])
@@ -763,16 +664,6 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     assert steps[-1][0] == steps[-1][1]
 
 
-@pytest.mark.parametrize(
-    "orders",
-    [{"names": ["paths"]}, {"points": 2}, {"points": 10**6}, {"draws": -1}, {"only": ["F99"]}],
-    ids=["study", "few points", "many points", "draws", "claim"],
-)
-def test_wrong_orders_are_refused(orders: dict[str, Any]) -> None:
-    with refused():
-        reproduce(**orders)
-
-
 def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(tmp_path: Path) -> None:
     """Evidence from before the interruption is not computed again; the verdict is that of an uninterrupted run."""
     orders: dict[str, Any] = {"only": ["f15b"], "points": 3, "with_cycles": False, "draws": 2}
@@ -795,28 +686,12 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
     assert resumed.maps.keys() == {"friction", "isolator-friction"}
     assert (resumed.linear, resumed.experiments) == (None, None)
     assert [item.claim.id for item in resumed.verdicts if item.finding] == ["F15B"]
-    for file in [file for suffix in ("json", "npz") for file in [*(tmp_path / "kept").glob(f"*.{suffix}")][:2]]:
-        content = file.read_bytes()
-        others = next(other for other in file.parent.iterdir() if other.suffix == file.suffix and other != file)
-        for damaged in (content[:-2], content.replace(b"1", b"2", 1), b"[1, 2", others.read_bytes()):
-            file.write_bytes(damaged)
-            assert kept_arrays(file) is None
-            assert kept_findings(file) is None
-        file.write_bytes(content)
+    file, *_ = (tmp_path / "kept").glob("*.json")
+    for damaged in (file.read_bytes()[:-2], file.read_bytes().replace(b"1", b"2", 1), b"[1, 2"):
+        file.write_bytes(damaged)
+        assert kept_findings(file) is None
     kept.clear()
     assert kept.count == 0
-
-
-def test_the_work_is_that_of_what_the_claims_need() -> None:
-    """F13 needs two runs in time a draw, and S342F one map and the linear analysis, where 34 min were told once."""
-    assert dict(settings.experiment_work).keys() == _RUNS.keys()
-    entries = registered()
-    assert work_of({"F13": entries["F13"]}, 51) == 51 * 2 * settings.response_work
-    assert work_of({"F13": entries["F13"]}, 51, 17) == 34 * 2 * settings.response_work
-    both = work_of({name: entries[name] for name in ("F13", "S342F")}, 51)
-    assert both - work_of({"F13": entries["F13"]}, 51) == 17 * (settings.linear_work + 21**2)
-    assert both < 60_000  # milliseconds
-    assert work_of(entries, 0) == 0
 
 
 def test_few_points_are_shown_and_not_judged_on() -> None:
@@ -833,18 +708,21 @@ def test_few_points_are_shown_and_not_judged_on() -> None:
 
 def test_results_are_kept_whole(tmp_path: Path) -> None:
     """Every kind of result is read back as it was written: words in arrays of objects, as runs have them, as texts."""
-    kept, experiment, runs = Kept(tmp_path), Experiments(thesis_rig()), rail_runs([3, 0])
+    kept, experiment, runs = Kept(tmp_path), experiments.Experiments(thesis_rig()), rail_runs([3, 0])
     kept.result(("runs",), RailRuns, lambda: replace(runs, outcome=runs.outcome.astype(object)))
     assert_same(kept.result(("runs",), RailRuns, lambda: pytest.fail("they were kept")), runs)
-    for name in (*EXPERIMENTS, TRACES):
-        kind, result = get_type_hints(Experiments)[name], getattr(experiment, name)
+    for name in (*experiments.EXPERIMENTS, experiments.TRACES):
+        kind, result = get_type_hints(experiments.Experiments)[name], getattr(experiment, name)
         kept.result((name,), kind, lambda made=result: made)
         assert_same(kept.result((name,), kind, lambda: pytest.fail("it was kept")), result)
-    arrays, kind = taken_apart(getattr(experiment, GRID)), get_type_hints(Experiments)[GRID]
+    arrays, kind = (
+        taken_apart(getattr(experiment, experiments.GRID)),
+        get_type_hints(experiments.Experiments)[experiments.GRID],
+    )
     for wrong in ({**arrays, "tree": np.array("[1]")}, {"tree": arrays["tree"]}, {"tree": np.array("[")}):
         with pytest.raises((ValueError, TypeError, KeyError)):
             put_together(kind, wrong)
-    assert kept.count == len(EXPERIMENTS) + 2
+    assert kept.count == len(experiments.EXPERIMENTS) + 2
 
 
 def assert_same(again: Any, made: Any) -> None:
@@ -866,14 +744,6 @@ def assert_same(again: Any, made: Any) -> None:
         assert again == made or (again != again and made != made)
 
 
-def test_findings_are_kept_whatever_their_judge_compared(tmp_path: Path) -> None:
-    """NumPy's truth is kept, too, which JSON does not know."""
-    kept = Kept(tmp_path)
-    kept.findings(("a",), lambda: {"F28": Finding((Part("a criterion", cast("Any", np.True_), "1"),))})
-    (again,) = kept.findings(("a",), lambda: pytest.fail("they were kept")).values()
-    assert again.parts[0].holds is True
-
-
 def test_what_is_kept_depends_on_all_sources_it_was_computed_with() -> None:
     """Every part of friso that these parts import is one of them, or decides on no number."""
     package = files("friso")
@@ -893,86 +763,6 @@ def test_a_draw_that_decides_nothing_says_why() -> None:
     with patched({module("plausible"): {"MAP_POINTS": 3, "counted": stopped}}):
         space = plausible({"F15B": registered()["F15B"]}, {"F15B": finding(True)}, 1).claims["F15B"]
     assert (space.undecided, space.count, space.failures) == (1, 0, {0: "ValueError: the loop stops"})
-    undecided: Any = SimpleNamespace(finding=None, space=space, reason="", turned={}, attracts=None)
-    assert details(undecided) == [("Draw 1, undecided", "ValueError: the loop stops")]
-
-
-def test_document_and_page_have_every_claim(thorough_study: Reproduction, tmp_path: Path) -> None:
-    document = reproduce_document(thorough_study)
-    assert [entry["id"] for entry in document["claims"]] == [claim.id for claim in claims()]
-    for entry in document["claims"]:
-        covered = entry["judgement"] != "not yet covered"
-        assert bool(entry["figure"] and entry["number"] and entry["criterion"]) == bool(entry["parts"]) == covered
-        undecided = any(part["undecided"] for part in entry["parts"])  # or no draw decides it
-        assert entry["reason"] or undecided or entry["judgement"] in ("holds", "depends", "not decided enough")
-        if entry["space"]:
-            assert entry["space"]["seeds"] == [[1, number] for number in range(0, entry["space"]["draws"])]
-            assert 0 <= entry["space"]["share"]["low"] <= entry["space"]["share"]["high"] <= 1
-    contents = reproduce_files(thorough_study)
-    page = str(contents["reproduction.html"])
-    shown = [item.claim.id for item in in_order(thorough_study.verdicts) if item.finding]
-    assert len(shown) > 20
-    places = [*(f'id="claim-{name}"' for name in shown), *(f">{claim.id}<" for claim in claims())]
-    places += [f'id="figure-figure-{number}"' for number in (5, 7, 8, *range(11, 30))]
-    assert [place for place in (*places, "default-src 'none'") if place not in page] == []
-    assert {Path(name).suffix for name in contents} == {".html", ".json", ".md", ".pdf", ".png", ".svg"}
-    pictures = [name for name in contents if name.startswith("figures/")]
-    assert len(pictures) == 2 * len(reproduction_figures(thorough_study))
-    few = [name for name in contents if name not in pictures or name == "figures/figure-26.png"]  # drawing takes long
-    paths = write({tmp_path / "new" / name: contents[name] for name in few})
-    assert all(path.stat().st_size > 1000 for path in paths)
-
-
-@pytest.mark.thorough
-def test_the_command_writes_its_page_and_claims(
-    thorough_study: Reproduction,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    snapshots: Snapshots,
-    undrawn: None,
-) -> None:
-    """The command runs in this process, which has cached the linear analysis of `thorough_study`, the longest part."""
-
-    def run(*arguments: str) -> int:
-        monkeypatch.setattr(sys, "argv", ["friso", "reproduce", *arguments])
-        with pytest.raises(SystemExit) as left:
-            main()
-        return int(left.value.code or 0)
-
-    monkeypatch.chdir(tmp_path)
-    assert run("masses", "--points", "5") == 2
-    assert "isolator-masses" in capsys.readouterr().err
-    assert run("isolator-masses", "--points", "5", "--draws", "0", "--out", "rep", "--details") == 0
-    assert not (tmp_path / "rep" / UNFINISHED).exists()
-    snapshots.check("reproduce", "run", capsys.readouterr().out)
-    snapshots.check("reproduce", "page", Page((tmp_path / "rep" / "reproduction.html").read_text("utf-8")).lines)
-    written = {claim["id"]: claim for claim in json.loads((tmp_path / "rep" / "claims.json").read_text())["claims"]}
-    assert written["F15A"]["judgement"] in ("holds", "holds in part", "differs")
-    assert written["F11A"]["judgement"] == "not yet covered"
-
-
-def test_the_evidence_page_has_every_judgement_once_with_its_reasons(thorough_study: Reproduction) -> None:
-    """F19 has its sharp result: 11 Hz and 0.75 kg are (2 pi 11 Hz)^2 0.75 kg."""
-    lines = claims_markdown(thorough_study).replace("\u00a0", " ").splitlines()
-    rows = {line.split(" | ")[0].removeprefix("| "): line for line in lines if line.startswith("| ")}
-    items = {line.split("**")[1]: line for line in lines if line.startswith("- **")}
-    assert len(items) == sum(line.startswith("- ") for line in lines)
-    assert items.keys() == {item.claim.id for item in thorough_study.verdicts if item.finding}
-    for item in thorough_study.verdicts:
-        if item.space and item.space.decided:
-            (interval,) = re.findall(r"\(([^();]* to [^();]*)", rows[item.claim.id].rsplit(" | ", 1)[1])
-            assert f"({interval})" in item.dependence
-        for part in item.finding.stated if item.finding else ():
-            assert part.open or part.holds or (part.number in items[item.claim.id] and part.why in items[item.claim.id])
-    assert (2 * np.pi * 11) ** 2 * 0.75 == pytest.approx(3583, abs=1)
-    assert "11 Hz and 0.75 kg that the thesis measured give 3.58 N/mm, not 2.9" in items["F19"]
-    assert "Why: Simulation cannot decide this: cables, misalignment" in items["F19"]
-
-
-def test_criteria_that_are_undecided_are_counted_as_such() -> None:
-    assert met(verdict(claims()[0], "1", Finding((OPEN_PART, BEYOND, NO)))) == "0 of 3, 2 undecided"
-    assert met(verdict(claims()[0], "1", Finding((YES, NO)))) == "1 of 2"
 
 
 def test_the_summary_has_every_text_whole_on_one_sheet() -> None:
@@ -980,6 +770,39 @@ def test_the_summary_has_every_text_whole_on_one_sheet() -> None:
     verdicts: Any = [item(claim=one, judgement="holds in part", finding=finding(True), space=space) for one in claims()]
     texts = {text.get_text().replace("\n", " ") for text in summary_sheet(verdicts, "Conclusion.", COLOURS).texts}
     assert {one.text for one in claims()} <= texts
+
+
+def test_document_has_every_claim(thorough_study: Reproduction) -> None:
+    document = reproduce_document(thorough_study)
+    assert [entry["id"] for entry in document["claims"]] == [claim.id for claim in claims()]
+    for entry in document["claims"]:
+        covered = entry["judgement"] != "not yet covered"
+        assert bool(entry["figure"] and entry["number"] and entry["criterion"]) == bool(entry["parts"]) == covered
+        undecided = any(part["undecided"] for part in entry["parts"])  # or no draw decides it
+        plain = ("holds", "depends", "not decided enough", "cannot be decided")
+        assert entry["reason"] or undecided or entry["judgement"] in plain
+        if entry["space"]:
+            assert 0 <= entry["space"]["share"]["low"] <= entry["space"]["share"]["high"] <= 1
+    contents = reproduce_files(thorough_study)
+    shown = {item.claim.id for item in thorough_study.verdicts if item.finding}
+    assert [name for name in shown if f'id="claim-{name}"' not in str(contents["reproduction.html"])] == []
+    assert len([name for name in contents if name.startswith("figures/")]) == 2 * len(
+        reproduction_figures(thorough_study)
+    )
+
+
+@pytest.mark.thorough
+def test_the_command_writes_its_numbers(
+    thorough_study: Reproduction, tmp_path: Path, snapshots: Snapshots, undrawn: None
+) -> None:
+    """The command runs in this process, which has cached the linear analysis of `thorough_study`, the longest part."""
+    assert friso_inside(tmp_path, "reproduce", "masses", "--points", "5").returncode == 2
+    given = ("isolator-masses", "--points", "5", "--draws", "0", "--out", "rep", "--details")
+    assert friso_inside(tmp_path, "reproduce", *given).returncode == 0
+    assert not (tmp_path / "rep" / UNFINISHED).exists()
+    written = json.loads((tmp_path / "rep" / "claims.json").read_text("utf-8"))["claims"]
+    numbers = [f"{one['id']}, {one['judgement']}: {one['number']}" for one in written if one["parts"]]
+    snapshots.check("reproduce", "numbers", "\n".join(numbers))
 
 
 def test_fig_14b_at_both_tolerances(thorough_study: Reproduction) -> None:
@@ -997,7 +820,7 @@ def test_fig_14b_at_both_tolerances(thorough_study: Reproduction) -> None:
     assert document["figure_14b"]["rtol"] == [1e-8, 1e-4]
 
 
-def test_a_new_judge_needs_no_change_of_the_page(thorough_study: Reproduction, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_judge_needs_no_change_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """The finding of a decorated function stands in page and document, escaped."""
     monkeypatch.delitem(_JUDGES, "F28")
     try:
@@ -1006,26 +829,17 @@ def test_a_new_judge_needs_no_change_of_the_page(thorough_study: Reproduction, m
         def settled(evidence: Evidence) -> Finding:
             return Finding((Part("<b>criterion</b> & more", False, "10.5 <i>Hz</i>", "<script>alert(1)</script>"),))
 
-        with pytest.raises(ValueError, match="one already"):
-            judges("F28", figure="28")
+        for claim, why in (("F28", "one already"), ("F99", "expected a claim")):
+            with pytest.raises(ValueError, match=why):
+                judges(claim, figure="28")
         reproduction = reproduce([], points=3, draws=0)
     finally:
         _JUDGES.pop("F28", None)
     (entry,) = (claim for claim in reproduce_document(reproduction)["claims"] if claim["id"] == "F28")
     assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
-    page = reproduce_html(replace(thorough_study, verdicts=reproduction.verdicts))
-    linked = [int(number) for number in re.findall(r'<a href="#section-\d+">(\d+)</a>', page)]
-    assert 28 in linked
-    assert linked == sorted(linked)
+    page = reproduce_html(reproduction)
     assert "&lt;b&gt;criterion&lt;/b&gt; &amp; more" in page
     assert "<script>alert(1)" not in page
-    assert "10.5 <i>" not in page
-
-
-def test_a_judge_of_no_claim_is_refused() -> None:
-    with pytest.raises(ValueError, match="expected a claim"):
-        judges("F99", figure="99")
-    assert not_covered(claims()[0], "reason").judgement == "not yet covered"
 
 
 @pytest.mark.thorough
@@ -1057,15 +871,6 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
     assert "edge of the attracting cycle (flip)" in labels
-
-
-def test_what_is_shortened_ends_with_a_statement() -> None:
-    long = "the contact of cart and stage would, with the stiffness that limiters have " * 3
-    long = long.strip()
-    assert short(f"{long}. The next one. Assumed: nothing") == long
-    assert short("one; two. Three. Assumed: nothing") == "one; two. Three"
-    assert short(f"one. Two; {long}") == "one. Two"
-    assert len(short("A statement. " * 40)) <= SHORT_FORM
 
 
 def unreadable_archive(stream: BinaryIO) -> None:

@@ -46,11 +46,8 @@ def test_beta_and_the_fixed_values() -> None:
     assert judged("E8").pattern == (Y, Y)
     finding = judged("T2")
     assert finding.pattern == (N,)
-    assert "Fig. 12A" in finding.parts[0].number
     assert judged_fixed([STUDIES["path"]]).pattern == (Y,)
     assert judged("S41F").pattern == (N,)
-    assert "Fig. 12A and 15B" in judged("S41F").parts[0].number
-    assert "alone, it is equal" in judged("S41F").parts[0].number
 
 
 def test_when_the_limiter_is_touched() -> None:

@@ -144,7 +144,6 @@ def test_the_solver_is_accurate_where_it_counts_and_swings_alike() -> None:
     assert judged_runs(runs, runs, runs).judgement == "holds"
     other_count = judged_runs({**runs, "still": (1, 0.0, 200_000.0)}, runs, runs)
     assert other_count.pattern == (False, True)
-    assert "still" in other_count.parts[0].number
     other_swing = judged_runs({**runs, "swinging": (6, 1.2e-3, 200_000.0)}, runs, runs)
     assert other_swing.pattern == (True, False)
 
