@@ -106,7 +106,7 @@ class EdgeSearch:
         else:
             decided = True
         beyond = np.append(next_to, farther)
-        survey = self._told(beyond, distances, confirm=(0,))
+        survey = self._told(beyond, distances)
         return beyond, survey if decided else replace(survey, decided=survey.decided & survey.attracts)
 
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
@@ -165,14 +165,10 @@ class EdgeSearch:
         survey = attractors(self.path.stages(np.array([place.at])), thorough=True, distances=distances[None])
         return bool(survey.attracts[0] and survey.decided[0])
 
-    def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
-        """Find the attractors at some factors.
-
-        Where return maps do not decide, runs also start from `distances` [m], shape (n,). At the factors numbered
-        `confirm`, runs check the maps.
-        """
+    def _told(self, factors: np.ndarray, distances: np.ndarray) -> Attractors:
+        """Find the attractors at some factors; runs also start from `distances` [m], shape (n,)."""
         begun, stages = np.broadcast_to(distances, (len(factors), len(distances))), self.path.stages(factors)
-        survey = what_attracts(stages, distances=begun, confirm=confirm)
+        survey = what_attracts(stages, distances=begun)
         return replace(survey, decided=survey.decided & (survey.attracts | surely_surveyed(stages, survey)))
 
     def _stable_again(self, end: float, beyond: float, last: Point) -> tuple[Swinging, ...]:

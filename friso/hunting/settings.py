@@ -44,9 +44,6 @@ class ToleranceSettings(Settings):
     """Tolerance of runs for the slope of a return map, relative to that of cycles. The slope is taken over a wide
     range."""
 
-    held_rtol_factor: float = setting(10.0, "of cycle_rtol")
-    """Tolerance of runs beside a cycle, relative to that of cycles. Rougher runs would blur narrow ranges."""
-
     check_rtol_factor: float = setting(0.01, "")
     """Factor of the tighter tolerance at which results are repeated to estimate their error."""
 

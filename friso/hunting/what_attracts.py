@@ -14,15 +14,12 @@ from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.rounds import typical_period
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families
-from friso.hunting.cycle.held import held_beside
+from friso.hunting.cycle.find import CYCLE_RTOL, families
 from friso.hunting.loop import winds_up_at_a_limit
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
-from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.mapped import Mapped, map_stages
 from friso.hunting.return_map.settings import settings
-from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 from friso.stage.controllers import NO_SETTINGS, SCHEDULES, dead_band
 
@@ -31,100 +28,43 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def what_attracts(
-    stages: Ensemble,
-    rtol: float = CYCLE_RTOL,
-    distances: np.ndarray | None = None,
-    confirm: Sequence[int] = (),
-    suggested: tuple[Cycles, ...] = (),
-) -> Attractors:
+def what_attracts(stages: Ensemble, rtol: float = CYCLE_RTOL, distances: np.ndarray | None = None) -> Attractors:
     """Find the attractors of stages as closed orbits, from return maps where these suffice.
 
-    A map shows that there is no attractor under three conditions: no cycle that Newton's method closes from the map of
-    stages at rest is stable; no unstable cycle has a lasting motion beside it; and, for the stages numbered `confirm`,
-    runs land where the map predicts. All other stages are searched from many starts, beside these cycles and motions,
-    and from `distances` [m], shape (count, n). `suggested` are the stages' `families`, if they are known. Orbits are
-    closed to the relative tolerance `rtol`. Raises Exhausted if an allowance of work is used up.
+    A stage has none if its map shows none and no run of a survey keeps swinging. Runs beside a cycle that surely repels
+    by its slope on the map do not count: they leave it too slowly for a run to show. All other stages are searched
+    from many starts, and from `distances` [m], shape (count, n). Orbits are closed to the relative tolerance `rtol`.
+    Raises Exhausted if an allowance of work is used up.
     """
     if not has_a_map(stages):
-        return _searched(stages, rtol, distances, _Cycles.of(stages, stages.searching_rtol(rtol), suggested))
+        return attractors(stages, False, rtol, distances)
     survey = survey_maps(stages, rtol)
-    decided = survey.resolved | survey.attracts  # a stable closed orbit proves attraction
-    quiet = np.array([number for number in confirm if decided[number] and not survey.attracts[number]], dtype=np.int64)
-    if quiet.size:
-        decided[quiet] = runs_land_as_foretold(survey, quiet)
-    motions, left = survey.motions, np.flatnonzero(~survey.attracts)
-    if left.size:
-        cycles = _Cycles.of(stages.take(left), rtol, tuple(family.take(left) for family in suggested)).beside(
-            survey, left
-        )
-        which = np.flatnonzero(~decided[left] | cycles.attract_or_hold)
-        if (open_ := left[which]).size:
-            begun = None if distances is None else distances[open_]
-            answer = _searched(stages.take(open_), rtol, begun, cycles.take(which))
-            motions += tuple(replace(motion, stage=int(open_[motion.stage])) for motion in answer.motions)
-            decided[open_] = answer.decided
+    motions, decided = survey.motions, survey.resolved | survey.attracts  # a stable closed orbit proves attraction
+    left = np.flatnonzero(~survey.attracts)
+    open_ = [left[~decided[left]]]
+    if (quiet := left[decided[left]]).size:
+        leaving = tuple((k, size) for k, number in enumerate(quiet) for size in _leaving(survey.mapped, int(number)))
+        runs = attractors(stages.take(quiet), cycles=False, distances=_some(distances, quiet), leaving=leaving)
+        open_.append(quiet[runs.attracts | ~runs.decided])
+    if (numbers := np.sort(np.concatenate(open_))).size:
+        searched = attractors(stages.take(numbers), False, rtol, _some(distances, numbers))
+        motions += tuple(replace(motion, stage=int(numbers[motion.stage])) for motion in searched.motions)
+        decided[numbers] = searched.decided
     nothing = np.zeros(stages.count, bool)
     return Attractors(motions, decided, typical_period(stages), (), nothing, decided, nothing)
 
 
-def attractors_beside(stages: Ensemble, cycles: tuple[Cycles, ...], rtol: float = CYCLE_RTOL) -> Attractors:
-    """Find the attractors of stages whose `families` of cycles are known, by return maps or by simulation.
-
-    Orbits are closed to the relative tolerance `rtol`.
-    """
-    return what_attracts(stages, rtol, suggested=cycles) if has_a_map(stages) else attractors(stages, rtol=rtol)
+def _some(distances: np.ndarray | None, numbers: np.ndarray) -> np.ndarray | None:
+    """Return the start distances of the stages with these numbers."""
+    return None if distances is None else distances[numbers]
 
 
-@dataclass(frozen=True)
-class _Cycles(ArrayRows):
-    """Cycles closed by Newton's method from maps of stages at rest, with motions beside them.
-
-    `held` [m], shape (count, n), are sticking distances of motions beside unstable cycles, NaN for none.
-    """
-
-    families: tuple[Cycles, ...]
-    held: np.ndarray
-
-    @classmethod
-    def of(cls, stages: Ensemble, rtol: float, cycles: tuple[Cycles, ...] = ()) -> _Cycles:
-        """Close the cycles of stages, if they are not known, and find lasting motions beside the unstable ones.
-
-        Orbits are closed to the relative tolerance `rtol`.
-        """
-        cycles = cycles or families(stages, rtol)
-        return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
-
-    def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:
-        """Add lasting motions beside the unstable orbits that a survey of return maps closed.
-
-        `numbers` are the numbers of these stages in the survey.
-        """
-        more = [np.full((len(numbers), 1), np.nan)]
-        for motion in survey.repelling:
-            if motion.cycles is not None and (rows := np.flatnonzero(numbers == motion.stage)).size:
-                stage = survey.mapped.stages.take(np.array([motion.stage]))
-                holds = held_beside(stage, motion.cycles.take(np.array([motion.number])))
-                more.append(np.full((len(numbers), holds.shape[1]), np.nan))
-                more[-1][rows] = holds
-        return _Cycles(self.families, np.hstack([self.held, *more]))
-
-    @property
-    def attract_or_hold(self) -> np.ndarray:
-        """Return which stages have a stable cycle, or a lasting motion beside an unstable one.
-
-        The result has the shape (count,).
-        """
-        return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
-
-
-def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycles: _Cycles) -> Attractors:
-    """Search the attractors of stages by simulation.
-
-    Runs start from many states, from `distances` [m], and beside cycles.
-    """
-    starts = cycles.held if distances is None else np.hstack([cycles.held, distances])
-    return attractors(stages, False, rtol, starts, suggested=cycles.families)
+def _leaving(mapped: Mapped, stage: int) -> Iterator[float]:
+    """Yield the peak-to-peak deviations [m] of the simple cycles of a stage that surely repel by their slopes."""
+    landing_map, length = mapped.maps[stage], float(mapped.stages.length[stage])
+    for point in landing_map.fixed_points():
+        if abs(point.slope) > 1 + settings.sure_errors * point.error:
+            yield length * (abs(point.distance) + abs(landing_map.foretold(np.array([point.distance]))[0]))
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
@@ -184,15 +124,16 @@ def surveyed_roughly(stages: Ensemble, rtol: float = CYCLE_RTOL, close: bool = T
     """Find at least one apparent attractor of each stage that may hunt, if it has one.
 
     This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. A coarse return map
-    decides. If its attractor is weak, or sticking distances wander, the cycles that Newton's method closes from the map
-    at rest decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if
+    decides. If its attractors are doubtful, the cycles that Newton's method closes from the map at rest decide
+    instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if
     an allowance of work is used up.
     """
     mapped, decided = _sketch(stages)
     motions: list[Swinging] = []
     if mapped is not None:
-        doubtful = decided & mapped.attracts & [close and _hardly_attracts(one) for one in mapped.maps]
-        sure = np.flatnonzero(decided & mapped.attracts & ~doubtful)
+        swings_on = np.array([bool(one.attractors) for one in mapped.maps])
+        doubtful = decided & swings_on & ~mapped.attracts & close
+        sure = np.flatnonzero(decided & swings_on & ~doubtful)
         motions += [motion for number in sure.tolist() for motion in _seen_on_map(mapped, number)]
         if (numbers := np.flatnonzero(doubtful)).size:
             for family in families(stages.take(numbers), rtol, one_each=True):
@@ -203,21 +144,6 @@ def surveyed_roughly(stages: Ensemble, rtol: float = CYCLE_RTOL, close: bool = T
         decided[left] = survey.decided
     nothing = np.zeros(stages.count, bool)
     return Attractors(tuple(motions), decided, typical_period(stages), (), nothing, decided, nothing)
-
-
-def _hardly_attracts(landing_map: LandingMap) -> bool:
-    """Tell whether a stage's coarse return map has no attractor that can be trusted.
-
-    A trusted attractor is simple, strongly stable, and reached from enough points. Where a stage next sticks almost as
-    far off as before, straight pieces between points create long cycles that the stage does not have.
-    """
-    swings = 1 if landing_map.symmetric else 2
-    return not any(
-        len(one.distances) == swings
-        and one.basin.size >= settings.least_arriving_points
-        and landing_map.slope(one) <= settings.hardly_attracting_share
-        for one in landing_map.attractors
-    )
 
 
 def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:
@@ -257,7 +183,6 @@ def has_a_map(stages: Ensemble) -> bool:
     It does not in any of these cases:
 
     - A joint swings freely while the cart sticks.
-    - A limiter chatters.
     - A force limit without anti-windup lets swings grow.
     - Integrals of several loops wind up separately.
     - The stage may stand anywhere within a dead band or a backlash.
@@ -269,6 +194,4 @@ def has_a_map(stages: Ensemble) -> bool:
     if not settings.maps_decide:
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))
-    return not (
-        stages.chatters or stands_anywhere or bends(stages) or winds_up_at_a_limit(stages) or stages.outer_integrals
-    )
+    return not (stands_anywhere or bends(stages) or winds_up_at_a_limit(stages) or stages.outer_integrals)

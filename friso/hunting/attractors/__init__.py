@@ -15,7 +15,7 @@ from friso.engine.allowance import Exhausted
 from friso.hunting.attractors.rounds import TIGHT_SURVEY_RTOL, typical_period
 from friso.hunting.attractors.settings import settings
 from friso.hunting.attractors.starts import Starts
-from friso.hunting.attractors.survey import Survey, Swinging
+from friso.hunting.attractors.survey import Leaving, Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, families
 from friso.hunting.loop import surely_run_away
@@ -106,7 +106,7 @@ def attractors(
     rtol: float = CYCLE_RTOL,
     distances: np.ndarray | None = None,
     cycles: bool = True,
-    suggested: tuple[Cycles, ...] = (),
+    leaving: tuple[Leaving, ...] = (),
 ) -> Attractors:
     """Find the attractors of stages, by simulation from many starts and from the return map.
 
@@ -116,30 +116,31 @@ def attractors(
     the `distances` [m], (count, n), where they are finite. Without `cycles`, a motion that has converged counts as
     attracted, and orbits are closed only from runs that have not converged by the third round.
 
-    A thorough survey runs all starts at once, as does one with `suggested` cycles: eight runs together take as long as
-    one. Both also start runs beside unstable cycles. A stage for which no suggested cycle was closed gets as many
-    starts as in a thorough survey.
+    Runs beside the cycles `leaving`, which surely repel, are not followed.
+
+    A thorough survey runs all starts at once, because eight runs together take as long as one. It also starts runs
+    beside unstable cycles.
 
     If its allowance of work is used up, a thorough survey returns the attractors it has by then; a stage counts as
     decided where an orbit was closed. Other surveys raise Exhausted.
     """
-    at_once, rtol = thorough or bool(suggested), rtol if thorough else stages.searching_rtol(rtol)
-    survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=at_once)
+    rtol = rtol if thorough else stages.searching_rtol(rtol)
+    survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=thorough, leaving=leaving)
     numbers = np.arange(stages.count)
-    nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
+    nothing, typical, suggested = np.zeros(stages.count, bool), typical_period(stages), tuple[Cycles, ...]()
     try:
         if thorough and cycles:
             suggested = families(stages, rtol)
         starts = Starts(stages) if cycles else Starts(stages, GUESS_RTOL)
         if distances is not None:
             starts.stuck_at(distances)
-        starts.spread(thorough | (at_once & ~np.any([cycles.closed for cycles in suggested], axis=0)))
+        starts.spread(thorough)
         _take_notice(starts, survey, numbers, suggested)
-        for runs, owners in starts.waves(at_once):
+        for runs, owners in starts.waves(thorough):
             survey.follow(runs, owners)
         if stages.remember:
             _try_memories(starts, survey)
-        if cycles and not at_once:
+        if cycles and not thorough:
             _try_cycles(starts, survey, rtol)
         decided = survey.attracted | ~survey.unknown
         columns = (nothing, ~survey.unknown, survey.runs_away)

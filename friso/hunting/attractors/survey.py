@@ -65,6 +65,9 @@ class Swinging:
         return -self.time / float(np.log(self.slope)) if 0 < self.slope < 1 else float("nan")
 
 
+Leaving = tuple[int, float]
+"""A simple cycle that surely repels: number of the stage, and peak-to-peak deviation [m]."""
+
 _Kind = tuple[int, float, float]
 """A kind of motion: number of the stage, peak-to-peak deviation [m], and time of repetition [s]."""
 
@@ -145,7 +148,7 @@ class Survey:
 
     A `thorough` survey looks for every attractor. A survey that must `prove` attraction closes orbits; otherwise a
     motion that has converged counts as attracted. A survey that `decides` may take more steps. `unbounded` marks stages
-    for which divergence is no failure.
+    for which divergence is no failure. Runs beside the cycles `leaving` are not followed: they leave, however slowly.
 
     `attracting` lists the attractors so far. Arrays have the shape (count,). A stage is `unknown` if a run failed or
     was stopped. `slowest` [s] is the time constant of the most weakly unstable cycle (0: none). `left` counts the
@@ -158,6 +161,7 @@ class Survey:
     rtol: float
     prove: bool = True
     decides: bool = False
+    leaving: tuple[Leaving, ...] = ()
     attracting: list[Swinging] = field(default_factory=list)
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
@@ -230,6 +234,7 @@ class Survey:
             close_from = settings.close_from_round if self.prove else settings.regular_from_round
             swinging = self._still_swinging(runs, owners, ends, early=number < close_from)
             swinging = self._within_budget(swinging, owners, ends)
+            swinging = swinging[~self._leaves(owners, ends)[swinging]]
             if not swinging.size:
                 return
             beside = self._beside(owners, ends)
@@ -319,6 +324,13 @@ class Survey:
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Return which runs resemble an unstable cycle, or a motion without a stable orbit, (runs,)."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
+
+    def _leaves(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
+        """Return which runs swing beside a simple cycle that surely repels, (runs,)."""
+        leaves, simple = np.zeros(len(owners), bool), (ends.repeats.swings > 0) & (ends.repeats.swings <= 2)
+        for stage, size in self.leaving:
+            leaves |= (owners == stage) & simple & (np.abs(ends.repeats.size / size - 1) < settings.same_motion_share)
+        return leaves
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Return which runs already have an attractor in the survey, shape (runs,).

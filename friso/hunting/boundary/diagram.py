@@ -15,7 +15,7 @@ from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
-from friso.hunting.what_attracts import attractors_beside
+from friso.hunting.what_attracts import what_attracts
 from friso.progress import Progress, Tally, silent
 
 BRANCHES = "following branches of cycles"
@@ -76,7 +76,7 @@ def diagram(space: Space, rtol: float = CYCLE_RTOL, seeds: int | None = None, pr
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
     sought = families(stages, stages.searching_rtol(rtol))
-    surveyed = attractors_beside(stages, sought, rtol)
+    surveyed = what_attracts(stages, rtol)
     hundredth = space.hundredth(np.zeros(1), np.ones(1))
     branches: list[Branch] = []
     special: list[tuple[LocatedPoint, ...]] = []

@@ -23,7 +23,7 @@ from friso.hunting.edge_search import Beyond, EdgeSearch
 from friso.hunting.loop import unstable_among
 from friso.hunting.path import ParameterPath
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import attractors_beside, what_attracts
+from friso.hunting.what_attracts import what_attracts
 from friso.progress import Progress, Tally, silent
 
 CURVES = "following the edge of hunting"
@@ -124,7 +124,7 @@ def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, prog
     undecided = np.flatnonzero(~attracts)  # stages with a stable cycle need no simulation
     if undecided.size:
         others = stages.take(undecided)
-        surveyed = attractors_beside(others, tuple(family.take(undecided) for family in sought), rtol)
+        surveyed = what_attracts(others, rtol)
         decided[undecided] = surely_surveyed(others, surveyed)
         attracts[undecided] = surveyed.attracts & decided[undecided]
     ends = grid.changes(decided & attracts, decided & ~attracts)

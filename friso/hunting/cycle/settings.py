@@ -43,27 +43,6 @@ class OrbitSettings(Settings):
     almost_return_log: float = setting(0.03, "")
     """Largest error of a return that serves as the guess of a cycle."""
 
-    held_range_share: float = setting(0.06, "of the distance")
-    """Range beside an unstable cycle in which lasting motions are looked for."""
-
-    held_runs: int = setting(61, "")
-    """Runs over the range beside a cycle. Ranges narrower than a step are missed; more runs take longer."""
-
-    held_break_runs: int = setting(12, "")
-    """Runs added at a break of the map. An attractor beside the break may be as narrow as a step."""
-
-    held_returns: int = setting(3, "returns")
-    """Returns of each run. They also give the map at the distances to which it leads."""
-
-    nearest_start_share: float = setting(1e-3, "of the distance")
-    """Start nearest to a cycle. Closer to it, rounding decides where a run goes."""
-
-    held_map_steps: int = setting(500, "")
-    """Iterations of the map beside a cycle, because slow motions need hundreds of returns."""
-
-    held_starts: int = setting(12, "")
-    """Most starts returned. Further starts give much the same motions."""
-
     beside_cycle_share: float = setting(2e-3, "of the distance")
     """Start of a simulation beside a cycle. Closer to it, rounding decides where the run goes."""
 

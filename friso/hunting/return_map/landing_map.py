@@ -13,14 +13,31 @@ from typing import Any
 import numpy as np
 
 from friso.hunting.attractors.settings import settings as survey_settings
+from friso.hunting.return_map.curve import (
+    FIRST_COORDINATE,
+    REST_COORDINATE,
+    Curve,
+    at_rest,
+    curve,
+    fitted,
+    join,
+    piece_about,
+)
 from friso.hunting.return_map.landings import Landings
 from friso.hunting.return_map.settings import settings as return_map_settings
 
 NEGATIVE_SIDE_SHIFT = 1e3
 """Shift of a landing's coordinate on the map, its log distance, on the negative side."""
 
-REST_COORDINATE = -1e6
-"""Coordinate on the map that stands for a stage that rests, or has diverged."""
+
+BISECTIONS = 40
+"""Halvings of an interval of coordinates, after which it is as exact as `repeated_share`."""
+
+SLOW = 1e-3
+"""Change of log distance over two landings below which a cycle is reached or left slowly."""
+
+MOST_HASTE = 40
+"""Most landings that are passed over at once where a cycle is reached or left slowly."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +52,20 @@ class MapAttractor:
     distances: np.ndarray
     basin: np.ndarray
     periodic: bool
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """Simple cycle of a return map: of one swing, or of two if its sides differ.
+
+    `distance` is that of a landing, signed, in deflections of the loop by the break-away force. `slope` is the factor
+    by which a small deviation grows per repetition, with its sign, and `error` its standard error (infinite: too few
+    landings tell it).
+    """
+
+    distance: float
+    slope: float
+    error: float
 
 
 @dataclass(frozen=True)
@@ -101,73 +132,81 @@ class LandingMap:
         return np.abs(self.after / self.before)
 
     @cached_property
-    def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the straight pieces of the map: where each begins, its value at 0, and its slope.
-
-        Coordinates are logarithms of distance (see `_place`), and ascend. Where the map breaks off between two points,
-        each half has the gain of the nearer point.
-        """
-        lines = [np.array([[-np.inf], [REST_COORDINATE], [0.0]])]
+    def _curve(self) -> Curve:
+        """Return the map as a function of coordinates (see `_place`)."""
+        parts = [at_rest(FIRST_COORDINATE)]
         for side in self.sides:
-            points = self.points(side)
-            places, after = _place(self.before[points]), self.after[points]
-            k = np.flatnonzero(np.diff(places) > 0)
-            low, high, one, two = places[k], places[k + 1], after[k], after[k + 1]
-            with np.errstate(all="ignore"):
-                slope = np.log(two / one) / (high - low)
-                joined = (one * two > 0) & (
-                    np.abs(slope)
-                    < return_map_settings.break_jump_log / (high - low) + return_map_settings.break_steepness
-                )
-            broken = ~joined
-            pieces = np.array([low, *_beside(low, one)])
-            pieces[1:, joined] = _place(one[joined]) - slope[joined] * low[joined], slope[joined]
-            middle = (low + high)[broken] / 2
-            pieces = np.hstack([pieces, [middle, *_beside(high[broken], two[broken])]])
-            pieces = pieces[:, np.argsort(pieces[0], kind="stable")]
-            if k.size and places[k[0]] == places[0]:
-                # the first line continues a little nearer to home
-                pieces[0, 0] -= return_map_settings.scatter_range_log
-            if len(points):
-                ends = after[-1:] if abs(after[-1]) < abs(self.before[points[-1]]) else np.zeros(1)
-                pieces = np.hstack([pieces, [places[-1:], *_beside(places[-1:], ends)]])
-            lines += [pieces, np.array([[NEGATIVE_SIDE_SHIFT / 2 if side > 0 else np.inf], [REST_COORDINATE], [0.0]])]
-        begins, values, slopes = np.hstack(lines)
-        return begins, values, slopes
+            places, after = self._going(side)
+            parts += [curve(places, after)] if places.size else []
+            parts.append(at_rest(NEGATIVE_SIDE_SHIFT / 2 if side > 0 else np.inf))
+        return join(parts)
+
+    def _going(self, side: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the coordinates of landings on a side and of the next ones, -inf for rest, by ascending distance."""
+        points = self.points(side)
+        after = self.after[points]
+        goes = np.isfinite(after) & (after != 0)
+        return _place(self.before[points]), np.where(goes, _place(np.where(goes, after, 1.0)), -np.inf)
 
     def next(self, places: np.ndarray) -> np.ndarray:
         """Return the coordinates of the landings that follow landings at `places`, both (count,).
 
         Coordinates are logarithms of distance (see `_place`), between which the map is interpolated.
         """
-        _, values, slopes = self._lines
-        pieces = self._pieces(places)
-        after = values[pieces] + slopes[pieces] * places
-        near = self._nearest
+        after, near = self._curve(places), self._nearest
         after[(after < near) | ((after > NEGATIVE_SIDE_SHIFT / 2) & (after < NEGATIVE_SIDE_SHIFT + near))] = (
             REST_COORDINATE
         )
         return after
 
-    def _pieces(self, places: np.ndarray) -> np.ndarray:
-        """Return the numbers of the straight pieces on which coordinates lie, both (count,)."""
-        return self._lines[0].searchsorted(places, side="right") - 1
+    def _repeated(self, places: np.ndarray) -> np.ndarray:
+        """Return the coordinates after as many landings as there are sides, which bring a simple cycle back."""
+        for _ in self.sides:
+            places = self.next(places)
+        return places
 
-    def _on_cycles(self, at: np.ndarray) -> np.ndarray:
-        """Move coordinates to the cycles of one or two landings that they approach; leave others as they are.
+    def fixed_points(self) -> Iterator[FixedPoint]:
+        """Yield the simple cycles of the map, by their landings on the first side, in ascending order of distance."""
+        begins = self._curve.begins
+        begins = begins[np.abs(begins) < NEGATIVE_SIDE_SHIFT / 2]
+        places = np.sort(np.concatenate([begins, (begins[1:] + begins[:-1]) / 2]))
+        off = self._repeated(places) - places
+        k = np.flatnonzero(off[:-1] * off[1:] <= 0)
+        low, high, rises = places[k], places[k + 1], off[k] > 0
+        for _ in range(BISECTIONS):
+            at = (low + high) / 2
+            below = (self._repeated(at) > at) == rises
+            low, high = np.where(below, at, low), np.where(below, high, at)
+        for at in low[np.abs(self._repeated(low) - low) < return_map_settings.repeated_share]:  # not a break of the map
+            slope, error, place = 1.0, 0.0, at
+            for _ in self.sides:
+                one, unsure = self._slope(place)
+                slope, error = slope * one, float(np.hypot(error * one, slope * unsure))
+                place = float(self.next(np.array([place]))[0])
+            yield FixedPoint(float(_distance(np.array([at]))[0]), slope, error)
 
-        Two straight pieces that lead back to the first make one straight line, whose fixed point is the cycle. If this
-        line is less steep than the diagonal, and coordinate and cycle lie on the same pieces, iterating the map leads
-        to the cycle as well, but slowly.
+    def _slope(self, place: float) -> tuple[float, float]:
+        """Return the slope of the map at a coordinate, and its standard error, infinite if too few landings tell it."""
+        places, after = self._going(-1.0 if place > NEGATIVE_SIDE_SHIFT / 2 else 1.0)
+        near = piece_about(places, after, place)
+        fit = fitted(places[near], after[near], np.array([place]))
+        if fit.good[0]:
+            return float(fit.slope[0]), float(fit.error[0])
+        return float(self._curve.slope(np.array([place]))[0]), np.inf
+
+    def _hastened(self, at: np.ndarray) -> np.ndarray:
+        """Move coordinates along where every second landing hardly moves: half-way to a cycle, or away from it.
+
+        Two landings later, a small distance x to a cycle has become s x. Where s is near 1, coordinates move on by
+        x / 2, the way that landings go, so that they reach or leave the cycle soon, but no farther than in `MOST_HASTE`
+        landings.
         """
-        _, values, slopes = self._lines
-        first, after = self._pieces(at), self.next(at)
-        second = self._pieces(after)
-        slope, offset = slopes[first] * slopes[second], values[second] + slopes[second] * values[first]
-        attracts = (slope >= 0) & (slope < 1) & (first > 0) & (self._pieces(self.next(after)) == first)
-        cycle = offset / np.where(attracts, 1 - slope, 1.0)
-        attracts &= (self._pieces(cycle) == first) & (self._pieces(self.next(cycle)) == second)
-        return np.where(attracts, cycle, at)
+        after = self.next(at)
+        slope = self._curve.slope(at) * self._curve.slope(after)
+        step = self.next(after) - at
+        with np.errstate(all="ignore"):
+            times = np.minimum(0.5 / np.abs(1 - slope), MOST_HASTE / 2)
+        return np.where((times > 1) & (at > REST_COORDINATE) & (np.abs(step) < SLOW), at + times * step, at)
 
     @cached_property
     def _nearest(self) -> float:
@@ -181,36 +220,45 @@ class LandingMap:
         at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST_COORDINATE)
         return tuple(self._told_apart(self._followed(at)))
 
+    @cached_property
+    def surely_attracts(self) -> bool:
+        """Whether the map has an attractor that can be trusted though its points are few.
+
+        It is a stable simple cycle, or a longer one that is strongly stable and reached from enough points. Other
+        motions that go on may come from gaps between points.
+        """
+        return any(abs(point.slope) < 1 for point in self.fixed_points()) or any(
+            one.periodic
+            and one.basin.size >= return_map_settings.least_arriving_points
+            and self.slope(one) <= return_map_settings.hardly_attracting_share
+            for one in self.attractors
+        )
+
     def _followed(self, at: np.ndarray) -> np.ndarray:
         """Iterate the map from coordinates until they are on attractors; return their last landings.
 
         The result holds coordinates (see `_place`), shape (points, landings).
         """
-        iterations, before, paths = return_map_settings.map_iterations, np.full(len(at), np.inf), at[:, None]
+        landings = 2 * survey_settings.most_repeating_swings + 1
+        paths, left = np.tile(at[:, None], landings), np.flatnonzero(at > REST_COORDINATE)
+        before, iterations = np.zeros(len(at)), return_map_settings.map_iterations
         for _ in range(return_map_settings.iteration_doublings):
-            earlier = np.full(len(at), np.inf)
+            at = paths[left, -1]
             for number in range(iterations):
-                if number % return_map_settings.checked_landings == 0:
-                    at = self._on_cycles(at)
-                    if np.all(
-                        (np.abs(at - earlier) < return_map_settings.exact_repetition_share) | (at <= REST_COORDINATE)
-                    ):
+                if number % return_map_settings.hastened_landings == 0:
+                    if np.all(at <= REST_COORDINATE):
                         break
-                    earlier = at
+                    at = self._hastened(at)
                 at = self.next(at)
-            if not np.any(at > REST_COORDINATE):
-                return np.tile(at[:, None], 2)
-            orbits = [at]
-            for _ in range(2 * survey_settings.most_repeating_swings):
-                orbits.append(self.next(orbits[-1]))
-            paths = np.array(orbits).T
-            strays = _strays(paths)
-            if not np.any(
-                (strays > return_map_settings.arrived_share) & (strays > before)
-                | ((strays > return_map_settings.same_landing_share) & ~np.isfinite(before))
-            ):
+            for k in range(landings):
+                paths[left, k], at = at, self.next(at)
+            strays = _strays(paths[left])
+            slow = (strays > before[left]) | (strays < return_map_settings.same_attractor_share)
+            before[left] = strays
+            left = left[slow & (strays > return_map_settings.arrived_share)]
+            if not left.size:
                 break
-            at, iterations, before = orbits[-1], 2 * iterations, strays
+            iterations *= 2
         return paths
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
@@ -236,17 +284,19 @@ class LandingMap:
         Paths are coordinates on the map (see `_place`), shape (points, landings).
         """
         left = np.all(paths > REST_COORDINATE, axis=1)
+        swings = np.array(
+            [_repeats_after(path, self.symmetric) if goes else 0 for path, goes in zip(paths, left, strict=True)]
+        )
         while left.any():
             number = int(np.flatnonzero(left)[0])
-            first = paths[number]
-            swings = _repeats_after(first, self.symmetric)
+            first, count = paths[number], int(swings[number])
             near = (
-                np.abs(paths[:, :, None] - first[None, None, : max(swings, 1)])
+                np.abs(paths[:, :, None] - first[None, None, : max(count, 1)])
                 < return_map_settings.same_attractor_share
             )
-            same = left & (near.any(axis=1).all(axis=1) if swings else _mixed(paths, first))
+            same = left & (near.any(axis=1).all(axis=1) if count else (swings == 0) & _mixed(paths, first))
             same[number] = True
-            yield MapAttractor(_distance(first[: swings or len(first)]), np.flatnonzero(same), swings > 0)
+            yield MapAttractor(_distance(first[: count or len(first)]), np.flatnonzero(same), count > 0)
             left &= ~same
 
     def slope(self, attractor: MapAttractor) -> float:
@@ -256,7 +306,7 @@ class LandingMap:
         """
         if not attractor.periodic:
             return np.inf
-        return float(np.abs(np.prod(self._lines[2][self._pieces(self._places(attractor.distances))])))
+        return float(np.abs(np.prod(self._curve.slope(self._places(attractor.distances)))))
 
     @property
     def scatter(self) -> tuple[float, float]:
@@ -296,16 +346,6 @@ def _distance(places: np.ndarray) -> np.ndarray:
     """Return signed distances from coordinates on the map (see `_place`)."""
     negative = places > NEGATIVE_SIDE_SHIFT / 2
     return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - NEGATIVE_SIDE_SHIFT, places))
-
-
-def _beside(at: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return values at 0 and slopes of straight pieces that have the gain of one point each, both (points,).
-
-    A point has the coordinate `at` on the map (see `_place`), and the next landing at the signed distance `after`. If
-    the stage rests or diverges after it, the piece leads to rest.
-    """
-    goes = np.isfinite(after) & (after != 0)
-    return np.where(goes, _place(np.where(goes, after, 1.0)) - at, REST_COORDINATE), np.where(goes, 1.0, 0.0)
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

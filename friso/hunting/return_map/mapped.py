@@ -49,7 +49,7 @@ class Mapped:
     @property
     def attracts(self) -> np.ndarray:
         """Return which stages have a map on which swings continue for ever, shape (count,)."""
-        return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
+        return np.array([landing_map.surely_attracts for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
         """Select the stages with these numbers, none of them twice, and their runs."""
@@ -204,7 +204,7 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
         limit = np.where(
             crosses & ~breaks,
             return_map_settings.fine_gap_log,
-            np.where(breaks, 2 * return_map_settings.fine_gap_log, return_map_settings.coarse_gap_log),
+            np.where(breaks, return_map_settings.break_width_log, return_map_settings.coarse_gap_log),
         )
         limit = np.where((upper < -1.0) | away, np.inf, limit)
         wide = np.flatnonzero(apart > limit)

@@ -38,9 +38,6 @@ class ReturnMapSettings(Settings):
     break_shares: tuple[float, ...] = setting((0.2, 0.4, 0.6, 0.8), "of the way between two starts")
     """Places at which more runs begin, to narrow down a break of the map. More run at once for nothing."""
 
-    checked_start_shares: tuple[float, ...] = setting((1 / 6, 1 / 2, 5 / 6), "of the starts in order of distance")
-    """Starts from which runs check a map: near, middle and far."""
-
     hardly_attracting_share: float = setting(0.95, "")
     """Largest fraction of a deviation left per repetition at which a sketched attractor is trusted. Above it, 51 of 149
     sketched attractors did not attract."""
@@ -68,9 +65,6 @@ class ReturnMapSettings(Settings):
     """Largest scatter of landings about the prediction of their neighbours. With more, the stage remembers more than
     distance."""
 
-    confirmed_landings: int = setting(12, "landings")
-    """Landings for which runs are compared with the map's predictions."""
-
     first_landings: int = setting(3, "landings")
     """Landings after which a stage has forgotten how its motion began."""
 
@@ -89,17 +83,33 @@ class ReturnMapSettings(Settings):
     break_steepness: float = setting(3.0, "")
     """Slope between two points beyond which the map breaks off."""
 
-    map_iterations: int = setting(200, "landings")
+    sure_errors: float = setting(3.0, "standard errors")
+    """Errors of a slope by which a cycle must be unstable to be told so for sure."""
+
+    merged_range_log: float = setting(0.02, "")
+    """Range of log distance in which landings count as one point. The slope between nearer ones is noise."""
+
+    fitted_reaches_log: tuple[float, ...] = setting((0.15, 0.075, 0.0375), "")
+    """Ranges of log distance on either side within which a cubic is fitted. A map bends little over a seventh; beside a
+    corner only the narrowest fits."""
+
+    fewest_fitted: int = setting(7, "landings")
+    """Fewest landings to which a cubic is fitted, three more than it has coefficients."""
+
+    fitted_scatter_log: float = setting(0.01, "")
+    """Scatter of landings about a fitted cubic beyond which the map goes through the landings themselves."""
+
+    map_iterations: int = setting(100, "landings")
     """Iterations of the map in which most starts reach an attractor."""
 
-    iteration_doublings: int = setting(4, "")
+    iteration_doublings: int = setting(3, "")
     """Doublings of the iterations for maps that leave a cycle slowly."""
 
-    checked_landings: int = setting(10, "landings")
-    """Last landings examined for repetition. Ten has many divisors, so cycles of 1, 2, 5 and 10 landings are seen."""
+    hastened_landings: int = setting(4, "landings")
+    """Landings after which a slow approach to a cycle, or a slow leave, is hastened."""
 
-    exact_repetition_share: float = setting(1e-9, "")
-    """Largest error of a repetition that is exact. A slow approach has a larger one."""
+    repeated_share: float = setting(1e-9, "")
+    """Largest error of a repetition that is exact. Beside a break of the map a landing differs by more."""
 
     arrived_share: float = setting(1e-6, "")
     """Change of landings below which they have reached a cycle."""
@@ -140,7 +150,7 @@ class ReturnMapSettings(Settings):
     coarse_gap_log: float = setting(0.15, "")
     """Widest gap between points away from the diagonal. Wider ones hide folds of the map."""
 
-    fine_gap_log: float = setting(0.01, "")
+    fine_gap_log: float = setting(0.03, "")
     """Widest gap between points near the diagonal, where the map decides stability. Finer gaps take more runs."""
 
     diagonal_gain_log: float = setting(0.1, "")

@@ -1,0 +1,165 @@
+"""Interpolate a return map smoothly between its landings, up to the places where it breaks off.
+
+Values and slopes are those of cubics fitted by least squares to the landings about a place (W. S. Cleveland, Robust
+locally weighted regression and smoothing scatterplots, 1979, doi:10.1080/01621459.1979.10481038, with equal weights).
+Coordinates are logarithms of distance (see `friso.hunting.return_map.landing_map`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import Akima1DInterpolator
+
+from friso.hunting.return_map.settings import settings
+
+REST_COORDINATE, FIRST_COORDINATE = -1e6, -1e9
+"""Coordinate on the map that stands for a stage that rests, or has diverged; and one before all others."""
+
+TERMS = 4
+"""Coefficients of a cubic."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Cubics side by side: where each begins, ascending, and its coefficients by power, (4, cubics).
+
+    A cubic is one of the distance from its beginning.
+    """
+
+    begins: np.ndarray
+    terms: np.ndarray
+
+    def __call__(self, places: np.ndarray) -> np.ndarray:
+        """Return the values at `places`, both (count,)."""
+        number = self._numbers(places)
+        apart, (value, slope, bend, twist) = places - self.begins[number], self.terms[:, number]
+        return value + apart * (slope + apart * (bend + apart * twist))
+
+    def slope(self, places: np.ndarray) -> np.ndarray:
+        """Return the slopes at `places`, both (count,)."""
+        number = self._numbers(places)
+        apart, (_, slope, bend, twist) = places - self.begins[number], self.terms[:, number]
+        return slope + apart * (2 * bend + apart * 3 * twist)
+
+    def _numbers(self, places: np.ndarray) -> np.ndarray:
+        """Return the numbers of the cubics at `places`, both (count,)."""
+        return self.begins.searchsorted(places, side="right") - 1
+
+
+def at_rest(begin: float) -> Curve:
+    """Return the curve of a stage that rests after landings from a coordinate on."""
+    return _flat(np.array([begin]), np.array([REST_COORDINATE]), 0.0)
+
+
+def curve(places: np.ndarray, after: np.ndarray) -> Curve:
+    """Return the curve through landings at ascending `places` and the next ones `after`, (points,), -inf for rest.
+
+    Where the curve breaks off between two landings, each half has the gain of the nearer one. It continues a little
+    nearer to home than the first landing, and beyond the last one if that leads inward.
+    """
+    pieces = _pieces(places, after)
+    ends = np.flatnonzero(np.diff(pieces)) + 1
+    parts, begin = list[Curve](), float(places[0]) - settings.scatter_range_log
+    for first, last in zip(np.append(0, ends), np.append(ends, len(places)), strict=True):
+        here, ahead = places[first:last], after[first:last]
+        if np.isfinite(ahead[0]):
+            parts += _piece(here, ahead, begin, first > 0)
+        else:
+            parts.append(at_rest(begin))
+        begin = float(places[last - 1] + places[min(last, len(places) - 1)]) / 2
+    inward = after[-1] < places[-1] and np.isfinite(after[-1])
+    parts.append(_flat(places[-1:], after[-1:], 1.0) if inward else at_rest(places[-1]))
+    return join(parts)
+
+
+def join(parts: list[Curve]) -> Curve:
+    """Return curves side by side as one."""
+    return Curve(np.concatenate([part.begins for part in parts]), np.hstack([part.terms for part in parts]))
+
+
+def _flat(begins: np.ndarray, values: np.ndarray, slope: float) -> Curve:
+    """Return straight lines of one slope, each with its value where it begins, both (lines,)."""
+    return Curve(begins, np.array([values, np.full(len(begins), slope), *np.zeros((2, len(begins)))]))
+
+
+def _pieces(places: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return on which piece of the map each landing lies, numbered in order, (points,)."""
+    goes = np.isfinite(after)
+    with np.errstate(all="ignore"):  # two landings after which the stage rests
+        joined = np.abs(np.diff(after)) < settings.break_jump_log + settings.break_steepness * np.diff(places)
+    return np.append(0, np.cumsum((goes[1:] | goes[:-1]) & ~joined))
+
+
+def piece_about(places: np.ndarray, after: np.ndarray, place: float) -> np.ndarray:
+    """Return which landings lie on the piece of the map on which a coordinate lies, (points,)."""
+    pieces = _pieces(places, after)
+    return pieces == pieces[np.abs(places - place).argmin()]
+
+
+def _piece(places: np.ndarray, after: np.ndarray, begin: float, breaks: bool) -> list[Curve]:
+    """Return the curve of one continuous piece from the coordinate `begin` on, where the map `breaks` off or begins."""
+    knots, values = _merged(places, after)
+    slopes = _slopes(knots, values)
+    fit = fitted(places, after, knots)
+    values, slopes = np.where(fit.good, fit.value, values), np.where(fit.good, fit.slope, slopes)
+    inward = 1.0 if breaks else float(slopes[0])
+    before = _flat(np.array([begin]), values[:1] + inward * (begin - knots[:1]), inward)
+    after_it = _flat(knots[-1:], values[-1:], 1.0)
+    apart, rise = np.diff(knots), np.diff(values)
+    with np.errstate(all="ignore"):
+        bend = (3 * rise / apart - 2 * slopes[:-1] - slopes[1:]) / apart
+        twist = (slopes[:-1] + slopes[1:] - 2 * rise / apart) / apart**2
+    return [before, Curve(knots[:-1], np.array([values[:-1], slopes[:-1], bend, twist])), after_it]
+
+
+def _merged(places: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the means of landings that are so near to each other that their slope is noise."""
+    group = np.floor((places - places[0]) / settings.merged_range_log)
+    first = np.append(0, np.flatnonzero(np.diff(group)) + 1)
+    number = np.diff(np.append(first, len(places)))
+    return np.add.reduceat(places, first) / number, np.add.reduceat(after, first) / number
+
+
+def _slopes(knots: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the slopes of a piece at its knots by Akima's rule, which does not overshoot beside a corner."""
+    if len(knots) < 3:
+        return np.ones(len(knots)) if len(knots) < 2 else np.full(2, np.diff(values)[0] / np.diff(knots)[0])
+    return Akima1DInterpolator(knots, values)(knots, 1)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Cubics fitted about places: value, slope, and the slope's standard error, and where they are good, (places,)."""
+
+    value: np.ndarray
+    slope: np.ndarray
+    error: np.ndarray
+    good: np.ndarray
+
+
+def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> Fit:
+    """Fit cubics to the landings about coordinates `about`, (n,), of one continuous piece of a map.
+
+    The landings lie within the reach at which the slope has the least standard error.
+    """
+    value, slope, error, good = (np.full(len(about), fill) for fill in (np.nan, np.nan, np.inf, False))
+    for reach in settings.fitted_reaches_log:
+        apart = (places - about[:, None]) / reach
+        near = np.abs(apart) < 1
+        enough = near.sum(axis=1) >= settings.fewest_fitted
+        if not enough.any():
+            continue
+        powers = np.where(near, apart, 0.0)[:, :, None] ** np.arange(TERMS) * near[:, :, None]
+        normal = np.einsum("npi,npj->nij", powers, powers)
+        normal[~enough] = np.eye(TERMS)
+        inverse = np.linalg.pinv(normal, hermitian=True)
+        terms = np.einsum("nij,npj,p->in", inverse, powers, after)
+        left = np.where(near, after - np.einsum("npi,in->np", powers, terms), 0.0)
+        variance = (left**2).sum(axis=1) / np.maximum(near.sum(axis=1) - TERMS, 1)
+        unsure = np.sqrt(variance * inverse[:, 1, 1]) / reach
+        better = enough & (np.sqrt(variance) < settings.fitted_scatter_log) & (unsure < error)
+        value[better], slope[better], error[better] = terms[0, better], terms[1, better] / reach, unsure[better]
+        good |= better
+    return Fit(value, slope, error, good)
