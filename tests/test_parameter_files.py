@@ -120,7 +120,9 @@ def test_the_example_is_an_axis_in_torque_mode(tmp_path: Path) -> None:
 def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force: str, answers: dict[str, Any]) -> None:
     more, path = {"force_per_output": force}, ini(tmp_path, {**GAINS, "MAX_ERROR_I": 0.01}, unit, joint)
     text = stage_from(path, None, {**answers, **more}).text()
-    back = gains_of(friso.loads(text), {**more, "machine_unit": unit}, "linuxcnc").parameters
+    stage, size = friso.loads(text), {"mm": 1e-3, "inch": 0.0254, "deg": np.pi / 180}[unit]
+    assert stage.flat()["controller.kp"] == pytest.approx(GAINS["P"] * float(force.split()[0]) / size)
+    back = gains_of(stage, {**more, "machine_unit": unit}, "linuxcnc").parameters
     assert back is not None
     assert {name: back[name] for name in GAINS} == pytest.approx(GAINS)
     assert back["MAX_ERROR_I"] == pytest.approx(0.01)
