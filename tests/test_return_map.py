@@ -26,7 +26,7 @@ from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.return_map.attracting import survey_maps
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import Landings
-from friso.hunting.what_attracts import map_may_decide, resolved_map
+from friso.hunting.what_attracts import map_may_decide, resolved_map, what_attracts
 from friso.stage import Stage
 
 DISTANCES = np.geomspace(0.01, 3.0, 400)
@@ -75,6 +75,24 @@ def test_a_slope_that_too_few_points_tell_has_no_error() -> None:
     (point,) = of_function(0.5 * (DISTANCES[::100] / 0.5) ** -0.5, DISTANCES[::100]).fixed_points()
     assert point.slope == pytest.approx(-0.5)
     assert point.error == np.inf
+
+
+@pytest.mark.parametrize(("slope", "corner", "beyond"), [(-0.95, 0.02, -1.5), (-0.97, 0.03, -1.3)])
+def test_beside_a_corner_a_slope_is_as_unsure_as_it_is_wrong(slope: float, corner: float, beyond: float) -> None:
+    u = np.unique(np.concatenate([np.arange(-0.5, 0.5, 0.03), np.arange(-0.1, 0.1, 0.01)]))
+    bent = np.where(np.abs(u) < corner, slope * u, np.sign(u) * (slope * corner + beyond * (np.abs(u) - corner)))
+    (point,) = of_function(np.exp(bent), np.exp(u)).fixed_points()
+    assert abs(point.slope) < 1 + 3 * point.error
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.1])
+def test_both_sides_of_a_map_go_on_alike(gain: float) -> None:
+    """Beyond its outermost landings it goes on if they lead inward."""
+    one = np.geomspace(0.1, 1, 30)
+    before = np.concatenate([-one[::-1], one])
+    sides = LandingMap(before, -gain * before, np.arange(60), np.ones(60, bool), False, 0)
+    assert sides.foretold(np.array([0.5, -0.5])) == pytest.approx([-0.5 * gain, 0.5 * gain])
+    assert sides.foretold(np.array([1.05, -1.05])) == pytest.approx(1.05 * 0.9 * np.array([-1, 1]) * (gain < 1))
 
 
 def test_beyond_a_flip_landings_alternate() -> None:
@@ -177,6 +195,14 @@ def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
     edge = find_margin(draw(7001, 83, "stages").variants()["locked"], attracting=False)
     assert edge is not None
     assert edge.factor < 0.46474 < edge.quiet
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("crossover", ["17.9 Hz", "17.90625 Hz", "17.9125 Hz"])
+def test_a_swing_beside_a_cycle_that_repels_is_not_taken_for_it(crossover: str) -> None:
+    """It is 2.5 % larger, and of 32 starts 13 end in it, at 1e-7 and 1e-9 (number 72 of seed 1301)."""
+    stage = draw(1301, 72).replace({"controller.crossover": crossover})
+    assert what_attracts(Ensemble.held(stage.flat(), 1)).attracts[0]
 
 
 @pytest.mark.slow

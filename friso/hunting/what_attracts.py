@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.rounds import typical_period
-from friso.hunting.attractors.survey import Swinging, of_cycles
+from friso.hunting.attractors.survey import Repelling, Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, families
 from friso.hunting.loop import winds_up_at_a_limit
@@ -41,10 +41,12 @@ def what_attracts(stages: Ensemble, rtol: float = CYCLE_RTOL, distances: np.ndar
     survey = survey_maps(stages, rtol)
     motions, decided = survey.motions, survey.resolved | survey.attracts  # a stable closed orbit proves attraction
     left = np.flatnonzero(~survey.attracts)
-    open_ = [left[~decided[left]]]
-    if (quiet := left[decided[left]]).size:
-        leaving = tuple((k, size) for k, number in enumerate(quiet) for size in _leaving(survey.mapped, int(number)))
-        runs = attractors(stages.take(quiet), cycles=False, distances=_some(distances, quiet), leaving=leaving)
+    cycles = {number: _repelling(survey.mapped, number) for number in left[decided[left]].tolist()}
+    quiet = np.array([number for number, repelling in cycles.items() if repelling is not None], np.int64)
+    open_ = [np.setdiff1d(left, quiet)]
+    if quiet.size:
+        repelling = tuple(replace(cycle, stage=k) for k, n in enumerate(quiet.tolist()) for cycle in cycles[n] or ())
+        runs = attractors(stages.take(quiet), cycles=False, distances=_some(distances, quiet), repelling=repelling)
         open_.append(quiet[runs.attracts | ~runs.decided])
     if (numbers := np.sort(np.concatenate(open_))).size:
         searched = attractors(stages.take(numbers), False, rtol, _some(distances, numbers))
@@ -59,12 +61,16 @@ def _some(distances: np.ndarray | None, numbers: np.ndarray) -> np.ndarray | Non
     return None if distances is None else distances[numbers]
 
 
-def _leaving(mapped: Mapped, stage: int) -> Iterator[float]:
-    """Yield the peak-to-peak deviations [m] of the simple cycles of a stage that surely repel by their slopes."""
+def _repelling(mapped: Mapped, stage: int) -> list[Repelling] | None:
+    """Return the simple cycles on the map of a stage, by its number; None if one of them does not surely repel."""
     landing_map, length = mapped.maps[stage], float(mapped.stages.length[stage])
+    cycles = []
     for point in landing_map.fixed_points():
-        if abs(point.slope) > 1 + settings.sure_errors * point.error:
-            yield length * (abs(point.distance) + abs(landing_map.foretold(np.array([point.distance]))[0]))
+        if not abs(point.slope) > 1 + settings.sure_errors * point.error:
+            return None
+        size = abs(point.distance) + abs(float(landing_map.foretold(np.array([point.distance]))[0]))
+        cycles.append(Repelling(stage, length * size, point.slope, point.scatter))
+    return cycles
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
@@ -105,7 +111,8 @@ def sketched(stages: Ensemble) -> Sketch:
     mapped, decided = _sketch(stages)
     if mapped is None:
         return Sketch(decided, decided)
-    return Sketch(mapped.attracts, decided)
+    surely = mapped.surely_attract
+    return Sketch(surely, decided & (surely | [not one.attractors for one in mapped.maps]))
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
@@ -132,7 +139,7 @@ def surveyed_roughly(stages: Ensemble, rtol: float = CYCLE_RTOL, close: bool = T
     motions: list[Swinging] = []
     if mapped is not None:
         swings_on = np.array([bool(one.attractors) for one in mapped.maps])
-        doubtful = decided & swings_on & ~mapped.attracts & close
+        doubtful = decided & swings_on & ~mapped.surely_attract & close
         sure = np.flatnonzero(decided & swings_on & ~doubtful)
         motions += [motion for number in sure.tolist() for motion in _seen_on_map(mapped, number)]
         if (numbers := np.flatnonzero(doubtful)).size:
@@ -182,11 +189,10 @@ def has_a_map(stages: Ensemble) -> bool:
 
     It does not in any of these cases:
 
-    - A joint swings freely while the cart sticks.
     - A force limit without anti-windup lets swings grow.
     - Integrals of several loops wind up separately.
     - The stage may stand anywhere within a dead band or a backlash.
-    - A window of the controller remembers the past.
+    - A window of the controller remembers the past, or the controller pushes beyond it.
     - Gains follow a schedule: the map bends where they do, between landings that are too far apart to show it.
 
     The result is also false where the setting `maps_decide` is.
@@ -194,4 +200,5 @@ def has_a_map(stages: Ensemble) -> bool:
     if not settings.maps_decide:
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))
-    return not (stands_anywhere or bends(stages) or winds_up_at_a_limit(stages) or stages.outer_integrals)
+    pushes = stages.chatters and stages.structure.joint != "free"
+    return not (stands_anywhere or pushes or bends(stages) or winds_up_at_a_limit(stages) or stages.outer_integrals)

@@ -15,7 +15,7 @@ from friso.engine.allowance import Exhausted
 from friso.hunting.attractors.rounds import TIGHT_SURVEY_RTOL, typical_period
 from friso.hunting.attractors.settings import settings
 from friso.hunting.attractors.starts import Starts
-from friso.hunting.attractors.survey import Leaving, Survey, Swinging
+from friso.hunting.attractors.survey import Repelling, Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, families
 from friso.hunting.loop import surely_run_away
@@ -106,7 +106,7 @@ def attractors(
     rtol: float = CYCLE_RTOL,
     distances: np.ndarray | None = None,
     cycles: bool = True,
-    leaving: tuple[Leaving, ...] = (),
+    repelling: tuple[Repelling, ...] = (),
 ) -> Attractors:
     """Find the attractors of stages, by simulation from many starts and from the return map.
 
@@ -116,7 +116,7 @@ def attractors(
     the `distances` [m], (count, n), where they are finite. Without `cycles`, a motion that has converged counts as
     attracted, and orbits are closed only from runs that have not converged by the third round.
 
-    Runs beside the cycles `leaving`, which surely repel, are not followed.
+    Runs that leave one of the cycles `repelling` are not followed.
 
     A thorough survey runs all starts at once, because eight runs together take as long as one. It also starts runs
     beside unstable cycles.
@@ -125,7 +125,7 @@ def attractors(
     decided where an orbit was closed. Other surveys raise Exhausted.
     """
     rtol = rtol if thorough else stages.searching_rtol(rtol)
-    survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=thorough, leaving=leaving)
+    survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=thorough, repelling=repelling)
     numbers = np.arange(stages.count)
     nothing, typical, suggested = np.zeros(stages.count, bool), typical_period(stages), tuple[Cycles, ...]()
     try:

@@ -174,6 +174,9 @@ class SurveySettings(Settings):
     same_motion_share: float = setting(0.05, "")
     """Largest relative difference in time and size between runs on the same motion."""
 
+    left_repetitions: int = setting(8, "")
+    """Repetitions over which the growth of a deviation tells that a run leaves a cycle. Over fewer, noise hides it."""
+
     same_irregular_share: float = setting(0.01, "of peak to peak")
     """Largest difference between irregular runs of the same kind over a long round."""
 

@@ -65,8 +65,19 @@ class Swinging:
         return -self.time / float(np.log(self.slope)) if 0 < self.slope < 1 else float("nan")
 
 
-Leaving = tuple[int, float]
-"""A simple cycle that surely repels: number of the stage, and peak-to-peak deviation [m]."""
+@dataclass(frozen=True)
+class Repelling:
+    """A simple cycle of the stage with this number that surely repels, by its slope on the return map.
+
+    `size` [m] is its peak-to-peak deviation. The `slope` is the factor, with its sign, by which a deviation grows per
+    repetition: after each swing, or after two if the stage is not symmetric. Swings scatter by the share `scatter`.
+    """
+
+    stage: int
+    size: float
+    slope: float
+    scatter: float
+
 
 _Kind = tuple[int, float, float]
 """A kind of motion: number of the stage, peak-to-peak deviation [m], and time of repetition [s]."""
@@ -148,7 +159,7 @@ class Survey:
 
     A `thorough` survey looks for every attractor. A survey that must `prove` attraction closes orbits; otherwise a
     motion that has converged counts as attracted. A survey that `decides` may take more steps. `unbounded` marks stages
-    for which divergence is no failure. Runs beside the cycles `leaving` are not followed: they leave, however slowly.
+    for which divergence is no failure. Runs that leave one of the cycles `repelling` are not followed.
 
     `attracting` lists the attractors so far. Arrays have the shape (count,). A stage is `unknown` if a run failed or
     was stopped. `slowest` [s] is the time constant of the most weakly unstable cycle (0: none). `left` counts the
@@ -161,7 +172,7 @@ class Survey:
     rtol: float
     prove: bool = True
     decides: bool = False
-    leaving: tuple[Leaving, ...] = ()
+    repelling: tuple[Repelling, ...] = ()
     attracting: list[Swinging] = field(default_factory=list)
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
@@ -234,7 +245,7 @@ class Survey:
             close_from = settings.close_from_round if self.prove else settings.regular_from_round
             swinging = self._still_swinging(runs, owners, ends, early=number < close_from)
             swinging = self._within_budget(swinging, owners, ends)
-            swinging = swinging[~self._leaves(owners, ends)[swinging]]
+            swinging = swinging[~self._leaves(runs, owners, ends)[swinging]]
             if not swinging.size:
                 return
             beside = self._beside(owners, ends)
@@ -325,11 +336,25 @@ class Survey:
         """Return which runs resemble an unstable cycle, or a motion without a stable orbit, (runs,)."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
-    def _leaves(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs swing beside a simple cycle that surely repels, (runs,)."""
-        leaves, simple = np.zeros(len(owners), bool), (ends.repeats.swings > 0) & (ends.repeats.swings <= 2)
-        for stage, size in self.leaving:
-            leaves |= (owners == stage) & simple & (np.abs(ends.repeats.size / size - 1) < settings.same_motion_share)
+    def _leaves(self, runs: Pending, owners: np.ndarray, ends: Ends) -> np.ndarray:
+        """Return which runs leave a cycle that surely repels, so slowly that they look as if they repeated, (runs,).
+
+        The difference between one swing and the next to the same side grows by the slope of the cycle each time. On
+        another cycle beside it, as one of twice the period, it does not. Differences so small that scatter hides their
+        growth count as growing.
+        """
+        leaves, repeats = np.zeros(len(owners), bool), ends.repeats
+        slow = 1 + settings.settled_swing_share / settings.same_motion_share
+        for cycle in self.repelling:
+            off = np.abs(repeats.size / cycle.size - 1)
+            near = (owners == cycle.stage) & (off < settings.same_motion_share)
+            which = np.flatnonzero(near & (repeats.swings > 0))
+            if which.size and abs(cycle.slope) < slow:
+                sizes = np.abs(ends.values[which]) if runs.mirrored[which[0]] else ends.values[which][:, 1::2]
+                apart, times = np.abs(np.diff(sizes, axis=1)), settings.left_repetitions
+                hidden = apart[:, -1] < cycle.size * cycle.scatter / (abs(cycle.slope) - 1)
+                grows = apart[:, -1] > apart[:, -1 - times] * abs(cycle.slope) ** (times / 2)
+                leaves[which] |= grows | (hidden & (off[which] < settings.settled_swing_share))
         return leaves
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:

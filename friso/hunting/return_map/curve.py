@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
+from scipy.special import ndtr, stdtrit
 
 from friso.hunting.return_map.settings import settings
 
@@ -20,9 +21,12 @@ REST_COORDINATE, FIRST_COORDINATE = -1e6, -1e9
 TERMS = 4
 """Coefficients of a cubic."""
 
+THREE_SIGMA = float(ndtr(3.0))
+"""Probability that a normally distributed error is less than three standard errors to one side."""
+
 
 @dataclass(frozen=True)
-class Curve:
+class Cubics:
     """Cubics side by side: where each begins, ascending, and its coefficients by power, (4, cubics).
 
     A cubic is one of the distance from its beginning.
@@ -48,20 +52,20 @@ class Curve:
         return self.begins.searchsorted(places, side="right") - 1
 
 
-def at_rest(begin: float) -> Curve:
+def at_rest(begin: float) -> Cubics:
     """Return the curve of a stage that rests after landings from a coordinate on."""
     return _flat(np.array([begin]), np.array([REST_COORDINATE]), 0.0)
 
 
-def curve(places: np.ndarray, after: np.ndarray) -> Curve:
+def curve(places: np.ndarray, after: np.ndarray, inward: bool) -> Cubics:
     """Return the curve through landings at ascending `places` and the next ones `after`, (points,), -inf for rest.
 
     Where the curve breaks off between two landings, each half has the gain of the nearer one. It continues a little
-    nearer to home than the first landing, and beyond the last one if that leads inward.
+    nearer to home than the first landing, and beyond the last one if that leads `inward`.
     """
     pieces = _pieces(places, after)
     ends = np.flatnonzero(np.diff(pieces)) + 1
-    parts, begin = list[Curve](), float(places[0]) - settings.scatter_range_log
+    parts, begin = list[Cubics](), float(places[0]) - settings.scatter_range_log
     for first, last in zip(np.append(0, ends), np.append(ends, len(places)), strict=True):
         here, ahead = places[first:last], after[first:last]
         if np.isfinite(ahead[0]):
@@ -69,19 +73,19 @@ def curve(places: np.ndarray, after: np.ndarray) -> Curve:
         else:
             parts.append(at_rest(begin))
         begin = float(places[last - 1] + places[min(last, len(places) - 1)]) / 2
-    inward = after[-1] < places[-1] and np.isfinite(after[-1])
-    parts.append(_flat(places[-1:], after[-1:], 1.0) if inward else at_rest(places[-1]))
+    if not (inward and np.isfinite(after[-1])):
+        parts.append(at_rest(places[-1]))
     return join(parts)
 
 
-def join(parts: list[Curve]) -> Curve:
+def join(parts: list[Cubics]) -> Cubics:
     """Return curves side by side as one."""
-    return Curve(np.concatenate([part.begins for part in parts]), np.hstack([part.terms for part in parts]))
+    return Cubics(np.concatenate([part.begins for part in parts]), np.hstack([part.terms for part in parts]))
 
 
-def _flat(begins: np.ndarray, values: np.ndarray, slope: float) -> Curve:
+def _flat(begins: np.ndarray, values: np.ndarray, slope: float) -> Cubics:
     """Return straight lines of one slope, each with its value where it begins, both (lines,)."""
-    return Curve(begins, np.array([values, np.full(len(begins), slope), *np.zeros((2, len(begins)))]))
+    return Cubics(begins, np.array([values, np.full(len(begins), slope), *np.zeros((2, len(begins)))]))
 
 
 def _pieces(places: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -98,27 +102,33 @@ def piece_about(places: np.ndarray, after: np.ndarray, place: float) -> np.ndarr
     return pieces == pieces[np.abs(places - place).argmin()]
 
 
-def _piece(places: np.ndarray, after: np.ndarray, begin: float, breaks: bool) -> list[Curve]:
+def _piece(places: np.ndarray, after: np.ndarray, begin: float, breaks: bool) -> list[Cubics]:
     """Return the curve of one continuous piece from the coordinate `begin` on, where the map `breaks` off or begins."""
     knots, values = _merged(places, after)
     slopes = _slopes(knots, values)
     fit = fitted(places, after, knots)
     values, slopes = np.where(fit.good, fit.value, values), np.where(fit.good, fit.slope, slopes)
-    inward = 1.0 if breaks else float(slopes[0])
-    before = _flat(np.array([begin]), values[:1] + inward * (begin - knots[:1]), inward)
-    after_it = _flat(knots[-1:], values[-1:], 1.0)
     apart, rise = np.diff(knots), np.diff(values)
-    with np.errstate(all="ignore"):
-        bend = (3 * rise / apart - 2 * slopes[:-1] - slopes[1:]) / apart
-        twist = (slopes[:-1] + slopes[1:] - 2 * rise / apart) / apart**2
-    return [before, Curve(knots[:-1], np.array([values[:-1], slopes[:-1], bend, twist])), after_it]
+    bend = (3 * rise / apart - 2 * slopes[:-1] - slopes[1:]) / apart
+    twist = (slopes[:-1] + slopes[1:] - 2 * rise / apart) / apart**2
+    low = values[:1] + slopes[0] * (places[0] - knots[:1])
+    high = values[-1:] + slopes[-1] * (places[-1] - knots[-1:])
+    nearer = 1.0 if breaks else slopes[0]
+    return [
+        _flat(np.array([begin]), low + nearer * (begin - places[0]), nearer),
+        _flat(places[:1], low, slopes[0]),
+        Cubics(knots[:-1], np.array([values[:-1], slopes[:-1], bend, twist])),
+        _flat(knots[-1:], values[-1:], slopes[-1]),
+        _flat(places[-1:], high, 1.0),
+    ]
 
 
 def _merged(places: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the means of landings that are so near to each other that their slope is noise."""
-    group = np.floor((places - places[0]) / settings.merged_range_log)
-    first = np.append(0, np.flatnonzero(np.diff(group)) + 1)
-    number = np.diff(np.append(first, len(places)))
+    first = [0]
+    while (end := int(places.searchsorted(places[first[-1]] + settings.merged_range_log, side="right"))) < len(places):
+        first.append(end)
+    number = np.diff([*first, len(places)])
     return np.add.reduceat(places, first) / number, np.add.reduceat(after, first) / number
 
 
@@ -130,36 +140,50 @@ def _slopes(knots: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Cubics fitted about places: value, slope, and the slope's standard error, and where they are good, (places,)."""
+class CubicFit:
+    """Cubics fitted about places, arrays of shape (places,).
+
+    They have a value, a slope with its standard error, and the landings scatter about them by `scatter`. Where they
+    are not `good`, too few landings or their scatter forbid them.
+    """
 
     value: np.ndarray
     slope: np.ndarray
     error: np.ndarray
+    scatter: np.ndarray
     good: np.ndarray
 
 
-def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> Fit:
-    """Fit cubics to the landings about coordinates `about`, (n,), of one continuous piece of a map.
+def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> CubicFit:
+    """CubicFit cubics to the landings about coordinates `about`, (n,), of one continuous piece of a map.
 
-    The landings lie within the reach at which the slope has the least standard error.
+    The landings lie within the reach at which the slope has the least standard error. The error grows by what slopes
+    within other reaches differ by beyond their own errors, as they do beside a corner. It is so large that three times
+    it are as rare as with many landings (Student's distribution).
     """
-    value, slope, error, good = (np.full(len(about), fill) for fill in (np.nan, np.nan, np.inf, False))
-    for reach in settings.fitted_reaches_log:
+    knots, _ = _merged(places, after)
+    found = np.full((4, len(settings.fitted_reaches_log), len(about)), np.nan)
+    found[2] = np.inf
+    for values, slopes, errors, scatters, reach in zip(*found, settings.fitted_reaches_log, strict=True):
         apart = (places - about[:, None]) / reach
         near = np.abs(apart) < 1
-        enough = near.sum(axis=1) >= settings.fewest_fitted
+        number, distinct = near.sum(axis=1), (np.abs(knots - about[:, None]) < reach).sum(axis=1)
+        enough = (number >= settings.fewest_fitted) & (distinct > TERMS)
         if not enough.any():
             continue
         powers = np.where(near, apart, 0.0)[:, :, None] ** np.arange(TERMS) * near[:, :, None]
         normal = np.einsum("npi,npj->nij", powers, powers)
         normal[~enough] = np.eye(TERMS)
-        inverse = np.linalg.pinv(normal, hermitian=True)
+        inverse = np.linalg.inv(normal)
         terms = np.einsum("nij,npj,p->in", inverse, powers, after)
         left = np.where(near, after - np.einsum("npi,in->np", powers, terms), 0.0)
-        variance = (left**2).sum(axis=1) / np.maximum(near.sum(axis=1) - TERMS, 1)
-        unsure = np.sqrt(variance * inverse[:, 1, 1]) / reach
-        better = enough & (np.sqrt(variance) < settings.fitted_scatter_log) & (unsure < error)
-        value[better], slope[better], error[better] = terms[0, better], terms[1, better] / reach, unsure[better]
-        good |= better
-    return Fit(value, slope, error, good)
+        freedom = np.maximum(number - TERMS, 1)
+        scatter = np.sqrt((left**2).sum(axis=1) / freedom)
+        good = enough & (scatter < settings.fitted_scatter_log)
+        error = scatter * np.sqrt(inverse[:, 1, 1]) / reach * stdtrit(freedom, THREE_SIGMA) / 3
+        values[good], slopes[good], errors[good] = terms[0, good], terms[1, good] / reach, error[good]
+        scatters[good] = scatter[good]
+    best, column = found[2].argmin(axis=0), np.arange(len(about))
+    value, slope, error, scatter = found[:, best, column]
+    misfit = np.nanmax(np.abs(found[1] - slope) - found[2], axis=0, initial=0.0, where=np.isfinite(found[1]))
+    return CubicFit(value, slope, np.hypot(error, misfit), scatter, np.isfinite(error))

@@ -16,7 +16,7 @@ from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.return_map.curve import (
     FIRST_COORDINATE,
     REST_COORDINATE,
-    Curve,
+    Cubics,
     at_rest,
     curve,
     fitted,
@@ -32,12 +32,6 @@ NEGATIVE_SIDE_SHIFT = 1e3
 
 BISECTIONS = 40
 """Halvings of an interval of coordinates, after which it is as exact as `repeated_share`."""
-
-SLOW = 1e-3
-"""Change of log distance over two landings below which a cycle is reached or left slowly."""
-
-MOST_HASTE = 40
-"""Most landings that are passed over at once where a cycle is reached or left slowly."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +54,13 @@ class FixedPoint:
 
     `distance` is that of a landing, signed, in deflections of the loop by the break-away force. `slope` is the factor
     by which a small deviation grows per repetition, with its sign, and `error` its standard error (infinite: too few
-    landings tell it).
+    landings tell it). Landings scatter about the map by the share `scatter`.
     """
 
     distance: float
     slope: float
     error: float
+    scatter: float
 
 
 @dataclass(frozen=True)
@@ -132,12 +127,13 @@ class LandingMap:
         return np.abs(self.after / self.before)
 
     @cached_property
-    def _curve(self) -> Curve:
+    def _curve(self) -> Cubics:
         """Return the map as a function of coordinates (see `_place`)."""
         parts = [at_rest(FIRST_COORDINATE)]
         for side in self.sides:
             places, after = self._going(side)
-            parts += [curve(places, after)] if places.size else []
+            if places.size:
+                parts.append(curve(places, after, bool(self.gain[self.points(side)[-1]] < 1)))
             parts.append(at_rest(NEGATIVE_SIDE_SHIFT / 2 if side > 0 else np.inf))
         return join(parts)
 
@@ -171,42 +167,40 @@ class LandingMap:
         begins = begins[np.abs(begins) < NEGATIVE_SIDE_SHIFT / 2]
         places = np.sort(np.concatenate([begins, (begins[1:] + begins[:-1]) / 2]))
         off = self._repeated(places) - places
-        k = np.flatnonzero(off[:-1] * off[1:] <= 0)
+        k = np.flatnonzero((off[:-1] * off[1:] <= 0) & (off[1:] != 0))
         low, high, rises = places[k], places[k + 1], off[k] > 0
         for _ in range(BISECTIONS):
             at = (low + high) / 2
             below = (self._repeated(at) > at) == rises
             low, high = np.where(below, at, low), np.where(below, high, at)
         for at in low[np.abs(self._repeated(low) - low) < return_map_settings.repeated_share]:  # not a break of the map
-            slope, error, place = 1.0, 0.0, at
+            slope, error, scatter, place = 1.0, 0.0, 0.0, np.array([at])
             for _ in self.sides:
-                one, unsure = self._slope(place)
-                slope, error = slope * one, float(np.hypot(error * one, slope * unsure))
-                place = float(self.next(np.array([place]))[0])
-            yield FixedPoint(float(_distance(np.array([at]))[0]), slope, error)
+                places, after = self._going(-1.0 if place[0] > NEGATIVE_SIDE_SHIFT / 2 else 1.0)
+                near = piece_about(places, after, float(place[0]))
+                fit = fitted(places[near], after[near], place)
+                one = float((fit.slope if fit.good[0] else self._curve.slope(place))[0])
+                slope, error = slope * one, float(np.hypot(error * one, slope * fit.error[0]))
+                scatter, place = max(scatter, float(np.nan_to_num(fit.scatter[0]))), self.next(place)
+            yield FixedPoint(float(_distance(np.array([at]))[0]), slope, error, scatter)
 
-    def _slope(self, place: float) -> tuple[float, float]:
-        """Return the slope of the map at a coordinate, and its standard error, infinite if too few landings tell it."""
-        places, after = self._going(-1.0 if place > NEGATIVE_SIDE_SHIFT / 2 else 1.0)
-        near = piece_about(places, after, place)
-        fit = fitted(places[near], after[near], np.array([place]))
-        if fit.good[0]:
-            return float(fit.slope[0]), float(fit.error[0])
-        return float(self._curve.slope(np.array([place]))[0]), np.inf
-
-    def _hastened(self, at: np.ndarray) -> np.ndarray:
+    def _moved_on(self, at: np.ndarray) -> np.ndarray:
         """Move coordinates along where every second landing hardly moves: half-way to a cycle, or away from it.
 
         Two landings later, a small distance x to a cycle has become s x. Where s is near 1, coordinates move on by
-        x / 2, the way that landings go, so that they reach or leave the cycle soon, but no farther than in `MOST_HASTE`
-        landings.
+        x / 2, the way that landings go, so that they reach or leave the cycle soon, but no farther than in the most
+        landings that may be passed over.
         """
         after = self.next(at)
         slope = self._curve.slope(at) * self._curve.slope(after)
         step = self.next(after) - at
         with np.errstate(all="ignore"):
-            times = np.minimum(0.5 / np.abs(1 - slope), MOST_HASTE / 2)
-        return np.where((times > 1) & (at > REST_COORDINATE) & (np.abs(step) < SLOW), at + times * step, at)
+            times = np.minimum(0.5 / np.abs(1 - slope), return_map_settings.most_passed_landings / 2)
+        return np.where(
+            (times > 1) & (at > REST_COORDINATE) & (np.abs(step) < return_map_settings.slow_move_log),
+            at + times * step,
+            at,
+        )
 
     @cached_property
     def _nearest(self) -> float:
@@ -224,10 +218,11 @@ class LandingMap:
     def surely_attracts(self) -> bool:
         """Whether the map has an attractor that can be trusted though its points are few.
 
-        It is a stable simple cycle, or a longer one that is strongly stable and reached from enough points. Other
-        motions that go on may come from gaps between points.
+        It is a simple cycle that is surely stable, or any one that is strongly stable and reached from enough points.
+        Other motions that go on may come from gaps between points.
         """
-        return any(abs(point.slope) < 1 for point in self.fixed_points()) or any(
+        sure = return_map_settings.sure_errors
+        return any(abs(point.slope) + sure * point.error < 1 for point in self.fixed_points()) or any(
             one.periodic
             and one.basin.size >= return_map_settings.least_arriving_points
             and self.slope(one) <= return_map_settings.hardly_attracting_share
@@ -245,10 +240,10 @@ class LandingMap:
         for _ in range(return_map_settings.iteration_doublings):
             at = paths[left, -1]
             for number in range(iterations):
-                if number % return_map_settings.hastened_landings == 0:
+                if number % return_map_settings.move_on_landings == 0:
                     if np.all(at <= REST_COORDINATE):
                         break
-                    at = self._hastened(at)
+                    at = self._moved_on(at)
                 at = self.next(at)
             for k in range(landings):
                 paths[left, k], at = at, self.next(at)

@@ -47,8 +47,8 @@ class Mapped:
         return LandingMap.of(self.landings.take(which), length, symmetric).renumbered(which)
 
     @property
-    def attracts(self) -> np.ndarray:
-        """Return which stages have a map on which swings continue for ever, shape (count,)."""
+    def surely_attract(self) -> np.ndarray:
+        """Return which stages have an attractor on their map that can be trusted, shape (count,)."""
         return np.array([landing_map.surely_attracts for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:

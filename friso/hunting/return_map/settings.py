@@ -94,7 +94,8 @@ class ReturnMapSettings(Settings):
     corner only the narrowest fits."""
 
     fewest_fitted: int = setting(7, "landings")
-    """Fewest landings to which a cubic is fitted, three more than it has coefficients."""
+    """Fewest landings to which a cubic is fitted, three more than it has coefficients. They form more points than it
+    has coefficients, too."""
 
     fitted_scatter_log: float = setting(0.01, "")
     """Scatter of landings about a fitted cubic beyond which the map goes through the landings themselves."""
@@ -105,8 +106,14 @@ class ReturnMapSettings(Settings):
     iteration_doublings: int = setting(3, "")
     """Doublings of the iterations for maps that leave a cycle slowly."""
 
-    hastened_landings: int = setting(4, "landings")
-    """Landings after which a slow approach to a cycle, or a slow leave, is hastened."""
+    move_on_landings: int = setting(4, "landings")
+    """Landings after which distances that hardly change are moved on."""
+
+    most_passed_landings: int = setting(40, "landings")
+    """Most landings that are passed over at once. Over more, the slope of the map changes."""
+
+    slow_move_log: float = setting(1e-3, "")
+    """Change of log distance over two landings below which it hardly changes."""
 
     repeated_share: float = setting(1e-9, "")
     """Largest error of a repetition that is exact. Beside a break of the map a landing differs by more."""
