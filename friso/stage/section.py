@@ -53,6 +53,9 @@ def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
     return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
+UNKNOWN = "unknown"
+"""What a file writes for a value that nobody knows."""
+
 MOST_KEYS = 100
 """Largest number of keys of a table, unknown ones included, because the nearest known key is searched for each unknown
 one."""
@@ -69,6 +72,11 @@ class Section(BaseModel):
     rules: ClassVar[tuple[Rule, ...]] = ()
     refusal: ClassVar[type[InputError]] = InputError
     """The error raised by this section and the sections within it."""
+
+    @classmethod
+    def otherwise(cls, key: str) -> str:
+        """Return what else a numeric key takes besides its values, after a semicolon; "" for nothing."""
+        return ""
 
     def __init__(self, /, **data: Any) -> None:
         self._take(data, LINEAR)
@@ -115,6 +123,8 @@ class UncertainSection(Section):
     @classmethod
     def _read_uncertain(cls, value: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         key, text, kind = str(info.field_name), getattr(value, "text", value), info.context or LINEAR
+        if isinstance(value, UncertainValue) and text == UNKNOWN:
+            return value
         if (field := numeric_fields(cls).get(key)) and is_range(text):
             return uncertain_value(text, field.on(kind))
         if several := list_fields(cls).get(key):
@@ -365,7 +375,7 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
-        return _complete(cause, key)
+        return _complete(cause, key, cls.otherwise(str(problem["loc"][0])) if problem["loc"] else "")
     if not problem["loc"]:  # no key has a wrong value: the mistake is friso's own
         raise cause or ValueError(problem["msg"])
     if problem["type"] == "extra_forbidden":
@@ -380,14 +390,14 @@ def _own_first(cls: type[Section]) -> list[str]:
     return [name for name in dict.fromkeys(declared) if name in cls.model_fields]
 
 
-def _complete(error: InputError, key: str) -> InputError:
-    """Put the key of the table before the key of an error that occurred in it.
+def _complete(error: InputError, key: str, otherwise: str) -> InputError:
+    """Put the key of the table before the key of an error that occurred in it, and say what is `otherwise` taken.
 
     `key` is also put before an example that is a mere value.
     """
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
-    return InputError(error.key, error.actual, error.expected, example, also=error.also).under(key)
+    return InputError(error.key, error.actual, f"{error.expected}{otherwise}", example, also=error.also).under(key)
 
 
 def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
@@ -400,7 +410,7 @@ def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
             return f"an array of tables [[{key}]]", item.example
         if hasattr(item, "written_example"):
             item = item.on(kind) if hasattr(item, "on") else item
-            return item.expected, f"{key} = {item.written_example}"
+            return f"{item.expected}{cls.otherwise(key)}", f"{key} = {item.written_example}"
     type_ = next((part for part in get_args(field.annotation) if part is not NoneType and get_args(part)), None)
     type_ = type_ or next((part for part in get_args(field.annotation) if part in (bool, str)), field.annotation)
     if type_ is bool:

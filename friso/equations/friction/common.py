@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 COULOMB_BELOW_STATIC = Rule(
     ("friction.coulomb", "friction.static"),
     lambda flat: flat["friction.coulomb"] <= flat["friction.static"],
-    expected="Coulomb friction no larger than static friction",
+    expected='Coulomb friction no larger than static friction; static = "unknown" follows it',
     example='static = "3 N", coulomb = "1 N"',
 )
 
