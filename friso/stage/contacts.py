@@ -203,12 +203,13 @@ def guessed_ratios(stage: Stage) -> dict[str, tuple[str, Interval]]:
     if not open_keys:
         return {}
     pairs = (("static", "coulomb", "ratio"), ("bristle_damping", "bristle_stiffness", "settling"))
-    return {
-        f"{table}.{key}": (f"{table}.{lead}", Interval(*getattr(_contact_of(stage, table), ends), ""))
-        for table in FRICTIONS
-        for key, lead, ends in pairs
-        if {f"{table}.{key}", f"{table}.{lead}"} <= open_keys
-    }
+    found = {}
+    for table in FRICTIONS:
+        for key, lead, name in pairs:
+            if {f"{table}.{key}", f"{table}.{lead}"} <= open_keys:
+                low, high = getattr(_contact_of(stage, table), name)
+                found[f"{table}.{key}"] = f"{table}.{lead}", Interval(low, high, "")
+    return found
 
 
 def _contact_of(stage: Stage, table: str = "friction") -> ContactKind:

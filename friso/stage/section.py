@@ -1,7 +1,7 @@
 """Define the base of all stage-file tables: strict keys, errors, rules, and variants."""
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from types import NoneType
@@ -72,6 +72,8 @@ class Section(BaseModel):
     rules: ClassVar[tuple[Rule, ...]] = ()
     refusal: ClassVar[type[InputError]] = InputError
     """The error raised by this section and the sections within it."""
+    among: ClassVar["Variants | None"] = None
+    """The sections told apart from this one by its tag, if there are others."""
 
     @classmethod
     def otherwise(cls, key: str) -> str:
@@ -226,6 +228,11 @@ class Variants:
         load_own(self.group)
         return self._classes
 
+    @property
+    def forms(self) -> Mapping[str, Sequence[type[Section]]]:
+        """Return the classes of the sections by name, of which a name may have several."""
+        return {name: [cls] for name, cls in self.classes.items()}
+
     def name_of(self, cls: type[Section]) -> str:
         """Return the name that a class declares, "step" for `kind: Literal["step"]`."""
         return get_args(cls.model_fields[self.tag].annotation)[0]
@@ -241,6 +248,7 @@ class Variants:
             expected = f"a name that is not taken: {holder.__module__}.{holder.__qualname__} has it"
             raise InputError(self.tag, actual, expected, f'{self.tag}: Literal["my_{name}"]')
         self._classes[name] = cls
+        cls.among = self
         if self.group:
             own_first = sorted(
                 self._classes.items(), key=lambda item: (not item[1].__module__.startswith("friso."), item[0])
@@ -260,6 +268,11 @@ class Variants:
         name = table.get(self.tag)
         if isinstance(name, str) and (cls := self.named(name)):
             return cls
+        if name is None:
+            keys = {key: cls for several in self.forms.values() for cls in several for key in cls.model_fields}
+            typos = [(key, near) for key in {*table} - {*keys} if (near := nearest_name(key, keys))]
+            for key, near in sorted(typos)[:1]:  # of a key that decides alone what is read, such as a guess
+                raise unknown_key(key, keys, _described(keys[near], near, LINEAR)[1])
         example = nearest_name(name, self.classes) or next(iter(self.classes))
         expected = f"one of {', '.join(map(as_toml, self.classes))}"
         raise InputError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")
@@ -379,9 +392,28 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     if not problem["loc"]:  # no key has a wrong value: the mistake is friso's own
         raise cause or ValueError(problem["msg"])
     if problem["type"] == "extra_forbidden":
+        if other := _of_another(cls, key):
+            return other
         near = nearest_name(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, _own_first(cls), _described(cls, near, kind)[1])
     return InputError(key, quoted(problem["input"]), *_described(cls, key, kind))
+
+
+def _of_another(cls: type[Section], key: str) -> InputError | None:
+    """Make the error for an unknown key that a section told apart from this one by its tag has, exactly or nearly."""
+    if cls.among is None:
+        return None
+    keys = {name: form for several in cls.among.forms.values() for form in several for name in form.model_fields}
+    near = key if key in keys else None if nearest_name(key, cls.model_fields) else nearest_name(key, keys)
+    if near is None:
+        return None
+    tag, owner = cls.among.tag, cls.among.name_of(keys[near])
+    did_you_mean = "" if near == key else f"; did you mean {near}?"
+    of_other = f"{tag} = {as_toml(owner)}"
+    own = [name for name in _own_first(cls) if cls.model_fields[name].is_required() and name != tag]
+    such = f", such as {', '.join(own)}" if own else ""
+    expected = f"a key of {tag} = {as_toml(cls.among.name_of(cls))}{such}; {near} belongs to {of_other}"
+    return InputError(key, f"an unknown key{did_you_mean}", expected, of_other)
 
 
 def _own_first(cls: type[Section]) -> list[str]:
@@ -416,6 +448,6 @@ def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
     if type_ is bool:
         return "true or false", f"{key} = true"
     if type_ is str:
-        return "a text in quotes", f'{key} = "Thesis rig"'
+        return "a text in quotes", f"{key} = {as_toml((field.examples or ['Thesis rig'])[0])}"
     choices = [as_toml(choice) for choice in get_args(type_) if choice]
     return f"one of {', '.join(choices)}", f"{key} = {choices[0]}"

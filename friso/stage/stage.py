@@ -466,7 +466,7 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any], derived_from_
                 replaced = Stage(**tables)
             except StageError as other:
                 raise error if other.key == CONTROLLER else _of_another_form(other, changes, others) from None
-            LOGGER.warning(f"[controller] is of another form now: {', '.join(others)} are gone")
+            LOGGER.warning(f"[controller] is of another form now: {', '.join(others)} are gone", extra={"after": True})
             return replaced
         begun = [key for key in changes if key.startswith(f"{name}.")]
         if name in own or not begun or not error.actual.startswith("nothing"):
