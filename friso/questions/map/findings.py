@@ -318,10 +318,11 @@ def facts(runs: xr.Dataset, metric: str) -> list[tuple[str, list[str]]]:
 
 def basis(runs: xr.Dataset) -> str:
     """Say how the runs were made, and by which rules they are judged."""
+    counted = "peaks" in runs and bool((runs["peaks"] > 0).any())
+    beside = f", and peaks are maxima of the position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2)" * counted
     return (
         f", relative tolerance {float(runs.attrs['rtol']):g}. Outcomes tell what each run does at its end, verdicts "
-        "are on the stage by what attracts it, from fewer starts than friso check tries, and peaks are maxima of the "
-        f"position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2)"
+        f"are on the stage by what attracts it, from fewer starts than friso check tries{beside}"
     )
 
 
