@@ -53,6 +53,11 @@ class Interval:
         return (self.low + self.high) / 2
 
     @property
+    def middle(self) -> float:
+        """Return the centre, which is that of the logarithm for a range over orders of magnitude."""
+        return self.evenly(0.5) if self.wide else self.centre
+
+    @property
     def wide(self) -> bool:
         """Tell whether the range spans orders of magnitude, so that its logarithm is taken as uniform."""
         return self.form == "range" and self.low > 0 and self.high > WIDE_RATIO * self.low
@@ -150,7 +155,7 @@ def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
     except _Refused as refused:
         expected = f'{of.expected}; or with its uncertainty, "VALUE +/- HALF-WIDTH" or "LOW .. HIGH"'
         raise InputError("", quoted(text, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
-    return UncertainValue(interval.evenly(0.5) if interval.wide else centre, text, interval)
+    return UncertainValue(interval.middle if interval.wide else centre, text, interval)
 
 
 class _Refused(Exception):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from pages import Page, packed_values
 from patched import patched
 from snapshots import Snapshots
 
+import friso
 from friso.hunting import (
     AttractionEnd,
     BandwidthWindow,
@@ -50,10 +52,12 @@ from friso.questions.check.cases import case_document, rows, rows_behind
 from friso.questions.check.figures import check_figures
 from friso.questions.check.words import answer, conclusion, details_sentences, edge_text, verdict_sentence
 from friso.shown import files, pages
+from friso.shown.blocks import AnswerBlock
 from friso.shown.cases import ShownCase, shown_cases
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.shown.loop_words import UNSTABLE_AS_BUILT
+from friso.stage import Stage
 
 # ---------------------------------------------------------------- figures of a check
 
@@ -447,3 +451,21 @@ def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:
     centre, bound = float(value) * (1e-3 if unit == "mHz" else 1.0), float(share) / 100
     for end in (1 - reserve, 1 + reserve):
         assert abs(edge * end / centre - 1) <= bound * (1 + 1e-6) + 2e-6
+
+
+def test_a_table_leaves_out_rows_of_zeros_and_dashes() -> None:
+    rows = [("Edge", ["–", "–"]), ("Cells", ["0", "–"]), ("Peaks", ["0", "2"]), ("Verdict", ["0 of 5", "–"])]
+    assert [name for name, _ in AnswerBlock(rows=rows).rows] == ["Peaks", "Verdict"]
+
+
+@pytest.mark.slow
+def test_the_thesis_s_peaks_are_spoken_of_only_where_some_are_counted(rig: Stage) -> None:
+    """A run of 6 s ends before any peak counts."""
+    short = rig.replace({"joint.locked": True, "motion.duration": "6 s"})
+    for stage, counted in ((short, False), (rig.replace({"joint.locked": True}), True)):
+        page = friso.check(stage).files()["report.html"]
+        assert ("higher than 0.1 mm" in page) is counted
+
+
+def test_the_template_is_the_user_s_own(tmp_path: Path) -> None:
+    assert not friso.load(friso.init(tmp_path / "mine.toml")).source

@@ -1,6 +1,7 @@
 """Test the command line: what it prints, its exit status, what it writes."""
 
 import copy
+import io
 import json
 import subprocess
 import sys
@@ -240,3 +241,18 @@ def test_a_path_with_blanks_that_lacks_its_quotes_is_told(tmp_path: Path, comman
     done = friso_inside(tmp_path, command, "my", "rig.toml")
     assert done.returncode == 2
     assert "needs quotes: 'my rig.toml'" in done.stderr.replace('"', "'")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["bode", "map"])
+def test_a_notice_on_an_input_comes_once_after_the_answer(command: str, tmp_path: Path) -> None:
+    uncertain = ["--set", "friction.static=3 N .. 4 N", "--set", "joint.locked=true"]
+    axes = ["--x", "controller.crossover=8 Hz..12 Hz:2"] * (command == "map")
+    both = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("inside.io.StringIO", lambda: both)
+        run(command, ROOT / "examples/thesis_rig.toml", *uncertain, *axes, cwd=tmp_path)
+    lines = both.getvalue().splitlines()
+    notices = [number for number, line in enumerate(lines) if "uncertain" in line]
+    assert len(notices) == 1
+    assert notices[0] > next(number for number, line in enumerate(lines) if "hunts" in line or "phase" in line)

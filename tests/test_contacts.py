@@ -9,15 +9,22 @@ from friso.axis import KINDS
 from friso.identification.estimate import Estimate
 from friso.identification.stage_file import CHOSEN, with_unknown
 from friso.interface.inputs import correlations_of
-from friso.stage import Stage
-from friso.stage.contacts import any_contact, contacts
+from friso.stage import Stage, loads
+from friso.stage.contacts import FRICTIONS, any_contact, contacts
 from friso.stage.correlations import draw
+from friso.stage.tables import USUAL
 
 GUESSED = {
     "masses": {"cart": "12 kg"},
     "friction": {"guess": "recirculating ball, size 25, light preload, 4 carriages"},
     "controller": {"kind": "pid", "crossover": "20 Hz", "alpha": 0.1, "beta": 2},
     "motion": {"kind": "step", "size": "1 mm", "duration": "5 s"},
+}
+
+SCREW = {
+    "transmission": {"mass": "2 kg", "stiffness": "120 N/um", "damping": "2e3 N*s/m"},
+    "encoder": {"position": "load", "velocity": "motor"},
+    "friction": {"model": "none"},
 }
 
 
@@ -85,3 +92,56 @@ def test_what_a_log_does_not_show_becomes_a_range_that_holds_the_file_s_own_valu
     assert both[damping].high / both[key].high <= 5e-3 * 1.01
     nothing = with_unknown(rig, origins | {"friction.static": CHOSEN}, ["friction.static", "friction.coulomb"], [])
     assert nothing.assumed_keys == ("friction.static", "friction.coulomb")
+
+
+@pytest.mark.parametrize(
+    ("friction", "contact"),
+    [
+        (
+            {"model": "lugre", **dict.fromkeys(USUAL, "unknown"), "stribeck_exponent": 2, "coulomb": "8 N"},
+            "contact bearing",
+        ),
+        ({"guess": "ball screw", "static": "unknown", "coulomb": "8 N"}, "ball screw"),
+        ({"guess": "ball screw", "coulomb": "8 N"}, "ball screw"),
+    ],
+)
+def test_unknown_means_the_range_of_the_contact(friction: dict[str, str], contact: str) -> None:
+    """The file keeps the word, a value that is set is known, and one that friso computes stays unknown."""
+    stage = Stage(**GUESSED | {"friction": friction})
+    interval, ends = stage.uncertain()["friction.static"], contacts()[contact].ratio
+    assert (interval.low, interval.high) == pytest.approx((8 * ends[0], 8 * ends[1]))
+    assert {*stage.unknown_keys} == {f"friction.{key}" for key in USUAL if key != "coulomb"}
+    assert not stage.doubt
+    assert stage.as_written()["friction"]["static"] == "unknown"
+    assert loads(stage.to_toml()) == stage
+    assert "friction.static" not in stage.replace({"friction.static": "9 N"}).unknown_keys
+    assert "friction.static" in stage.with_numbers({"friction.static": 9.0}).unknown_keys
+    assert (
+        "friction.static"
+        in stage.replace({"friction.static": "9 N"}).replace({"friction.static": "unknown"}).unknown_keys
+    )
+
+
+@pytest.mark.parametrize(
+    ("stated", "lead", "follows"),
+    [
+        ({"coulomb": "8 N"}, "coulomb", True),
+        ({"coulomb": "6 N .. 10 N"}, "coulomb", True),
+        ({"static": "12 N"}, "static", True),
+        ({"static": "12 N"}, "coulomb", True),
+        ({}, "coulomb", True),
+        ({"coulomb": "8 N"}, "static", False),
+    ],
+)
+@pytest.mark.parametrize("table", FRICTIONS)
+def test_a_guessed_value_follows_the_key_it_was_guessed_from(
+    stated: dict[str, str], lead: str, follows: bool, table: str
+) -> None:
+    """A sweep over that key gives the stages that a file with each value would; over another key, nothing changes."""
+    stage = Stage(**GUESSED | SCREW | {table: GUESSED["friction"] | stated})
+    swept = stage.flat({f"{table}.{lead}": np.array([10.0, 11.0])})
+    for k, value in enumerate((10.0, 11.0)):
+        of_file = stage.replace({f"{table}.{lead}": f"{value} N"})
+        numbers = {key: item for key, item in of_file.flat().items() if isinstance(item, float)}
+        assert {key: np.broadcast_to(swept[key], 2)[k] for key in numbers} == pytest.approx(numbers)
+    assert (np.ndim(swept[f"{table}.bristle_stiffness"]) == 1) is follows

@@ -49,3 +49,9 @@ def test_completion_of_an_answer_shows_nothing_private(tmp_path: Path) -> None:
     shown = dir(friso.logs(tmp_path / "a.csv"))
     assert {"plot", "report", "to_dict"} <= {*shown}
     assert not [name for name in shown if name.startswith("_") and not name.startswith("__")]
+
+
+@pytest.mark.parametrize("given", [[{"joint.locked": True}], []], ids=["by place", "by keyword"])
+def test_changes_given_to_load_are_answered_with_the_way_to_set_keys(given: list[dict[str, bool]]) -> None:
+    with pytest.raises(TypeError, match=r"load\(\).*friso\.load\(path\)\.replace\({"):
+        friso.load(friso.example("thesis_rig"), *given, **({} if given else {"set": {"joint.locked": True}}))  # type: ignore[call-arg]

@@ -165,3 +165,24 @@ def test_cells_without_a_verdict_are_on_no_side_of_an_edge(locked: Stage) -> Non
 def test_a_name_that_links_use_is_free(locked: Stage) -> None:
     study = Request(locked, {"speed": [0.5, 1.0]}, None, {"controller.crossover": "8*speed"}).study()
     assert study.cell_stage([0]).controller.crossover == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "crossover", "grey", "title"),
+    [
+        ({}, "20 Hz..40 Hz:3", True, "in the"),
+        ({}, "4 Hz..40 Hz:5", True, "has an answer"),
+        ({"friction.static": "unknown"}, "20 Hz..40 Hz:3", False, "on this map"),
+    ],
+)
+def test_no_title_speaks_for_cells_without_an_answer(
+    locked: Stage, changes: dict[str, str], crossover: str, grey: bool, title: str
+) -> None:
+    """Static friction that nobody knows follows a swept Coulomb friction, which leaves no cell without an answer."""
+    axes = {"friction.coulomb": "0.5 N..6 N:5", "controller.crossover": crossover}
+    answer = friso.sweep(locked.replace(changes), axes)
+    assert bool((answer.data["sketch"] == "invalid").any()) is grey
+    assert title in message(answer.data, "sketch", None)
+    assert answer.condition.count("friction.static follows friction.coulomb") == (not grey)
+    if not grey:
+        assert answer.cell(4, 0).flat()["friction.static"] == pytest.approx(12)  # 1 to 3 times 6 N

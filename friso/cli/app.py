@@ -145,12 +145,33 @@ def _status() -> int:
     return status
 
 
+class Notices(logging.StreamHandler[Any]):
+    """Writes messages as they come, but each of those on inputs once, when the answer stands."""
+
+    def __init__(self) -> None:
+        super().__init__(sys.stderr)
+        self.held: dict[str, logging.LogRecord] = {}
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a message, or hold it."""
+        if getattr(record, "after", False):
+            self.held.setdefault(record.getMessage(), record)
+        else:
+            super().emit(record)
+
+    def tell(self) -> None:
+        """Write what was held."""
+        sys.stdout.flush()
+        for record in self.held.values():
+            super().emit(record)
+
+
 def _run() -> int:
     """Run the command and return its status.
 
     Only the named command is loaded, because the options of all commands take seconds to build.
     """
-    messages, log = logging.StreamHandler(sys.stderr), logging.getLogger("friso")
+    messages, log = Notices(), logging.getLogger("friso")
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     log.addHandler(messages)
     try:
@@ -166,6 +187,7 @@ def _run() -> int:
         return copy_context().run(app, standalone_mode=False) or 0
     finally:  # another run in this process may have another standard error
         log.removeHandler(messages)
+        messages.tell()
 
 
 def _function_of(command: str) -> Callable[..., None] | None:

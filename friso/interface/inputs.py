@@ -87,7 +87,7 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
     if changes is not None and not isinstance(changes, Mapping):
         in_units = stage.in_own_units(wanted)
         for key in (key for key, value in wanted.items() if in_units[key] != value):
-            LOGGER.warning(f"{key}={wanted[key]} is taken as {in_units[key]}")
+            note(f"{key}={wanted[key]} is taken as {in_units[key]}")
         wanted = in_units
     return stage.replace(wanted) if wanted else stage
 
@@ -95,6 +95,11 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
 def file_of(source: StageLike, changes: Changes = None) -> str:
     """Return the path of a stage file as a word of a command line; "" for another source, or with changed keys."""
     return "" if isinstance(source, Stage | Mapping) or changes_of(changes) else shell_word(str(source))
+
+
+def note(text: str, **marks: bool) -> None:
+    """Log what is to be known about an input; the command line says it once, after the answer."""
+    LOGGER.warning(text, extra={"after": True, **marks})
 
 
 def tables_of(source: StageLike) -> dict[str, Any]:
@@ -131,17 +136,15 @@ def read_stage(
     """
     stage = stage_of(source, changes)
     for doubt in (*implausible_values(stage), *idle_encoder(stage)):
-        LOGGER.warning(doubt)
+        note(doubt)
     keys = [] if uncertain_too else [*stage.uncertain()]
     if keys:
         several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"
         named = ", ".join([*keys[:MOST_NAMED], *(["..."] if len(keys) > MOST_NAMED else [])])
         centres = "their centres are" if len(keys) > 1 else "its centre is"
-        LOGGER.warning(
-            f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range"
-        )
+        note(f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range")
     if left := left_out(stage, leaves_out):
-        LOGGER.warning(left)
+        note(left)
     return stage
 
 
@@ -153,7 +156,7 @@ def mention_sampling(stage: Stage) -> None:
     stated = stage.flat().get("drive.sample_time")
     every = with_unit(stated or SAMPLE_TIME, "s")
     usual = "" if stated else ", as drive.sample_time is not given"
-    LOGGER.warning(f"runs are of the machine as built: its controller samples every {every}{usual}")
+    note(f"runs are of the machine as built: its controller samples every {every}{usual}")
 
 
 def mention_unstable_loop(stage: Stage) -> None:
@@ -165,7 +168,7 @@ def mention_unstable_loop(stage: Stage) -> None:
     from friso.shown.loop_words import unstable_loop
 
     for sentence in unstable_loop(unstable(stage)):
-        LOGGER.warning(sentence.removesuffix("."), extra={"meanwhile": True})
+        note(sentence.removesuffix("."), meanwhile=True)
 
 
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from friso.quantities import NOTHING
 
 if TYPE_CHECKING:
     from friso.shown.drawing.figure import Figure
@@ -23,6 +25,14 @@ class ColouredLabel(Protocol):
     def colour(self) -> str:
         """Return the colour, which the page shows beside the heading."""
         ...
+
+
+Row = TypeVar("Row", bound=tuple[str, Sequence[str]])
+
+
+def filled(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows of a table without those that have nothing but dashes and zeros."""
+    return [row for row in rows if not {*row[1]} <= {NOTHING, "0"}]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +73,10 @@ class AnswerBlock:
 
     numbers: Callable[[], Mapping[str, Any]] = dict
     """Function that returns what the block adds to the JSON document, in SI, with the unit in each key's suffix."""
+
+    def __post_init__(self) -> None:
+        """Leave out the empty rows of the table."""
+        object.__setattr__(self, "rows", filled(self.rows))
 
     @property
     def labels(self) -> list[str]:

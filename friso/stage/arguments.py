@@ -248,18 +248,25 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
         if parameter.kind is not parameter.VAR_KEYWORD
     }
 
+    makes_stage = str(parameters.return_annotation).rpartition(".")[2].strip("'>") == "Stage"
     takes_no_others = len(kinds) == len(parameters.parameters)
 
     @wraps(function)
     def call(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
         """Check the arguments, then call the function."""
+        extra = [
+            *arguments[len(parameters.parameters) :],
+            *map(options.get, options.keys() - parameters.parameters.keys()),
+        ]
+        changes = '; keys are set so: friso.load(path).replace({"joint.locked": True})'
+        how = changes if makes_stage and any(isinstance(value, Mapping) for value in extra) else ""
         if unknown := options.keys() - parameters.parameters.keys() if takes_no_others else ():
             nearest = near_words(min(unknown), parameters.parameters)
-            raise TypeError(f"{function.__name__}() has no keyword {min(unknown)!r}{nearest}")
+            raise TypeError(f"{function.__name__}() has no keyword {min(unknown)!r}{how or nearest}")
         try:
             bound = parameters.bind(*arguments, **options)
         except TypeError as error:
-            raise TypeError(f"{function.__name__}(): {error}") from None
+            raise TypeError(f"{function.__name__}(): {error}{how}") from None
         for name, value in bound.arguments.items():
             _check(name, value, kinds.get(name, {}), "set" in kinds)
             if "Stage" in kinds.get(name, {}) and not isinstance(value, Stage):

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, StageError
-from friso.intervals import WIDE_RATIO, Interval, is_range, uncertain_value
+from friso.intervals import WIDE_RATIO, Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Quantity, positive, quoted
-from friso.stage.section import nearest_name, numeric_fields
-from friso.stage.tables import FRICTION
+from friso.stage.section import UNKNOWN, nearest_name, numeric_fields
+from friso.stage.tables import FRICTION, MOTOR_FRICTION, USUAL
 
 if TYPE_CHECKING:
     from friso.stage.stage import Stage
@@ -24,6 +24,14 @@ ContactRange = tuple[float, float]
 """Lowest and highest value of a range [SI]."""
 
 _FORCE = Quantity("N", positive, "5 N")
+
+FRICTIONS = ("friction", MOTOR_FRICTION)
+"""Tables of a stage file that state friction."""
+
+_HOW_LARGE = (
+    "static or Coulomb friction, if only as a wide range, or a guess with the size of the contact; without [friction], "
+    "friso check says from which friction on such machines hunt"
+)
 
 _EXAMPLE = 'guess = "recirculating ball, size 25, light preload, 4 carriages"'
 
@@ -99,31 +107,65 @@ def any_contact(axis: AxisKind) -> ContactKind:
 
 
 def with_guess(tables: Mapping[str, Any], axis: AxisKind) -> dict[str, Any]:
-    """Complete the tables of a stage file whose [friction] has a `guess`, which names the contact.
+    """Complete the tables of a stage file in which friction is "unknown", or has a `guess`, which names the contact.
 
-    Keys that the file lacks get ranges, and stand in the list of what is unknown. Tables without a guess stay as they
-    are. Raises StageError for a guess that is not understood, or that leaves open how large the friction is.
+    Keys that are "unknown", and those that a table with a guess lacks, get ranges. Other tables stay as they are.
+    Raises StageError for a guess that is not understood, or if nothing says how large the friction is.
     """
-    friction = tables.get("friction")
-    if not isinstance(friction, Mapping) or not isinstance(friction.get("guess"), str):
-        return {**tables}
-    contact, drag = _understood(friction["guess"], axis)
+    frictions = {name: table for name in FRICTIONS if isinstance(table := tables.get(name), Mapping)}
+    return {**tables, **{name: _with_ranges(name, table, axis) for name, table in frictions.items()}}
+
+
+def _with_ranges(name: str, friction: Mapping[str, Any], axis: AxisKind) -> Mapping[str, Any]:
+    """Return a table of friction with ranges for the keys that nobody knows; `name` is that of the table."""
+    guess = friction.get("guess")
+    asked = {key for key, value in friction.items() if getattr(value, "text", value) == UNKNOWN}
+    if not asked and not isinstance(guess, str):
+        return friction
+    contact, drag = _understood(guess, axis, name) if isinstance(guess, str) else (any_contact(axis), None)
     table = {"model": "lugre", **friction}
-    law = FRICTION.pick(table)
-    coulomb = _stated(table, "coulomb", axis) or _from_static(_stated(table, "static", axis), contact) or drag
-    if coulomb is None:
-        expected = "Coulomb friction beside the guess, since this contact has no size that says how large it is"
-        raise StageError("friction.coulomb", "nothing", expected, f'coulomb = "5 {axis.force}"')
-    ranges = contact.ranges(coulomb)
-    fields = numeric_fields(law)
-    added = {
-        key: written(ranges[key], fields[key].on(axis).unit) for key in fields if key in ranges and key not in table
-    }
-    if "stribeck_exponent" in fields and "stribeck_exponent" not in table:
-        table["stribeck_exponent"] = 2  # a Gaussian curve
-    said = tables.get("unknown", "")
-    unknown = [said] * bool(said) + [f"friction.{key}" for key in added]
-    return {**tables, "friction": {**table, **added}, **({"unknown": ", ".join(unknown)} if unknown else {})}
+    law = FRICTION.named(table["model"]) if isinstance(table["model"], str) else None
+    if law is None:  # a later check reports this error, as it does keys that the law does not have
+        return table
+    if "guess" in table:
+        asked |= {*law.model_fields} - {*table}
+    fields, coulomb = numeric_fields(law), _stated(table, "coulomb", axis)
+    coulomb = coulomb or _from_static(_stated(table, "static", axis), contact) or drag
+    if coulomb is None and {*table} <= {*law.model_fields} and asked & {*fields} & {*USUAL}:
+        actual = quoted(UNKNOWN) if "coulomb" in table else "nothing"
+        raise StageError(f"{name}.coulomb", actual, _HOW_LARGE, f'coulomb = "1 {axis.force} .. 20 {axis.force}"')
+    ranges = contact.ranges(coulomb or (1.0, 1.0))
+    added = {key: _guessed(ends, fields[key].on(axis).unit) for key, ends in ranges.items() if key in asked & {*fields}}
+    exponent = {"stribeck_exponent": 2} if "stribeck_exponent" in asked & {*fields} else {}  # a Gaussian curve
+    return {**table, **added, **exponent}
+
+
+def _guessed(ends: ContactRange, unit: str) -> UncertainValue:
+    """Return a value that nobody knows, which a stage file writes as "unknown", from the ends of its range [SI]."""
+    interval = Interval(*ends, written(ends, unit))
+    return UncertainValue(interval.middle, UNKNOWN, interval)
+
+
+def followed(stage: Stage, swept: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
+    """Return the guessed keys of a stage that follow a swept one, each with that key and its values [SI].
+
+    `swept` has SI numbers or arrays by key. Values follow from Coulomb friction, or from static friction where that
+    alone is stated.
+    """
+    found = {}
+    for table in FRICTIONS:
+        keys = {key for key in stage.guessed_keys if key.startswith(f"{table}.")}
+        lead, static = f"{table}.coulomb", f"{table}.static"
+        if lead in keys and lead not in swept and static not in keys:
+            lead = static
+        if lead not in swept:
+            continue
+        contact = _contact_of(stage, table)
+        ranges = contact.ranges((1.0, 1.0) if lead != static else (1 / contact.ratio[1], 1 / contact.ratio[0]))
+        for name, ends in ranges.items():  # all but the velocity are proportional to the level of friction
+            if (key := f"{table}.{name}") in keys - {*swept} and name != "stribeck_velocity":
+                found[key] = lead, Interval(*ends, "").middle * swept[lead]
+    return found
 
 
 def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, ContactRange]) -> dict[str, ContactRange]:
@@ -160,18 +202,19 @@ def guessed_ratios(stage: Stage) -> dict[str, tuple[str, Interval]]:
     open_keys = {key for key, one in intervals.items() if one.wide or key in stage.unknown_keys}
     if not open_keys:
         return {}
-    contact = _contact_of(stage)
-    pairs = (("static", "coulomb", contact.ratio), ("bristle_damping", "bristle_stiffness", contact.settling))
-    return {
-        f"friction.{key}": (f"friction.{lead}", Interval(*ends, ""))
-        for key, lead, ends in pairs
-        if {f"friction.{key}", f"friction.{lead}"} <= open_keys
-    }
+    pairs = (("static", "coulomb", "ratio"), ("bristle_damping", "bristle_stiffness", "settling"))
+    found = {}
+    for table in FRICTIONS:
+        for key, lead, name in pairs:
+            if {f"{table}.{key}", f"{table}.{lead}"} <= open_keys:
+                low, high = getattr(_contact_of(stage, table), name)
+                found[f"{table}.{key}"] = f"{table}.{lead}", Interval(low, high, "")
+    return found
 
 
-def _contact_of(stage: Stage) -> ContactKind:
-    """Return the contact that the guess of a stage names, or any contact."""
-    guess = getattr(stage.friction, "guess", None)
+def _contact_of(stage: Stage, table: str = "friction") -> ContactKind:
+    """Return the contact that the guess in a `table` of a stage names, or any contact."""
+    guess = getattr(getattr(stage, table), "guess", None)
     return _understood(guess, stage.axis_kind)[0] if guess else any_contact(stage.axis_kind)
 
 
@@ -189,7 +232,7 @@ def written(ends: ContactRange, unit: str) -> str:
 def _stated(table: Mapping[str, Any], key: str, axis: AxisKind) -> ContactRange | None:
     """Return the range in which a table states a force [N]; None without one, or if it cannot be read."""
     text = getattr(table.get(key), "text", table.get(key))
-    if text is None:
+    if text is None or text == UNKNOWN:
         return None
     try:
         if is_range(text):
@@ -206,25 +249,25 @@ def _from_static(static: ContactRange | None, contact: ContactKind) -> ContactRa
     return static and (static[0] / contact.ratio[1], static[1] / contact.ratio[0])
 
 
-def _understood(guess: str, axis: AxisKind) -> tuple[ContactKind, ContactRange | None]:
+def _understood(guess: str, axis: AxisKind, table: str = "friction") -> tuple[ContactKind, ContactRange | None]:
     """Return the contact that a guess names, and its Coulomb friction [N], or None if the guess has no size.
 
-    Raises StageError for words that are not understood.
+    Raises StageError, for a key of the `table`, for words that are not understood.
     """
     name, *words = (part.strip() for part in guess.split(","))
     kinds = contacts(axis.name)
-    contact = kinds[_named(name, kinds)]
+    contact = kinds[_named(name, kinds, table)]
     size, preload, carriages = None, None, 1
     for word in words:
         what, _, rest = word.partition(" ")
         if what == "size" and contact.sizes:
-            size = _named(rest, contact.sizes)
+            size = _named(rest, contact.sizes, table)
         elif rest == "preload" and contact.preloads:
-            preload = _named(what, contact.preloads)
+            preload = _named(what, contact.preloads, table)
         elif rest in ("carriage", "carriages") and what.isdecimal() and what.strip("0") and len(what) < 3:
             carriages = int(what)
         else:
-            raise _not_understood(word, "size, preload and number of carriages, of contacts that have sizes")
+            raise _not_understood(word, "size, preload and number of carriages, of contacts that have sizes", table)
     if size is None:
         return contact, None
     drags = [contact.drag(size, share) for share in ([preload] if preload else contact.preloads)]
@@ -232,14 +275,14 @@ def _understood(guess: str, axis: AxisKind) -> tuple[ContactKind, ContactRange |
     return contact, (low, high)
 
 
-def _named(word: str, names: Iterable[str]) -> str:
+def _named(word: str, names: Iterable[str], table: str) -> str:
     """Return a word if it is one of some names. Raises StageError, which lists them, for another word."""
     if word in (names := [*names]):
         return word
     near = nearest_name(word, names)
-    raise _not_understood(word, f"one of {', '.join(names)}{f'; did you mean {near}?' if near else ''}")
+    raise _not_understood(word, f"one of {', '.join(names)}{f'; did you mean {near}?' if near else ''}", table)
 
 
-def _not_understood(word: str, expected: str) -> StageError:
+def _not_understood(word: str, expected: str, table: str) -> StageError:
     """Make the error for a word of a guess that is not understood."""
-    return StageError("friction.guess", quoted(word, "not understood"), expected, _EXAMPLE)
+    return StageError(f"{table}.guess", quoted(word, "not understood"), expected, _EXAMPLE)

@@ -1,7 +1,7 @@
 """Define the base of all stage-file tables: strict keys, errors, rules, and variants."""
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from types import NoneType
@@ -53,6 +53,9 @@ def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
     return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
+UNKNOWN = "unknown"
+"""What a file writes for a value that nobody knows."""
+
 MOST_KEYS = 100
 """Largest number of keys of a table, unknown ones included, because the nearest known key is searched for each unknown
 one."""
@@ -69,6 +72,13 @@ class Section(BaseModel):
     rules: ClassVar[tuple[Rule, ...]] = ()
     refusal: ClassVar[type[InputError]] = InputError
     """The error raised by this section and the sections within it."""
+    among: ClassVar["Variants | None"] = None
+    """The sections told apart from this one by its tag, if there are others."""
+
+    @classmethod
+    def otherwise(cls, key: str) -> str:
+        """Return what else a numeric key takes besides its values, after a semicolon; "" for nothing."""
+        return ""
 
     def __init__(self, /, **data: Any) -> None:
         self._take(data, LINEAR)
@@ -115,6 +125,8 @@ class UncertainSection(Section):
     @classmethod
     def _read_uncertain(cls, value: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         key, text, kind = str(info.field_name), getattr(value, "text", value), info.context or LINEAR
+        if isinstance(value, UncertainValue) and text == UNKNOWN:
+            return value
         if (field := numeric_fields(cls).get(key)) and is_range(text):
             return uncertain_value(text, field.on(kind))
         if several := list_fields(cls).get(key):
@@ -216,6 +228,11 @@ class Variants:
         load_own(self.group)
         return self._classes
 
+    @property
+    def forms(self) -> Mapping[str, Sequence[type[Section]]]:
+        """Return the classes of the sections by name, of which a name may have several."""
+        return {name: [cls] for name, cls in self.classes.items()}
+
     def name_of(self, cls: type[Section]) -> str:
         """Return the name that a class declares, "step" for `kind: Literal["step"]`."""
         return get_args(cls.model_fields[self.tag].annotation)[0]
@@ -231,6 +248,7 @@ class Variants:
             expected = f"a name that is not taken: {holder.__module__}.{holder.__qualname__} has it"
             raise InputError(self.tag, actual, expected, f'{self.tag}: Literal["my_{name}"]')
         self._classes[name] = cls
+        cls.among = self
         if self.group:
             own_first = sorted(
                 self._classes.items(), key=lambda item: (not item[1].__module__.startswith("friso."), item[0])
@@ -250,6 +268,11 @@ class Variants:
         name = table.get(self.tag)
         if isinstance(name, str) and (cls := self.named(name)):
             return cls
+        if name is None:
+            keys = {key: cls for several in self.forms.values() for cls in several for key in cls.model_fields}
+            typos = [(key, near) for key in {*table} - {*keys} if (near := nearest_name(key, keys))]
+            for key, near in sorted(typos)[:1]:  # of a key that decides alone what is read, such as a guess
+                raise unknown_key(key, keys, _described(keys[near], near, LINEAR)[1])
         example = nearest_name(name, self.classes) or next(iter(self.classes))
         expected = f"one of {', '.join(map(as_toml, self.classes))}"
         raise InputError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")
@@ -365,13 +388,32 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
-        return _complete(cause, key)
+        return _complete(cause, key, cls.otherwise(str(problem["loc"][0])) if problem["loc"] else "")
     if not problem["loc"]:  # no key has a wrong value: the mistake is friso's own
         raise cause or ValueError(problem["msg"])
     if problem["type"] == "extra_forbidden":
+        if other := _of_another(cls, key):
+            return other
         near = nearest_name(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, _own_first(cls), _described(cls, near, kind)[1])
     return InputError(key, quoted(problem["input"]), *_described(cls, key, kind))
+
+
+def _of_another(cls: type[Section], key: str) -> InputError | None:
+    """Make the error for an unknown key that a section told apart from this one by its tag has, exactly or nearly."""
+    if cls.among is None:
+        return None
+    keys = {name: form for several in cls.among.forms.values() for form in several for name in form.model_fields}
+    near = key if key in keys else None if nearest_name(key, cls.model_fields) else nearest_name(key, keys)
+    if near is None:
+        return None
+    tag, owner = cls.among.tag, cls.among.name_of(keys[near])
+    did_you_mean = "" if near == key else f"; did you mean {near}?"
+    of_other = f"{tag} = {as_toml(owner)}"
+    own = [name for name in _own_first(cls) if cls.model_fields[name].is_required() and name != tag]
+    such = f", such as {', '.join(own)}" if own else ""
+    expected = f"a key of {tag} = {as_toml(cls.among.name_of(cls))}{such}; {near} belongs to {of_other}"
+    return InputError(key, f"an unknown key{did_you_mean}", expected, of_other)
 
 
 def _own_first(cls: type[Section]) -> list[str]:
@@ -380,14 +422,14 @@ def _own_first(cls: type[Section]) -> list[str]:
     return [name for name in dict.fromkeys(declared) if name in cls.model_fields]
 
 
-def _complete(error: InputError, key: str) -> InputError:
-    """Put the key of the table before the key of an error that occurred in it.
+def _complete(error: InputError, key: str, otherwise: str) -> InputError:
+    """Put the key of the table before the key of an error that occurred in it, and say what is `otherwise` taken.
 
     `key` is also put before an example that is a mere value.
     """
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
-    return InputError(error.key, error.actual, error.expected, example, also=error.also).under(key)
+    return InputError(error.key, error.actual, f"{error.expected}{otherwise}", example, also=error.also).under(key)
 
 
 def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
@@ -400,12 +442,12 @@ def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
             return f"an array of tables [[{key}]]", item.example
         if hasattr(item, "written_example"):
             item = item.on(kind) if hasattr(item, "on") else item
-            return item.expected, f"{key} = {item.written_example}"
+            return f"{item.expected}{cls.otherwise(key)}", f"{key} = {item.written_example}"
     type_ = next((part for part in get_args(field.annotation) if part is not NoneType and get_args(part)), None)
     type_ = type_ or next((part for part in get_args(field.annotation) if part in (bool, str)), field.annotation)
     if type_ is bool:
         return "true or false", f"{key} = true"
     if type_ is str:
-        return "a text in quotes", f'{key} = "Thesis rig"'
+        return "a text in quotes", f"{key} = {as_toml((field.examples or ['Thesis rig'])[0])}"
     choices = [as_toml(choice) for choice in get_args(type_) if choice]
     return f"one of {', '.join(choices)}", f"{key} = {choices[0]}"

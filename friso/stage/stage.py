@@ -16,7 +16,7 @@ from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import COMMANDS, Number, Quantity, as_toml, exactly, in_unit_of, positive, quoted, unit_of
-from friso.stage.contacts import with_guess
+from friso.stage.contacts import FRICTIONS, followed, with_guess
 from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLER,
@@ -33,6 +33,7 @@ from friso.stage.lists import element_keys
 from friso.stage.motion import MOTION, Motion, motion_of
 from friso.stage.rig import Cable, Drive, Floor, Rail
 from friso.stage.section import (
+    UNKNOWN,
     Rule,
     Section,
     Table,
@@ -260,7 +261,13 @@ class Stage(Section):
     @property
     def unknown_keys(self) -> tuple[str, ...]:
         """Return the keys, and the tables, whose values in the stage file nobody knows."""
-        return _split(self.unknown)
+        return tuple(dict.fromkeys((*_split(self.unknown), *self.guessed_keys)))
+
+    @property
+    def guessed_keys(self) -> tuple[str, ...]:
+        """Return the keys of friction that are unknown, and whose ranges follow from what the stage file states."""
+        sections = ((name, section) for name in FRICTIONS if (section := getattr(self, name)))
+        return tuple(f"{name}.{key}" for name, section in sections for key, value in section if _text(value) == UNKNOWN)
 
     @property
     def assumed_keys(self) -> tuple[str, ...]:
@@ -291,14 +298,16 @@ class Stage(Section):
         arrays of [floor]. Elements of any other array are numbered from 1: friction.element_stiffness.2.
 
         `swept`, keys to SI numbers or arrays, is laid over the stage before the defaults that follow other keys are
-        filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
+        filled in: tuned_mass follows a swept mass, and guessed friction what it was guessed from. Raises StageError for
+        an unknown key.
         """
         if not swept:
             return dict(self._complete)
         for key in swept:
             if key not in self._sweepable:
                 raise StageError.of(unknown_key(key, self._sweepable))
-        return derived(_with_defaults({**self._declared, **swept}))
+        guesses = {key: values for key, (_, values) in followed(self, swept).items()}
+        return derived(_with_defaults({**self._declared, **guesses, **swept}))
 
     def numeric_keys(self) -> Mapping[str, Quantity | Number]:
         """Return unit, bound and example of every numeric key that this stage can have."""
@@ -432,11 +441,15 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any], derived_from_
     if the result is no valid stage.
     """
     own, tables = {*tables}, deepcopy(dict(tables))
+    guessed = [key for key in changes if derived_from_it and _text(_under(tables, key)) == UNKNOWN]
     for key, value in changes.items():
-        _put(tables, key, getattr(value, "text", value))
-    if isinstance(tables.get("unknown"), str) and "unknown" not in changes:
+        _put(tables, key, _text(value))
+    if isinstance(listed := tables.get("unknown", ""), str) and "unknown" not in changes:
+        tables.pop("unknown", None)
         stated = () if derived_from_it else changes  # what the user sets is known
-        unset = [key for key in _split(tables.pop("unknown")) if not {key, key.partition(".")[0]} & {*stated}]
+        unset = [
+            key for key in dict.fromkeys((*_split(listed), *guessed)) if not {key, key.partition(".")[0]} & {*stated}
+        ]
         unset = [key for key in unset if _has(tables, key)]
         tables |= {"unknown": ", ".join(unset)} if unset else {}
     try:
@@ -453,7 +466,7 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any], derived_from_
                 replaced = Stage(**tables)
             except StageError as other:
                 raise error if other.key == CONTROLLER else _of_another_form(other, changes, others) from None
-            LOGGER.warning(f"[controller] is of another form now: {', '.join(others)} are gone")
+            LOGGER.warning(f"[controller] is of another form now: {', '.join(others)} are gone", extra={"after": True})
             return replaced
         begun = [key for key in changes if key.startswith(f"{name}.")]
         if name in own or not begun or not error.actual.startswith("nothing"):
@@ -660,6 +673,11 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
     if FORCE_LIMIT in flat:
         flat.setdefault(ANTI_WINDUP, "clamp")
     return with_material(flat)
+
+
+def _text(value: Any) -> Any:
+    """Return a value as the user wrote it."""
+    return getattr(value, "text", value)
 
 
 def _under(tables: Mapping[str, Any], key: str) -> Any:

@@ -16,7 +16,7 @@ from pydantic import model_validator
 from friso.axis import axis_of
 from friso.errors import StageError
 from friso.quantities import Bound, Number, Quantity, Value, any_sign, non_negative, positive, quoted
-from friso.stage.section import Rule, Section, UncertainSection, Variants
+from friso.stage.section import UNKNOWN, Rule, Section, UncertainSection, Variants
 
 
 class AxisTable(UncertainSection):
@@ -117,6 +117,10 @@ class Masses(UncertainSection):
         return self
 
 
+USUAL = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "bristle_damping", "viscous")
+"""Keys of friction for which similar contacts have a usual range (`friso.stage.contacts`)."""
+
+
 class FrictionSection(UncertainSection):
     """Base of the friction laws, which declare keys, `model: Literal["name"]`, and equations."""
 
@@ -134,6 +138,15 @@ class FrictionSection(UncertainSection):
     """Whether `friso identify` fits the law's parameters to logs of moves."""
     words: ClassVar[Mapping[str, str]] = {}
     """Names of keys on the axes of maps, where the key itself is not clear enough."""
+
+    @classmethod
+    def otherwise(cls, key: str) -> str:
+        """Return what stands for a key of friction that nobody measured."""
+        named = "; guess names the contact" if "guess" in cls.model_fields else ""
+        if key in USUAL:
+            return f'; or "{UNKNOWN}", for the range of similar contacts{named}'
+        required = key in cls.model_fields and cls.model_fields[key].is_required() and key != "model"
+        return f'; if nobody knows it, model = "lugre" takes "{UNKNOWN}"' if required else ""
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, cast
 
+from pydantic import Field
+
 from friso.equations.conditions import LEVELS, friction_level, has_conditions
 from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
 from friso.stage import FrictionSection, Rule
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 COULOMB_BELOW_STATIC = Rule(
     ("friction.coulomb", "friction.static"),
     lambda flat: flat["friction.coulomb"] <= flat["friction.static"],
-    expected="Coulomb friction no larger than static friction",
+    expected='Coulomb friction no larger than static friction; static = "unknown" follows it',
     example='static = "3 N", coulomb = "1 N"',
 )
 
@@ -194,7 +196,7 @@ class StribeckSection(FrictionSection):
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
     asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
     viscous_asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
-    guess: str | None = None
+    guess: str | None = Field(None, examples=["ball screw"])
     """Contact whose usual friction stands for keys that nobody measured (see `friso.stage.contacts`)."""
     under_conditions: ClassVar[bool] = True
     rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)

@@ -17,6 +17,7 @@ from friso.interface.inputs import AxisRange, Changes, StageLike, Tolerance
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, any_sign
 from friso.stage import Stage
+from friso.stage.contacts import followed
 
 if TYPE_CHECKING:
     from friso.questions.boundary.words import ShownKey
@@ -50,7 +51,7 @@ class BoundaryAnswer(Answer):
     def keys(self) -> tuple[ShownKey, ...]:
         """Return the keys in the units in which their ranges were given."""
         ranges = zip(self.result.space.ranges, self.texts, strict=True)
-        varied = frozenset(self.varied)
+        varied = frozenset((*self.varied, *followed(self.stage, dict.fromkeys(self.varied, 1.0))))
         return tuple(replace(_in_its_unit(swept, text, self.axis_kind), varied=varied) for swept, text in ranges)
 
     @property

@@ -8,7 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from friso.hunting.criteria import PEAK_RULE
-from friso.questions.check.cases import case_document, rows, rows_behind
+from friso.quantities import NOTHING
+from friso.questions.check.cases import case_document, peaks_shown, rows, rows_behind
 from friso.questions.check.draws import (
     draws_colours,
     draws_details,
@@ -37,10 +38,12 @@ if TYPE_CHECKING:
 def basis(check: CheckAnswer) -> str:
     """Say how accurately the cases were simulated, and by which criteria they are judged."""
     tolerances = sorted({f"{case.solver.rtol:g}" for case in check.result.values()})
+    beside = f" Peaks are counted beside it: maxima of the position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2)."
+    counted = any(peaks_shown(case) not in (NOTHING, "0") for case in check.result.values())
     return (
-        f", relative tolerance {', '.join(tolerances)}. The verdict is by everything that attracts the stage. Peaks "
-        f"are counted beside it: maxima of the position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2). Settling "
-        "times count from the last corner of the reference; where it stands at several places, the longest"
+        f", relative tolerance {', '.join(tolerances)}. The verdict is by everything that attracts the stage."
+        f"{beside * counted} Settling times count from the last corner of the reference; where it "
+        "stands at several places, the longest"
     )
 
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 from friso import hunting
 from friso.axis import axis_shown
 from friso.hunting import MORE_WORK, Case, CheckPart, Cycle, Kick, Tracking
-from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
+from friso.hunting.criteria import COUNTED_AFTER
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
 from friso.questions.check.words import at_the_end, edge_text, moves_tried
+from friso.shown.blocks import filled
 from friso.shown.cases import ShownCase, band_text, verdict_in_short
 from friso.shown.documents import dwells_document, entries, plain_json, tracking_document, unit_suffix
 from friso.shown.drawing.prefixes import (
@@ -51,8 +52,7 @@ def rows_behind(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
 def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
     """Return rows with one text for each case.
 
-    `columns` has, by the name of a row, the function that writes a text about a case. Rows in which no case has an
-    entry are left out.
+    `columns` has, by the name of a row, the function that writes a text about a case.
     """
     effort = axis_shown().effort
     fine, coarse = map(band_text, cases[0].case.bands)
@@ -60,7 +60,7 @@ def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...
         name.format(effort=effort, fine=fine, coarse=coarse): [text(item.case) for item in cases]
         for name, text in columns.items()
     }
-    return [(name, row) for name, row in texts.items() if set(row) != {NOTHING}]
+    return filled(texts.items())
 
 
 def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
@@ -185,7 +185,7 @@ def _moves_tried(case: Case) -> str:
     return f"{moves_tried(case, moves)}, evenly" if moves else NOTHING
 
 
-def _peaks(case: Case) -> str:
+def peaks_shown(case: Case) -> str:
     """Write the peak count, and why it may contradict the verdict.
 
     A run that ends too early has none, nor has a rotary axis, as the thesis counts peaks by their height in mm.
@@ -194,11 +194,6 @@ def _peaks(case: Case) -> str:
     if duration <= COUNTED_AFTER or not axis_shown().plain:
         return NOTHING
     remarks = {
-        (
-            "hunts",
-            False,
-        ): f" (the thesis counts peaks from {COUNTED_AFTER:g} s on, if higher than {with_unit(COUNTED_ABOVE, 'm')})",
-        ("bistable", False): " (another motion hunts)",
         ("bistable", True): " (a long transient)",
         ("transient", True): " (a long transient)",
         ("settles", True): " (a long transient)",
@@ -257,7 +252,7 @@ _NUMBERS: dict[str, Callable[[Case], str]] = {
 _BEHIND: dict[str, Callable[[Case], str]] = {
     "Hunting multiplier": _of_the_cycle(_multiplier),
     "Multiplier taken over": _of_the_cycle(_decided),
-    "Counted peaks": _peaks,
+    "Counted peaks": peaks_shown,
     "Solver status": lambda case: case.solver.status,
     "Steps (rejected)": lambda case: f"{case.solver.steps} ({case.solver.rejected})",
 }

@@ -135,11 +135,11 @@ def _settling_figure(cases: list[ShownCase]) -> Figure:
         tuple(peaks),
         limits,
     )
+    counted = f" Peaks are counted as in the thesis (Sec. 3.2.2): {PEAK_RULE}." if peaks else ""
     caption = (
-        "Hunting appears as a deviation that keeps coming back; so does a long transient, for a while. Peaks are "
-        f"counted as in the thesis (Sec. 3.2.2): {PEAK_RULE}. Below: the size of the "
-        "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
-        "the lines."
+        f"Hunting appears as a deviation that keeps coming back; so does a long transient, for a while.{counted} "
+        "Below: the size of the deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that "
+        "hunts never stays under the lines."
     )
     caption = axis_shown().text(caption)
     return Figure("settled", "Does it hunt?", caption, (zoom, _settling(cases)), subject=subject(cases))

@@ -215,7 +215,7 @@ def checked_stage(
     drawn = across = None
     cut = False
     if uncertain is not None and cases["given"].unstable:
-        LOGGER.warning("no machines were drawn from the uncertain keys: at their centres the loop is unstable")
+        inputs.note("no machines were drawn from the uncertain keys: at their centres the loop is unstable")
     elif uncertain is not None:
         from friso.studies.draws import affordable
 
@@ -282,6 +282,6 @@ def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlatio
     try:
         draw(stage, correlations, settings.trial_draws, seed)
     except InputError as error:
-        LOGGER.warning(f"no machines were drawn from the uncertain keys ({error.actual}); their centres are used")
+        inputs.note(f"no machines were drawn from the uncertain keys ({error.actual}); their centres are used")
         return None
     return correlations

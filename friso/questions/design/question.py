@@ -13,7 +13,7 @@ from friso.design_method.prepare import assumed, by_rules, check_designable, off
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import AS_BUILT, LOGGER, Changes, FrequencyLike, StageLike
+from friso.interface.inputs import AS_BUILT, Changes, FrequencyLike, StageLike
 from friso.platform.extras import need
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
@@ -105,9 +105,7 @@ def design(
     _tell_what_is_assumed(chosen, specification, spec is None)
     inputs.mention_unstable_loop(chosen)
     if chosen.drive:
-        LOGGER.warning(
-            "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"
-        )
+        inputs.note("[drive] is taken into account for the margins; hunting and moves are simulated in continuous time")
     from friso.design_method.method import DesignInterrupted, NotNeeded
     from friso.design_method.method import design as designed
 
@@ -137,20 +135,20 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
 
     if outlined:
         made = "friso init --spec STAGE.toml writes it for you to edit"
-        LOGGER.warning(f"no specification: one is made from the stage file; {made}")
+        inputs.note(f"no specification: one is made from the stage file; {made}")
     rules = by_rules(stage)
     if rules is not stage:
         hertz = with_unit(bandwidth(rules.flat()), "Hz")
-        LOGGER.warning(
+        inputs.note(
             f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
             f"controller, with its bandwidth when the joint is locked, {hertz}; friso export lists its gains"
         )
     if offset := offset_points(stage, spec):
-        LOGGER.warning(
+        inputs.note(
             f"actuator and sensor are taken {with_unit(float(spec.leaves.offset), 'm')} off the middle of the leaves' "
             f"width, so that they see it turn: state [leaves] offset, or {', '.join(offset)}, to have another"
         )
     if keys := assumed(stage, spec):
         units = numeric_keys(stage.flat() | keys)
         numbers = ", ".join(f"{key} = {with_unit(value, units[key].unit)}" for key, value in keys.items())
-        LOGGER.warning(f"the stage file has no joint: {numbers} are assumed; state [masses] and [joint] to have others")
+        inputs.note(f"the stage file has no joint: {numbers} are assumed; state [masses] and [joint] to have others")

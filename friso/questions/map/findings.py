@@ -20,6 +20,7 @@ from friso.shown.drawing.figure import SecondScale
 from friso.shown.drawing.prefixes import listed, range_with_unit
 from friso.shown.loop_words import unstable_loop
 from friso.stage import Stage
+from friso.stage.contacts import followed
 from friso.studies.axes import SCALINGS
 from friso.studies.edges import HUNTS_LEVEL, MapEdges, OwnLine, verdict_levels
 from friso.studies.metric import MapFinding, metrics, worded
@@ -187,8 +188,11 @@ def message(runs: xr.Dataset, metric: str, edges: MapEdges | None) -> str:
     if np.isnan(levels).all():
         return ""
     hunts, decided = levels == HUNTS_LEVEL, ~np.isnan(levels)
+    answered = ~np.isin(words, ["", *_NO_RESULT, *_open_words(metric)])
+    share = "" if answered.all() else _percent(answered.sum(), answered.size)
     if not hunts.any() or hunts[decided].all():
-        return "Hunts nowhere on this map" if not hunts.any() else "Hunts everywhere on this map"
+        where = f"in the {share} of this map that has an answer" if share else "on this map"
+        return f"Hunts {'everywhere' if hunts.any() else 'nowhere'} {where}"
     side, number = next(
         (
             (name, axis)
@@ -200,9 +204,9 @@ def message(runs: xr.Dataset, metric: str, edges: MapEdges | None) -> str:
     )
     text = f"Hunts {side} the line"
     lines = {line.key: line for line in edges.own} if edges else {}
-    if axes[number].key not in lines:
-        return text
-    return f"{text}, at your {_short(axes[1 - number])} {_where(lines[axes[number].key], axes[number], runs)}"
+    if axes[number].key in lines:
+        text += f", at your {_short(axes[1 - number])} {_where(lines[axes[number].key], axes[number], runs)}"
+    return f"{text}; {share} of this map has an answer" if share else text
 
 
 def _short(axis: CellAxis) -> str:
@@ -314,10 +318,11 @@ def facts(runs: xr.Dataset, metric: str) -> list[tuple[str, list[str]]]:
 
 def basis(runs: xr.Dataset) -> str:
     """Say how the runs were made, and by which rules they are judged."""
+    counted = "peaks" in runs and bool((runs["peaks"] > 0).any())
+    beside = f", and peaks are maxima of the position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2)" * counted
     return (
         f", relative tolerance {float(runs.attrs['rtol']):g}. Outcomes tell what each run does at its end, verdicts "
-        "are on the stage by what attracts it, from fewer starts than friso check tries, and peaks are maxima of the "
-        f"position {PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2)"
+        f"are on the stage by what attracts it, from fewer starts than friso check tries{beside}"
     )
 
 
@@ -330,7 +335,8 @@ def _all_sentences(runs: xr.Dataset, study: Study, metric: str, edges: MapEdges 
 def answers(runs: xr.Dataset, metric: str, edges: MapEdges | None = None) -> list[str]:
     """Return what a map says first: its message or, without one, its first statement; and where the stage itself is."""
     says = message(runs, metric, edges)
-    first = [f"{subject_of(runs)}: {says[0].lower()}{says[1:]}."] if says else statements(runs, metric)[:1]
+    subject = subject_of(runs) or "The stage"
+    first = [f"{subject}: {says[0].lower()}{says[1:]}."] if says else statements(runs, metric)[:1]
     return [*first, *own_place(runs, metric, edges)]
 
 
@@ -406,7 +412,9 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
 def in_its_unit(axis: CellAxis, runs: xr.Dataset) -> CellAxis:
     """Return an axis as sentences name it: factors as values in Hz and N, and which friction an axis of friction is."""
     links = json.loads(runs.attrs.get("links", "{}"))
-    held = map_words.friction_held(axis.key, {*map(str, runs.coords), *links})
+    machine, varied = machine_of(runs), {*map(str, runs.coords), *links}
+    varied |= {*followed(machine, dict.fromkeys(varied, 1.0))} if machine else set()
+    held = map_words.friction_held(axis.key, varied)
     values = _multiplied(axis, runs)
     if values is None:
         return replace(axis, quantity=f"{map_words.in_sentence(axis.key)}{held}")

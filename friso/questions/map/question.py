@@ -252,10 +252,11 @@ def sweep(
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else CONFIRMED_FROM)
         else:
-            if metric is None and not confirm and is_moved_evenly(inputs.read_stage(stage, set)):
+            given = inputs.stage_of(stage, set)
+            if metric is None and not confirm and is_moved_evenly(given):
                 metric = "stick_slip"
             metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
-            chosen = inputs.read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
+            chosen = inputs.read_stage(given, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
             if runs_as_built(chosen, [metric]):
                 inputs.mention_sampling(chosen)
             study = study_for(chosen, varied, metric, None if yes else CONFIRMED_FROM, crew)

@@ -139,7 +139,7 @@ def tune(
     goal = _goal(chosen, within, settle, moves, force_limit, bandwidth_limit, margin, only, keep)
     correlations = inputs.correlations_of(stage, chosen)
     if missing("design"):
-        LOGGER.warning(f"no leaf springs are sized for a joint: that takes {install('design')}")
+        inputs.note(f"no leaf springs are sized for a joint: that takes {install('design')}")
     from friso.remedies.method import tune as tuned
 
     begins, answered = partial(inputs.mention_unstable_loop, chosen), partial(_mention, chosen, goal)

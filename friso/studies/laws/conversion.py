@@ -164,7 +164,7 @@ def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
     If some of its friction is unknown, all of the new law's is.
     """
     of_friction = ("friction" if key.startswith("friction.") else key for key in stage.unknown_keys)
-    unknown = {"unknown": ", ".join(dict.fromkeys(of_friction))} if stage.unknown else {}
+    unknown = {"unknown": ", ".join(dict.fromkeys(of_friction))} if stage.unknown_keys else {}
     return stage.replace({"friction": _table(stage, law, keys), **unknown})
 
 
