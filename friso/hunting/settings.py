@@ -180,9 +180,6 @@ class EdgeSettings(Settings):
     joint_margin_work: float = setting(2e8, "")
     """Work for the margins of a joint, which only --details needs: a quarter of a check's time."""
 
-    flip_multiplier: float = setting(0.8, "")
-    """Magnitude of the multiplier next to an edge above which the cycle flips there."""
-
 
 @dataclass(frozen=True)
 class CheckSettings(Settings):

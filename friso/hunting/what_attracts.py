@@ -12,9 +12,9 @@ import numpy as np
 
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.rounds import typical_period
-from friso.hunting.attractors.survey import Repelling, Swinging, of_cycles
+from friso.hunting.attractors.survey import Repelling, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import CYCLE_RTOL, families
+from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.loop import winds_up_at_a_limit
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.landing_map import LandingMap
@@ -111,40 +111,35 @@ def sketched(stages: Ensemble) -> Sketch:
     mapped, decided = _sketch(stages)
     if mapped is None:
         return Sketch(decided, decided)
-    surely = mapped.surely_attract
-    return Sketch(surely, decided & (surely | [not one.attractors for one in mapped.maps]))
+    return Sketch(mapped.surely_attract, decided)
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
     """Return coarse return maps of stages, and for which they decide what attracts, (count,).
 
-    The maps are None if the stages have none.
+    The maps are None if the stages have none. A map whose attractors cannot be trusted does not decide, nor does one
+    without any where a limiter may be touched: swings that reach it land in few places.
     """
     if not has_a_map(stages):
         return None, np.zeros(stages.count, bool)
     mapped = map_stages(stages, settings.sketched_starts, 1, SKETCH_RTOL, sparse=True)
-    return mapped, MapSurvey(mapped, (), (), np.zeros(stages.count, bool)).resolved
+    resolved = MapSurvey(mapped, (), np.zeros(stages.count, bool)).resolved
+    quiet = [not (one.attractors or stages.chatters) for one in mapped.maps]
+    return mapped, resolved & (mapped.surely_attract | quiet)
 
 
 @np.errstate(all="ignore")
-def surveyed_roughly(stages: Ensemble, rtol: float = CYCLE_RTOL, close: bool = True) -> Attractors:
+def surveyed_roughly(stages: Ensemble) -> Attractors:
     """Find at least one apparent attractor of each stage that may hunt, if it has one.
 
-    This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. A coarse return map
-    decides. If its attractors are doubtful, the cycles that Newton's method closes from the map at rest decide
-    instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if
-    an allowance of work is used up.
+    This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. Coarse return maps
+    decide; stages whose maps do not are simulated. Raises Exhausted if an allowance of work is used up.
     """
     mapped, decided = _sketch(stages)
     motions: list[Swinging] = []
     if mapped is not None:
-        swings_on = np.array([bool(one.attractors) for one in mapped.maps])
-        doubtful = decided & swings_on & ~mapped.surely_attract & close
-        sure = np.flatnonzero(decided & swings_on & ~doubtful)
+        sure = np.flatnonzero(decided & mapped.surely_attract)
         motions += [motion for number in sure.tolist() for motion in _seen_on_map(mapped, number)]
-        if (numbers := np.flatnonzero(doubtful)).size:
-            for family in families(stages.take(numbers), rtol, one_each=True):
-                motions += of_cycles(numbers, family, stages.sticking)
     if (left := np.flatnonzero(~decided)).size:
         survey = attractors(stages.take(left), cycles=False)
         motions += [replace(motion, stage=int(left[motion.stage])) for motion in survey.motions]

@@ -150,9 +150,6 @@ class StudySettings(Settings):
     block_timeout: float = setting(10.0, "s")
     """Time within which cancelled blocks end."""
 
-    rows_together: int = setting(100_000, "")
-    """Rows written together, some tens of megabytes."""
-
     curve_error: float = setting(0.02, "")
     """Largest difference of virgin curves that a measurement cannot resolve."""
 

@@ -134,32 +134,25 @@ def concatenate_cycles(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
     return Cycles(0.0, 0, **{pair[0][0]: np.concatenate([array for _, array in pair])[order] for pair in columns})
 
 
-def families(stages: Ensemble, rtol: float = CYCLE_RTOL, one_each: bool = False) -> tuple[Cycles, ...]:
+def families(stages: Ensemble, rtol: float = CYCLE_RTOL) -> tuple[Cycles, ...]:
     """Find the cycles that the return maps of stages suggest.
 
     If all stages are symmetric, the result has two entries: their symmetric cycles, and one of each asymmetric pair. If
-    any stage is not, the only entry has cycles over a whole period. With `one_each`, asymmetric cycles are sought only
-    for stages whose symmetric one is not stable.
+    any stage is not, the only entry has cycles over a whole period.
     """
     positive = return_map(stages, GUESS_RTOL)
     if not stages.symmetric.all():
         return (whole_cycles(stages, rtol, positive),)
-    symmetric = symmetric_cycles(stages, rtol, positive)
-    return symmetric, asymmetric_cycles(stages, positive, rtol, ~symmetric.attracting if one_each else None)
+    return symmetric_cycles(stages, rtol, positive), asymmetric_cycles(stages, positive, rtol)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def asymmetric_cycles(
-    stages: Ensemble, positive: ReturnMap, rtol: float = CYCLE_RTOL, which: np.ndarray | None = None
-) -> Cycles:
+def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = CYCLE_RTOL) -> Cycles:
     """Find one of the pair of asymmetric cycles of each symmetric stage, if it has one.
 
-    `positive` is the return map, which suggests the cycle. The other cycle of the pair is its mirror image. Stages for
-    which `which`, shape (count,), is false are left out, as if nothing suggested a cycle.
+    `positive` is the return map, which suggests the cycle. The other cycle of the pair is its mirror image.
     """
     guess = whole_guess(stages, positive, positive, settings.least_asymmetry_share)
-    if which is not None:
-        guess.times[~which] = np.nan
     cycles = _closed(stages, guess, 1.0, rtol)
     same = np.abs(cycles.middle) < settings.least_lean_share * cycles.amplitude
     cycles.closed[same], cycles.reasons[same] = False, NO_PAIR

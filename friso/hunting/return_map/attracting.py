@@ -29,13 +29,12 @@ SCATTERS = "landings at equal distances return differently: the stage remembers 
 class MapSurvey:
     """Result of surveying stages by their return maps.
 
-    `mapped` are the runs that sample the maps, `motions` the stable orbits, `repelling` the unstable ones. A stage is
-    `undecided`, shape (count,), if its map has an attractor that was not closed as a stable orbit.
+    `mapped` are the runs that sample the maps, `motions` the stable orbits. A stage is `undecided`, shape (count,), if
+    its map has an attractor that was not closed as a stable orbit.
     """
 
     mapped: Mapped
     motions: tuple[Swinging, ...]
-    repelling: tuple[Swinging, ...]
     undecided: np.ndarray
 
     @property
@@ -102,7 +101,7 @@ def survey_maps(stages: Ensemble, rtol: float = CYCLE_RTOL) -> MapSurvey:
         own = [motion for motion in motions if motion.stage == stage]
         for attractor in landing_map.attractors:
             undecided[stage] |= not any(is_motion(attractor, motion, float(lengths[stage])) for motion in own)
-    return MapSurvey(mapped, tuple(motions), tuple(repelling), undecided)
+    return MapSurvey(mapped, tuple(motions), undecided)
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:

@@ -218,12 +218,13 @@ class LandingMap:
     def surely_attracts(self) -> bool:
         """Whether the map has an attractor that can be trusted though its points are few.
 
-        It is a simple cycle that is surely stable, or any one that is strongly stable and reached from enough points.
-        Other motions that go on may come from gaps between points.
+        It is a simple cycle that is surely stable, or one that is strongly stable and reached from enough points. Other
+        motions that go on may come from gaps between points.
         """
         sure = return_map_settings.sure_errors
         return any(abs(point.slope) + sure * point.error < 1 for point in self.fixed_points()) or any(
             one.periodic
+            and len(one.distances) == len(self.sides)
             and one.basin.size >= return_map_settings.least_arriving_points
             and self.slope(one) <= return_map_settings.hardly_attracting_share
             for one in self.attractors

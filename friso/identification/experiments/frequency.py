@@ -32,7 +32,7 @@ from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, VERMILLION
+from friso.shown.drawing.palette import BLUE, GREY, INK, ORANGE, VERMILLION
 from friso.shown.drawing.phases import phases
 from friso.shown.drawing.prefixes import range_with_unit
 from friso.stage import Stage
@@ -64,9 +64,6 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
     resonance = model["resonance frequency"].value
     away = [abs(np.log(resonance / frequency)) for frequency in (joint, flat["parasitic.frequency"])]
     return resonance if away[1] < away[0] else None
-
-
-FACTOR_COLOURS = (GREEN, BLUE, PINK)
 
 
 def _bode(bench: Bench, name: str) -> Figure:

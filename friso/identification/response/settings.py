@@ -173,10 +173,6 @@ class ResponseSettings(Settings):
     lines_of_a_scatter: int = setting(15, "")
     """Number of lines from which the scatter between neighbours is computed."""
 
-    # Simulated friction.
-    periods_simulated: int = setting(10, "")
-    """Number of periods simulated. Friction forgets the initial state within one or two."""
-
     # Two masses.
     resonance_ratios: tuple[float, ...] = setting((1.05, 1.2, 1.5, 2.0, 3.0), "")
     """Ratios of resonance to antiresonance from which the fit starts."""
