@@ -51,10 +51,10 @@ from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions, rests_off
 from friso.hunting.path import AttractionEnd, BandwidthWindow
 from friso.hunting.return_map.settings import ReturnMapSettings
-from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
+from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS
 from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, lasting_swings
 from friso.hunting.stage_margins import ParameterMargin, joint_margins
-from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
+from friso.hunting.tracking import Dwell, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement
 
 __all__ = [
@@ -98,8 +98,6 @@ __all__ = [
     "Point",
     "ReturnMap",
     "ReturnMapSettings",
-    "Reversal",
-    "SearchLimits",
     "Solver",
     "Space",
     "Spot",

@@ -56,13 +56,12 @@ class PathSearch:
         Factors nearest to 1 come first, until a fraction of the work is used up. Raises Exhausted if the allowance
         around the whole search is used up.
         """
-        sketch = sketched(self._stages(numbers))
-        self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
-        left = numbers[~sketch.decided]
+        self.attracts[numbers], self.decided[numbers] = sketched(self._stages(numbers))
+        left = numbers[~self.decided[numbers]]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
         at_once, work = (
             (edge_settings.bandwidths_at_once, edge_settings.simulated_work)
-            if sketch.decided.any()
+            if 2 * len(left) < len(numbers)  # maps decide most
             else (len(left), np.inf)
         )
         with allowance(work) as simulated:

@@ -6,7 +6,7 @@ Where a map does not decide, stages are searched from many starts.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -90,28 +90,16 @@ def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | 
     return landing_map if survey.resolved[0] and all(map(on_map, motions)) and all(attract) else None
 
 
-@dataclass(frozen=True)
-class Sketch:
-    """Result of coarse return maps of stages, arrays of shape (count,).
-
-    `attracts` is true if a stage seems to have an attractor, and `decided` if the map decides that.
-    """
-
-    attracts: np.ndarray
-    decided: np.ndarray
-
-
 @np.errstate(all="ignore")
-def sketched(stages: Ensemble) -> Sketch:
+def sketched(stages: Ensemble) -> tuple[np.ndarray, np.ndarray]:
     """Sketch the return maps of stages that may hunt, without closing orbits.
 
-    An attractor with a narrow basin is missed. Stages without a map stay undecided. Raises Exhausted if an allowance of
-    work is used up.
+    Returns which stages seem to have an attractor, and for which their map decides that, both (count,). An attractor
+    with a narrow basin is missed. Stages without a map stay undecided. Raises Exhausted if an allowance of work is used
+    up.
     """
     mapped, decided = _sketch(stages)
-    if mapped is None:
-        return Sketch(decided, decided)
-    return Sketch(mapped.surely_attract, decided)
+    return (decided if mapped is None else mapped.surely_attract), decided
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:

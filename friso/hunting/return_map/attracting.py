@@ -16,13 +16,8 @@ from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.return_map.landing_map import MapAttractor
-from friso.hunting.return_map.mapped import Mapped, map_stages, remembered
+from friso.hunting.return_map.mapped import Mapped, map_stages
 from friso.hunting.return_map.settings import settings as return_map_settings
-
-UNCLOSED = "an attractor of the map was not closed as an orbit that attracts"
-LOST = "runs were not completed"
-SCATTERS = "landings at equal distances return differently: the stage remembers more than its distance"
-"""Reason why a return map does not decide: landings at equal distances continue differently."""
 
 
 @dataclass(frozen=True)
@@ -38,26 +33,15 @@ class MapSurvey:
     undecided: np.ndarray
 
     @property
-    def doubts(self) -> np.ndarray:
-        """Return why a stage's map does not decide which motions are stable, texts (count,).
-
-        A text is "" if the map decides.
-        """
-        why = np.full(self.mapped.stages.count, "", dtype=object)
-        for stage, landing_map in enumerate(self.mapped.maps):
-            scatter, _ = landing_map.scatter
-            if self.undecided[stage]:
-                why[stage] = UNCLOSED
-            elif landing_map.lost:
-                why[stage] = LOST
-            elif scatter > return_map_settings.map_scatter_share:
-                why[stage] = f"{SCATTERS} ({remembered(self.mapped, stage)})"
-        return why
-
-    @property
     def resolved(self) -> np.ndarray:
-        """Return which stages have a map that decides which motions are stable, shape (count,)."""
-        return np.equal(self.doubts, "")
+        """Return which stages have a map that decides which motions are stable, shape (count,).
+
+        Every attractor was closed, no run was lost, and landings at equal distances return alike: where they do not,
+        the stage remembers more than its distance.
+        """
+        most = return_map_settings.map_scatter_share
+        whole = [one.lost == 0 and one.scatter <= most for one in self.mapped.maps]
+        return np.array(whole, bool) & ~self.undecided
 
     @property
     def attracts(self) -> np.ndarray:

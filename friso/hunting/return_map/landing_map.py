@@ -305,14 +305,14 @@ class LandingMap:
         return float(np.abs(np.prod(self._curve.slope(self._places(attractor.distances)))))
 
     @property
-    def scatter(self) -> tuple[float, float]:
-        """Return the largest relative error of a landing predicted by neighbours, and where it is.
+    def scatter(self) -> float:
+        """Return the largest relative error of a landing predicted by neighbours.
 
-        The place is a signed distance. The error is infinite if a stage comes to rest after one landing but swings on
-        alike after both neighbours of it, or the reverse. It is 0, and the place NaN, if no three points are close
-        together. Only points whose next landing is at more than half of their distance count.
+        It is infinite if a stage comes to rest after one landing but swings on alike after both neighbours of it, or
+        the reverse, and 0 if no three points are close together. Only points whose next landing is at more than half of
+        their distance count.
         """
-        worst, place = 0.0, np.nan
+        worst = 0.0
         for side in self.sides:
             points = self.points(side)
             if len(points) < 3:
@@ -327,10 +327,8 @@ class LandingMap:
             off = np.where(goes[1:-1] & goes[:-2] & goes[2:], off, np.where(goes[:-2] != goes[1:-1], np.inf, 0.0))
             off = np.where(alike & (u[2:] - u[:-2] < return_map_settings.scatter_range_log), off, 0.0)
             off[np.fmax(v[1:-1] - u[1:-1], v[2:] - u[2:]) < np.log(0.5)] = 0.0
-            if off.max() > worst:
-                k = int(off.argmax())
-                worst, place = float(off[k]), side * float(np.exp(u[k + 1]))
-        return worst, place
+            worst = max(worst, float(off.max()))
+        return worst
 
 
 def _place(distances: np.ndarray) -> np.ndarray:

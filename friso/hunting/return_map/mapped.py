@@ -149,29 +149,6 @@ def map_stages(
     return mapped
 
 
-def remembered(mapped: Mapped, stage: int) -> str:
-    """Return the state that best explains why runs with equal landings continue differently.
-
-    That state, given by its name, carries the stage's past. Returns "" if no landings show one.
-    """
-    landing_map = mapped.maps[stage]
-    _, place = landing_map.scatter
-    with np.errstate(all="ignore"):
-        apart = np.log(landing_map.before / place)  # NaN on the other side, or if nothing scatters
-    near = np.flatnonzero(
-        (np.abs(apart) < return_map_settings.coarse_gap_log) & landing_map.final & np.isfinite(landing_map.after)
-    )
-    if near.size < 2:
-        return ""
-    after = np.abs(landing_map.after[near])
-    least, most = (int(landing_map.run[near[k]]) for k in (after.argmin(), after.argmax()))
-    stages, states = mapped.stages, mapped.landings.ends
-    size = len(stages.kernel.states)
-    unlike = np.abs(np.abs(states[least, :size]) - np.abs(states[most, :size])) / stages.scales[stage]
-    unlike[[stages.integral, stages.sticking, stages.kernel.position]] = 0.0  # these give the distance and the wait
-    return stages.kernel.states[int(unlike.argmax())]
-
-
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
     """Return the landings of runs that begin stuck at `starts`, at most `most` of each run.
 
