@@ -117,8 +117,8 @@ def true_turns(flat: dict[str, Any], names: tuple[str, ...], times: np.ndarray) 
 
 def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, times: np.ndarray) -> np.ndarray:
     """States by SciPy Radau from the equations written by hand, from corner to corner."""
-    masses = ("position", "cart_position", "parasitic_position")
-    x = np.array([motion.initial_displacement(flat) if name in masses else 0.0 for name in names])
+    signs = {"position": 1, "cart_position": 1, "parasitic_position": 1, "filtered_error": -1}  # it has settled
+    x = motion.initial_displacement(flat) * np.array([signs.get(name, 0) for name in names], float)
     corners = [*(c for c in motion.pieces(flat, 1)[0][:, 0] if c < times[-1]), times[-1]]
     states = np.zeros((times.size, len(names)))
     rates, nudges = plain.rates(flat, names), np.diag(1e-7 * scales)

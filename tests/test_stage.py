@@ -126,7 +126,7 @@ def test_round_trip(path: Path, tmp_path: Path) -> None:
     again = load(tmp_path / "again.toml")
     assert (again, again.flat(), again.as_written()) == (stage, stage.flat(), stage.as_written())
     assert again.to_toml() == stage.to_toml()
-    assert stage.source
+    assert stage.source or path == TEMPLATE  # a machine of one's own has another source
 
 
 def test_numbers_are_written_as_people_do_and_read_again_as_the_same(rig: Stage) -> None:

@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
-from scipy.special import ndtr, stdtrit
 
 from friso.hunting.return_map.settings import settings
 
@@ -20,9 +18,6 @@ REST_COORDINATE, FIRST_COORDINATE = -1e6, -1e9
 
 TERMS = 4
 """Coefficients of a cubic."""
-
-THREE_SIGMA = float(ndtr(3.0))
-"""Probability that a normally distributed error is less than three standard errors to one side."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +131,8 @@ def _slopes(knots: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the slopes of a piece at its knots by Akima's rule, which does not overshoot beside a corner."""
     if len(knots) < 3:
         return np.ones(len(knots)) if len(knots) < 2 else np.full(2, np.diff(values)[0] / np.diff(knots)[0])
+    from scipy.interpolate import Akima1DInterpolator  # slow
+
     return Akima1DInterpolator(knots, values)(knots, 1)
 
 
@@ -161,6 +158,8 @@ def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> CubicFit
     within other reaches differ by beyond their own errors, as they do beside a corner. It is so large that three times
     it are as rare as with many landings (Student's distribution).
     """
+    from scipy.special import ndtr, stdtrit  # slow
+
     knots, _ = _merged(places, after)
     found = np.full((4, len(settings.fitted_reaches_log), len(about)), np.nan)
     found[2] = np.inf
@@ -180,7 +179,7 @@ def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> CubicFit
         freedom = np.maximum(number - TERMS, 1)
         scatter = np.sqrt((left**2).sum(axis=1) / freedom)
         good = enough & (scatter < settings.fitted_scatter_log)
-        error = scatter * np.sqrt(inverse[:, 1, 1]) / reach * stdtrit(freedom, THREE_SIGMA) / 3
+        error = scatter * np.sqrt(inverse[:, 1, 1]) / reach * stdtrit(freedom, ndtr(3.0)) / 3
         values[good], slopes[good], errors[good] = terms[0, good], terms[1, good] / reach, error[good]
         scatters[good] = scatter[good]
     best, column = found[2].argmin(axis=0), np.arange(len(about))
