@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import product
 
 import numpy as np
 
@@ -29,18 +28,17 @@ class Starts:
         """Return an empty list of starts for the stages with these numbers."""
         return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
-    def spread(self, thorough: np.ndarray | bool) -> None:
+    def spread(self, thorough: bool) -> None:
         """Add runs stuck at distances on both sides of the reference.
 
-        Symmetric stages get one side only. Stages that are `thorough`, (count,) or all, get twice as many distances,
-        and pushes as well.
+        Symmetric stages get one side only. A `thorough` survey has twice as many distances, and pushes as well.
         """
         controller = self.stages.structure.controller
         limited = controller is not None and controller.anti_windup is not None
-        for side, more in product((1.0, -1.0), (False, True)):
-            ranges = settings.thorough_starts if more else settings.usual_starts
-            units = spread_over(*ranges, *([settings.limited_starts] if limited else []))
-            which = np.flatnonzero(np.equal(thorough, more) & ((side > 0) | ~self.stages.symmetric))
+        ranges = settings.thorough_starts if thorough else settings.usual_starts
+        units = spread_over(*ranges, *([settings.limited_starts] if limited else []))
+        for side in (1.0, -1.0):
+            which = np.flatnonzero((side > 0) | ~self.stages.symmetric)
             if which.size:
                 owners = np.repeat(which, len(units))
                 stages = self.stages.take(owners)
@@ -50,7 +48,7 @@ class Starts:
                     self._add(owners, stuck(stages, distances, wound / stages.number("rate")))
                 if controller is not None and controller.anti_windup == "none":
                     self._wound_up(which, side)
-                if more:
+                if thorough:
                     pushes = spread_over(settings.pushed_starts)
                     owners = np.repeat(which, len(pushes))
                     stages = self.stages.take(owners)

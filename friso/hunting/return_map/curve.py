@@ -152,7 +152,7 @@ class CubicFit:
 
 
 def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> CubicFit:
-    """CubicFit cubics to the landings about coordinates `about`, (n,), of one continuous piece of a map.
+    """Fit cubics to the landings about coordinates `about`, (n,), of one continuous piece of a map.
 
     The landings lie within the reach at which the slope has the least standard error. The error grows by what slopes
     within other reaches differ by beyond their own errors, as they do beside a corner. It is so large that three times

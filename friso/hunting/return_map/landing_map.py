@@ -29,7 +29,6 @@ from friso.hunting.return_map.settings import settings as return_map_settings
 NEGATIVE_SIDE_SHIFT = 1e3
 """Shift of a landing's coordinate on the map, its log distance, on the negative side."""
 
-
 BISECTIONS = 40
 """Halvings of an interval of coordinates, after which it is as exact as `repeated_share`."""
 
