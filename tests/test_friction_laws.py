@@ -147,7 +147,7 @@ CASES = given(st.floats(0.3, 3), st.floats(3, 12), st.floats(1.2, 4), st.floats(
 @CASES
 def test_mirror(displacement: float, crossover: float, static: float, coulomb: float) -> None:
     keys = friction_keys(static=static, coulomb=coulomb) | {"controller.crossover": crossover, "motion.duration": 4.0}
-    one, other = (run(keys | {"motion.displacement": side * displacement * 1e-3}) for side in (1, -1))
+    one, other = (run(keys | {"motion.displacement": side * displacement * 1e-3}, 1e-9) for side in (1, -1))
     assert turns(one).size == turns(other).size
     assert turns(one) == pytest.approx(-turns(other), rel=1e-6, abs=1e-12)
     assert swing_heights(one) == pytest.approx(-swing_heights(other), rel=1e-6)
