@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.engine.allowance import Exhausted, allowance
+from friso.engine.allowance import Exhausted, allowance, current_allowance
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
@@ -59,11 +59,13 @@ class PathSearch:
         self.attracts[numbers], self.decided[numbers] = sketched(self._stages(numbers))
         left = numbers[~self.decided[numbers]]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
-        at_once, work = (
-            (edge_settings.bandwidths_at_once, edge_settings.simulated_work)
+        at_once, share = (
+            (edge_settings.bandwidths_at_once, edge_settings.simulated_work_share)
             if 2 * len(left) < len(numbers)  # maps decide most
-            else (len(left), np.inf)
+            else (len(left), 1.0)
         )
+        around = current_allowance()
+        work = share * around.left if around else np.inf
         with allowance(work) as simulated:
             try:
                 for first in range(0, len(left), at_once):
@@ -71,8 +73,7 @@ class PathSearch:
                     survey = attractors(self._stages(some), cycles=False)
                     self.attracts[some], self.decided[some] = survey.attracts, survey.decided
             except Exhausted:
-                # the allowance around this search has less left
-                if simulated.left < work - simulated.used or np.isinf(work):
+                if share == 1 or not simulated.exhausted:
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
@@ -126,7 +127,8 @@ class PathSearch:
             return None
         if end is None:
             raise Undecided
-        before = numbers[side * np.log(self.factors[numbers] / end.outside) <= 0]
+        nearer = end.inside if hunts else end.outside
+        before = numbers[side * np.log(self.factors[numbers] / nearer) <= 0]
         hunting_side = edge_settings.inside_end_log * np.sign(np.log(end.inside / end.outside))
         inside = float(np.clip(end.inside * np.exp(hunting_side), self.factors[0], self.factors[-1]))
         if hunts and side * np.log(inside) < 0:

@@ -154,8 +154,9 @@ class EdgeSettings(Settings):
     reach_log: float = setting(0.06, "log of bandwidth")
     """First distance ahead at which attractors are looked for. It doubles each time."""
 
-    simulated_work: float = setting(1e8, "")
-    """Work for simulations at bandwidths without a map. The rest of a check needs work too."""
+    simulated_work_share: float = setting(0.33, "of the work left")
+    """Work for simulations of the few stages whose maps do not decide. Beside an end of attraction these take long, and
+    following an orbit past them decides."""
 
     bandwidths_at_once: int = setting(8, "")
     """Bandwidths surveyed at once, as many as stages in one register."""
@@ -198,7 +199,7 @@ class CheckSettings(Settings):
     feeding_work_share: float = setting(0.3, "")
     """Least fraction of a case's work for the search of the cause that feeds a cycle."""
 
-    friction_margin_work_share: float = setting(0.25, "")
+    friction_margin_work_share: float = setting(0.4, "")
     """Work for the margin in static friction, as a fraction of that of a case."""
 
     advice_work_share: float = setting(0.1, "")
