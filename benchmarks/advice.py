@@ -23,7 +23,7 @@ from benchmarks.advice_equations import settling
 from benchmarks.report import print_table
 from friso.axis import speaking_of
 from friso.equations.bandwidth import sped_up
-from friso.frequency.crossover import loop_bandwidth
+from friso.frequency.bode import loop_bandwidth
 from friso.questions.tune.words import answer
 from friso.remedies.caps import speed_cap
 from friso.remedies.machines import Fleet, Goal, draw_fleet

@@ -154,7 +154,7 @@ def compare_thesis_rig() -> Values:
 
 
 def frequency_delays() -> Values:
-    from friso.frequency.crossover import limits
+    from friso.frequency.bode import limits
     from friso.stage import load
 
     stage, edges = load(ROOT / "examples" / "thesis_rig.toml"), {}

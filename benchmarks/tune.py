@@ -23,7 +23,7 @@ from scipy.stats import qmc
 
 from benchmarks.report import Goal as Target
 from benchmarks.report import print_goals, print_table
-from friso.frequency.crossover import limits, loop_bandwidths
+from friso.frequency.bode import limits, loop_bandwidths
 from friso.questions.tune.words import changes
 from friso.remedies.catalogue import BANDWIDTH, Remedy
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet

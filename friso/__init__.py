@@ -11,9 +11,9 @@ from friso.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from friso.errors import InputError, LogError, SpecError, StageError, StoreError
-    from friso.frequency.analysis import linear
+    from friso.frequency.loops import linear
     from friso.frequency.margins import Tuning, tuning
-    from friso.frequency.members import Members, member
+    from friso.frequency.system import Members, member
     from friso.interface.starting import example, init, schema
     from friso.questions.bode.question import bode
     from friso.questions.boundary.question import boundary
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 _PLACES = {
     "friso.interface.starting": ("example", "init", "schema"),
     "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
-    "friso.frequency.analysis": ("linear",),
-    "friso.frequency.members": ("Members", "member"),
+    "friso.frequency.loops": ("linear",),
+    "friso.frequency.system": ("Members", "member"),
     "friso.frequency.margins": ("Tuning", "tuning"),
     "friso.stage": ("Stage", "load", "loads", "save"),
     "friso.studies.axes": ("Samples",),

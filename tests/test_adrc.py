@@ -17,7 +17,7 @@ from friso.equations.bandwidth import faster
 from friso.equations.controllers.adrc import crossing_ratio
 from friso.errors import InputError
 from friso.frequency.margins import margins
-from friso.frequency.members import limit_cases
+from friso.frequency.system import limit_cases
 from friso.remedies.loops import linear_flat
 from friso.stage import Stage
 

@@ -16,7 +16,7 @@ from friso.equations.blocks import Blocks, Demand, Loop, Measured, Signal, loop_
 from friso.equations.component import STEADY, Kink, Role
 from friso.equations.continuous import Continuous, ForceLimit
 from friso.equations.sampled import SAMPLE_TIME, Rest, Sampled
-from friso.frequency.parts import FORCE, STAGE, compensator
+from friso.frequency.loops import FORCE, STAGE, compensator
 from friso.quantities import Quantity, Value, positive
 from friso.stage import ControllerSection, register_controller
 from friso.stage.controllers import CONTROLLERS

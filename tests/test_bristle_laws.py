@@ -26,8 +26,8 @@ from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.equations.driven import Driven
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.frequency.members import member
-from friso.frequency.parts import plant
+from friso.frequency.loops import plant
+from friso.frequency.system import member
 from friso.identification.output_error.parameters import fit_parameters
 from friso.stage.tables import friction_law
 from friso.virtual_rig.run import failures, run

@@ -25,7 +25,7 @@ from friso.equations.continuous import slow_gains
 from friso.equations.sampled import SAMPLE_TIME, sampled_controller
 from friso.equations.structure import controller_form
 from friso.frequency.margins import margins
-from friso.frequency.members import limit_cases
+from friso.frequency.system import limit_cases
 from friso.hunting import Hunting
 from friso.hunting import hunting as hunting_of
 from friso.identification.experiments.moves import identify_moves

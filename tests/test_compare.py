@@ -19,8 +19,8 @@ from friso.design_method.prepare import isolated
 from friso.equations.motion import Stand
 from friso.errors import InputError
 from friso.frequency.margins import margins
-from friso.frequency.members import limit_cases, member
 from friso.frequency.settings import FrequencySettings
+from friso.frequency.system import limit_cases, member
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
 from friso.questions.compare.blocks import compare_document, rows, sentences
 from friso.remedies import comparison as study

@@ -7,7 +7,7 @@ from variants import VARIANTS
 
 import friso
 from friso.equations.rail import friction_factors
-from friso.frequency.members import level
+from friso.frequency.system import level
 from friso.stage import Stage
 from friso.virtual_rig.run import as_built_keys
 

@@ -20,7 +20,7 @@ from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec, load_spec
 from friso.design_method.verification import MachineOutcomes, move_machines, verification
 from friso.equations.breakaway import least_breakaway
-from friso.frequency.crossover import limits, settled_margin
+from friso.frequency.bode import limits, settled_margin
 from friso.hunting import find_margin
 from friso.hunting.measures import measured_run
 from friso.leaf_springs import beams as beams_module

@@ -13,7 +13,7 @@ from friso.design_method.geometry import Geometry, Sheet, box, round_geometries,
 from friso.design_method.population import corners, random_machines, typical_move
 from friso.design_method.prepare import assumed, by_rules, outline, prepared, with_leaves
 from friso.design_method.spec import Spec, load_spec, read_spec
-from friso.frequency.crossover import rigid_bandwidth
+from friso.frequency.bode import rigid_bandwidth
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SPEC = EXAMPLES / "specs" / "thesis.toml"

@@ -17,8 +17,8 @@ from friso.equations.blocks import Loop
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
-from friso.frequency.members import limit_cases
-from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator
+from friso.frequency.loops import FORCE, REFERENCE, STAGE, VELOCITY, compensator
+from friso.frequency.system import limit_cases
 from friso.stage import Stage, numeric_keys
 from friso.stage.filters import FILTER_RULE, FILTERS, FilterSection, filter_forms
 from friso.studies.axes import SweptAxis, check_links, linked, read_axis

@@ -20,14 +20,19 @@ from friso.equations.component import TIME
 from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.roles import Role
 from friso.equations.structure import Structure, structure
-from friso.frequency.bode import bode
-from friso.frequency.crossover import COMFORTABLE_MARGIN, limits, settled_members
-from friso.frequency.family import impedance, loops, plants, scan_stability, spectral_abscissa
-from friso.frequency.loops import closed_loop, open_loop, poles, response
-from friso.frequency.margins import margins, of_loop, with_resonances
-from friso.frequency.members import Members, family, level, limit_cases, member
-from friso.frequency.parts import plant
-from friso.frequency.system import DriveTiming, exponentials
+from friso.frequency.bode import COMFORTABLE_MARGIN, bode, limits, settled_members
+from friso.frequency.loops import closed_loop, open_loop, plant, poles, response
+from friso.frequency.margins import (
+    impedance,
+    loops,
+    margins,
+    of_loop,
+    plants,
+    scan_stability,
+    spectral_abscissa,
+    with_resonances,
+)
+from friso.frequency.system import DriveTiming, Members, exponentials, family, level, limit_cases, member
 from friso.stage import Stage
 
 HZ = 2 * np.pi

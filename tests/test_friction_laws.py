@@ -17,7 +17,7 @@ from friso.engine.arrays import Results, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.frequency.members import steady_force
+from friso.frequency.system import steady_force
 from friso.hunting import Ensemble, find_attractors
 from friso.stage.tables import FRICTION
 

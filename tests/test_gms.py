@@ -13,8 +13,8 @@ from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.friction.gms import GeneralisedMaxwellSlip, polygon
 from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
-from friso.frequency.members import member
-from friso.frequency.parts import plant
+from friso.frequency.loops import plant
+from friso.frequency.system import member
 from friso.hunting import Ensemble, find_cycles
 from friso.studies.laws.conversion import measure_friction
 from friso_thesis.studies.describing.function import describing

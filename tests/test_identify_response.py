@@ -10,7 +10,7 @@ from scipy import signal
 from scipy.linalg import expm
 
 import friso
-from friso.frequency.analysis import linear
+from friso.frequency.loops import linear
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse

@@ -15,7 +15,7 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction
 from friso.equations.friction.gms import STIFFNESS
 from friso.errors import InputError
-from friso.frequency.members import steady_force
+from friso.frequency.system import steady_force
 from friso.identification.readings.common import stribeck_curve
 from friso.stage import Stage, element_keys
 from friso.stage.tables import friction_law

@@ -14,8 +14,8 @@ from friso.equations.component import Kink, Switch, state
 from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.frequency.members import level, member, speeds, steady_force
-from friso.frequency.parts import plant
+from friso.frequency.loops import plant
+from friso.frequency.system import level, member, speeds, steady_force
 from friso.hunting import Cycles, Ensemble, find_cycles
 from friso.identification.output_error.parameters import fit_parameters
 from friso.virtual_rig.run import as_built_keys, failures, run

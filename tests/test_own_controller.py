@@ -16,7 +16,7 @@ from friso.engine.arrays import Status
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
-from friso.frequency import crossover
+from friso.frequency import bode
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.remedies import method
@@ -116,7 +116,7 @@ def test_map_of_multipliers(locked: Stage, tmp_path: Path) -> None:
 def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
     document = answer(tmp_path, whole, "bode")
     assert "At 6.00 Hz" in document["conclusion"]
-    slow = crossover.limits(whole.replace({"drive.delay": None, "drive.sample_time": None}).flat())
+    slow = bode.limits(whole.replace({"drive.delay": None, "drive.sample_time": None}).flat())
     assert document["highest_stable_crossover_hz"] < slow.highest_stable
 
 

@@ -12,11 +12,9 @@ from variants import cascade, lugre, release, stage
 
 import friso
 from friso.frequency.bode import CascadeLoop, cascade_loops
-from friso.frequency.loops import cut_over_period, poles, response, samples_controller
+from friso.frequency.loops import FORCE, RATED, STAGE, cut_over_period, plant, poles, response, samples_controller
 from friso.frequency.margins import margins
-from friso.frequency.members import Members, limit_cases
-from friso.frequency.parts import FORCE, RATED, STAGE, plant
-from friso.frequency.system import DriveTiming, waited, zero_order_hold
+from friso.frequency.system import DriveTiming, Members, limit_cases, waited, zero_order_hold
 from friso.stage import Stage
 
 KV, KP, T_V, FAST, SLOW = 25.0, 50.0, 0.06, 1e-3, 4

@@ -13,9 +13,8 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.engine.simulate import sampled_outputs
 from friso.equations.structure import structure
-from friso.frequency.loops import closed_loop
-from friso.frequency.members import Members, member
-from friso.frequency.parts import operating_point
+from friso.frequency.loops import closed_loop, operating_point
+from friso.frequency.system import Members, member
 from friso.stage import Stage
 
 HELD = {"motion.kind": "hold"}

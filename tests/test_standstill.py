@@ -18,7 +18,7 @@ from friso.equations.blocks import Loop
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
-from friso.frequency.parts import compensator
+from friso.frequency.loops import compensator
 from friso.hunting import DITHERS, Ensemble, HuntingDoubt, stuck, wait
 from friso.hunting import hunting as hunting_of
 from friso.stage import Stage

@@ -30,8 +30,7 @@ import friso
 from friso.drives.program import Program
 from friso.drives.target import TARGETS, CodeTarget, Parcel
 from friso.errors import InputError
-from friso.frequency.loops import controller_over_period, samples_controller
-from friso.frequency.parts import RATED, STAGE
+from friso.frequency.loops import RATED, STAGE, controller_over_period, samples_controller
 from friso.questions.export.controller_words import verdict_line
 from friso.questions.export.parcel import packed
 from friso.stage import Stage

@@ -13,10 +13,8 @@ from scipy.io import savemat
 import friso
 from friso.engine.simulate import simulate
 from friso.equations.bandwidth import faster
-from friso.frequency.loops import poles
-from friso.frequency.members import limit_cases
-from friso.frequency.parts import FORCE, REFERENCE, compensator
-from friso.frequency.system import DriveTiming
+from friso.frequency.loops import FORCE, REFERENCE, compensator, poles
+from friso.frequency.system import DriveTiming, limit_cases
 from friso.hunting import HuntingDoubt, hunting
 from friso.shown.motion_words import motion_sentences
 from friso.stage import Stage

@@ -11,12 +11,10 @@ import friso
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import numbers
 from friso.equations.structure import structure
-from friso.frequency.crossover import limits, settled_members
-from friso.frequency.family import loops, spectral_abscissa
-from friso.frequency.loops import response
-from friso.frequency.members import Members, limit_cases, member
-from friso.frequency.parts import plant
-from friso.frequency.system import DriveTiming
+from friso.frequency.bode import limits, settled_members
+from friso.frequency.loops import plant, response
+from friso.frequency.margins import loops, spectral_abscissa
+from friso.frequency.system import DriveTiming, Members, limit_cases, member
 from friso.hunting import Decline, Ensemble, Feeding, cannot_hunt, hunting, unstable
 from friso.hunting.feeding import feeding
 from friso.hunting.settings import CheckSettings

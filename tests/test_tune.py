@@ -27,8 +27,8 @@ from friso.equations.bandwidth import sped_up
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.equations.motion import size
 from friso.equations.settings import SETTINGS
-from friso.frequency.crossover import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth, settled_margin
-from friso.frequency.family import controller_response
+from friso.frequency.bode import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth, settled_margin
+from friso.frequency.margins import controller_response
 from friso.hunting import check_given, find_margin
 from friso.hunting.measures import measured_run
 from friso.questions.tune.question import TuneAnswer

@@ -16,19 +16,18 @@ from friso.design_method.population import Population
 from friso.design_method.settings import settings
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
-from friso.frequency.crossover import (
-    COMFORTABLE_MARGIN,
-    Range,
-    ranges_below,
-    searched_crossovers,
-    settled_members,
-    shared,
+from friso.frequency.bode import COMFORTABLE_MARGIN, Range, ranges_below, searched_crossovers, settled_members, shared
+from friso.frequency.margins import (
+    Tuning,
+    controller_response,
+    distance_to_lines,
+    frequency_grid,
+    plants,
+    stability_by_poles,
+    tuning,
 )
-from friso.frequency.family import controller_response, distance_to_lines, frequency_grid, plants, stability_by_poles
-from friso.frequency.margins import Tuning, tuning
-from friso.frequency.members import Members
 from friso.frequency.settings import settings as frequency_settings
-from friso.frequency.system import DriveTiming
+from friso.frequency.system import DriveTiming, Members
 from friso.leaf_springs.evaluation import Evaluation
 from friso.stage import Stage
 

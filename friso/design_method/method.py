@@ -36,7 +36,7 @@ from friso.design_method.verification import HuntingMap, Verification, hunting_m
 from friso.engine.side_by_side import both
 from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import Range
+from friso.frequency.bode import Range
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage

@@ -17,7 +17,7 @@ from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, controller_table
 from friso.equations.motion import size
 from friso.errors import InputError
-from friso.frequency.crossover import rigid_bandwidth
+from friso.frequency.bode import rigid_bandwidth
 from friso.materials import materials
 from friso.quantities import as_toml, exactly, percent
 from friso.stage import Stage

@@ -1,4 +1,11 @@
-"""Analyse a stage linearly: limit cases, states between them, highest bandwidth, cascades.
+"""The Bode analysis of a stage: crossovers, and what limits them.
+
+Find a loop's bandwidth, and the crossovers with stability and the required margin.
+
+The bandwidth is the highest frequency at which the loop's gain is 1. Ranges in which a condition holds have their ends
+located.
+
+Analyse a stage linearly: limit cases, states between them, highest bandwidth, cascades.
 
 The loops of a cascade are each opened where a drive's Bode plot opens them. The plant leads from the commanded force to
 the velocity at the encoder. The velocity loop is cut where the velocity is fed back, with the position loop open. The
@@ -9,21 +16,39 @@ Electrical Feed Drives, chapters 3 and 4). With loops at several rates both are 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from typing import Any, Literal
 
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
-from friso.equations.settings import named_gains
+from friso.equations.bandwidth import bandwidth, faster, sped_up
+from friso.equations.settings import gain_states, named_gains
 from friso.errors import InputError
-from friso.frequency.crossover import Limits, Range, limits, ranges_below
-from friso.frequency.family import Scan, closed_loop_poles, loops, plant_poles, scan_stability, spectral_abscissa
-from friso.frequency.loops import lifted_loop, locus_of, poles, response
-from friso.frequency.margins import Margins, margins, margins_of, with_resonances
-from friso.frequency.members import (
+from friso.frequency.loops import FORCE, STAGE, VELOCITY, lifted_loop, locus_of, plant, poles, response
+from friso.frequency.margins import (
+    Margins,
+    PoleStability,
+    Scan,
+    bare_loops,
+    closed_loop_poles,
+    distance_to_lines,
+    frequency_grid,
+    loops,
+    margins,
+    margins_of,
+    plant_poles,
+    scan_stability,
+    spectral_abscissa,
+    stability_by_poles,
+    with_resonances,
+)
+from friso.frequency.settings import settings
+from friso.frequency.system import (
+    Complex,
+    DriveTiming,
     Members,
     family,
     limit_cases,
@@ -31,12 +56,337 @@ from friso.frequency.members import (
     member,
     steady_force,
 )
-from friso.frequency.parts import FORCE, STAGE, VELOCITY, plant
-from friso.frequency.settings import settings
-from friso.frequency.system import Complex, DriveTiming
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 from friso.stage.tables import leading_friction
+
+BANDWIDTH_FREQUENCIES = np.geomspace(0.01, 1e4, 800)
+"""Frequencies [Hz] at which loops are evaluated for their bandwidth; more lie near resonances of the stage."""
+
+
+def loop_bandwidth(stage: Stage) -> float:
+    """Return the bandwidth [Hz] of a stage: the last frequency at which its loop has gain 1.
+
+    The stage slides; while it is stuck, the bearing holds it and the loop hardly moves it. The result is NaN if the
+    gain never reaches 1. With other gains at standstill the larger bandwidth counts.
+    """
+    return float(np.fmax.reduce([_last_crossing(flat) for flat in gain_states(stage.flat())]))
+
+
+def rigid_bandwidth(stage: Stage) -> float:
+    """Return the bandwidth [Hz] of a stage with its joint locked and without a parasitic mode.
+
+    The mass then moves as a whole, as van Dijk's rules for the crossover assume.
+    """
+    flat = {key: value for key, value in stage.flat().items() if not key.startswith("parasitic.")}
+    return _last_crossing({**flat, "joint.locked": True} if stage.joint else flat)
+
+
+def _last_crossing(flat: Mapping[str, Any]) -> float:
+    crossings = margins(flat, _sliding(flat)).crossovers
+    return float(crossings[-1]) if crossings else float("nan")
+
+
+def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the bandwidths [Hz] of a stage whose controller is made faster by some factors.
+
+    The shape is (factors,).
+    """
+    return loop_bandwidths(stage, sped_up(stage.flat(), np.array(factors)), len(factors))
+
+
+@np.errstate(all="ignore")
+def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
+    """Return the bandwidths [Hz] of a stage with changed keys, in continuous time, (count,).
+
+    `changes` has the keys with their values [SI], arrays (count,). The stage slides; a loop that never falls through
+    gain 1 gives NaN. The results have a relative error of 1e-3: the loop is computed on a grid of frequencies, and its
+    gain is a power of frequency in between. If the gains at standstill differ, the larger bandwidth counts.
+    """
+    flat, sliding = stage.flat(), _sliding(stage.flat())
+    omega = with_resonances(2 * np.pi * BANDWIDTH_FREQUENCIES, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
+    machines = sliding.repeated(count)
+    return np.fmax.reduce([_last_falls(state, machines, omega) for state in gain_states({**flat, **changes})])
+
+
+def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:
+    """Return the last frequencies [Hz] at which open loops fall through gain 1, (machines,).
+
+    `machines` are states of the stage. The frequencies are searched between angular frequencies `omega` [rad/s]. NaN
+    marks a loop that never falls through 1.
+    """
+    loops = poles(flat, machines, DriveTiming(0.0, 0.0)).loop(omega)
+    gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))
+    falls = (gain[:, :-1] >= 0) & (gain[:, 1:] < 0)
+    last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
+    rows = np.arange(len(machines))
+    before, after = gain[rows, last], gain[rows, last + 1]
+    at = frequency[last] + (frequency[last + 1] - frequency[last]) * before / (before - after)
+    return np.where(falls.any(axis=1), np.exp(at), np.nan)
+
+
+def _sliding(flat: Mapping[str, Any]) -> Members:
+    """Return the limit case in which the stage slides."""
+    return next(case for name, case in limit_cases(flat).items() if not name.startswith("stuck"))
+
+
+EVENLY, NEAR_ZERO = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
+"""Where a step that contains an end is divided: evenly, and near the zero of a straight line, as fractions of the
+step."""
+
+Range = tuple[float, float]
+
+
+def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> tuple[Range, ...]:
+    """Return the ranges in which a function is below 0, with their ends located.
+
+    `at` are ascending positive arguments (n,) at which `excess`, the function, is evaluated first.
+    """
+    values = excess(at)
+    below = values < 0
+    changes = np.flatnonzero(below[1:] != below[:-1])
+    ends = [_end(at[k : k + 2], values[k : k + 2], excess) for k in changes]
+    ends = [*at[:1][below[:1]], *ends, *at[-1:][below[-1:]]]
+    return tuple((float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True))
+
+
+def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, ...]:
+    """Return the ranges in which both of two lists of ranges hold."""
+    pairs = [(max(a[0], b[0]), min(a[1], b[1])) for a in first for b in second]
+    return tuple(pair for pair in pairs if pair[0] < pair[1])
+
+
+def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
+    """Return the zero of the function `excess` between two arguments, from its values there."""
+    precise = settings.end_precision * np.log(at[-1] / at[0])
+    while np.log(at[-1] / at[0]) > precise:
+        with np.errstate(invalid="ignore"):
+            zero = np.nan_to_num(values[0] / (values[0] - values[-1]), nan=0.5)
+        shares = np.unique(np.clip(np.append(EVENLY, zero + NEAR_ZERO), 0.0005, 0.9995))
+        places = at[0] * (at[-1] / at[0]) ** shares
+        at, values = np.array([at[0], *places, at[-1]]), np.array([values[0], *excess(places), values[-1]])
+        k = int(((values < 0) != (values[0] < 0)).argmax())
+        at, values = at[k - 1 : k + 1], values[k - 1 : k + 1]
+    return float(np.sqrt(at[0] * at[1]))
+
+
+COMFORTABLE_MARGIN = 0.5
+"""Modulus margin that counts as comfortable: a peak sensitivity of 2, 6 dB."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Crossovers [Hz] at which a stage is stable, and those with a `comfortable` margin.
+
+    They are ranges within `searched_crossovers`, valid in all limit cases: stuck under any bias force or sliding fast,
+    limiter free or touched, with every set of gains that the loop may have.
+
+    For both kinds, one range contains the stage's own crossover, or is the next one below it (or the lowest).
+    `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None without a range. `first_lost` is
+    the state that becomes unstable just above `highest_stable`. `closest` is the state that comes closest to -1 just
+    above `highest_comfortable`. Each comes with the gains that act in it (`named_gains`), and is None if its range ends
+    with the search. Without a range, both states are given at the stage's own crossover. For a controller given by
+    gains all values are factors of its bandwidth.
+    """
+
+    searched: Range
+    stable: tuple[Range, ...]
+    comfortable: tuple[Range, ...]
+    highest_stable: float | None
+    highest_comfortable: float | None
+    first_lost: tuple[Members, str] | None
+    closest: tuple[Members, str] | None
+
+    @property
+    def open_ended(self) -> bool:
+        """Tell whether the stage is still stable at the end of the search."""
+        return self.highest_stable == self.searched[1]
+
+
+def limits(flat: Mapping[str, Any]) -> Limits:
+    """Find the crossovers at which a stage is stable, and those with a comfortable margin.
+
+    `flat` has the stage's keys in SI.
+    """
+    search = _SearchOfGains({name: _Search(keys, settled_members(keys)) for name, keys in named_gains(flat).items()})
+    ends, crossover = search.ends, _stated(flat)
+    stable = search.stable()
+    close = ranges_below(search.at, lambda f: COMFORTABLE_MARGIN - search.distance(f).min(axis=1))
+    comfortable = shared(close, stable)
+    highest, calm = (range_end(ranges, crossover) for ranges in (stable, comfortable))
+    above, beyond = (np.array([end * (1 + settings.crossover_nudge) if end else crossover]) for end in (highest, calm))
+    return Limits(
+        ends,
+        stable,
+        comfortable,
+        highest,
+        calm,
+        first_lost=None if highest == ends[1] else search.state(int(search.abscissa(above)[0].argmax())),
+        closest=None if calm == ends[1] else search.state(int(search.distance(beyond)[0].argmin())),
+    )
+
+
+def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range, ...]:
+    """Return the ranges of crossovers [Hz] at which a stage is stable in all given states.
+
+    For a controller that states no crossover, they are factors of its bandwidth.
+    """
+    return _Search(flat, members).stable()
+
+
+def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
+    """Return the upper end [Hz] of the range that contains a crossover [Hz].
+
+    If none does, it is the end of the next range below, or else of the lowest. None without ranges.
+    """
+    below = [high for low, high in ranges if low <= crossover] or [high for _, high in ranges[:1]]
+    return below[-1] if below else None
+
+
+def searched_crossovers(flat: Mapping[str, Any]) -> Range:
+    """Return the range of crossovers [Hz] that is searched.
+
+    The range ends below half the sampling frequency of a drive. For a controller that states no crossover, it is a
+    range of factors of its bandwidth.
+    """
+    drive = DriveTiming.of(flat)
+    if bandwidth(flat) is None:
+        return 1 / 100.0, 1000.0
+    return settings.lowest_crossover, min(settings.highest_crossover, 0.999 * drive.highest / (2 * np.pi))
+
+
+def settled_margin(flat: Mapping[str, Any]) -> float:
+    """Return the least modulus margin of the states in which a stage may settle.
+
+    It is 0 if one of them is unstable.
+    """
+    loops = scan_stability(flat, settled_members(flat))
+    return float(loops.distance.min()) if loops.stable.all() else 0.0
+
+
+def settled_members(flat: Mapping[str, Any]) -> Members:
+    """Return the limit cases, and the states stuck under a bias force.
+
+    A stage is in one of them unless it creeps or has just broken away, while its friction falls with speed.
+    """
+    members = family(flat, settings.search_biases, 2)
+    return Members.joined([*limit_cases(flat).values(), members[members.stuck]])
+
+
+def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:
+    """Tell whether a loop is unstable only because of the drive's sampling and delay.
+
+    The first result is for a sticking stage, the second for a sliding one. `flat` has the stage's keys in SI.
+    """
+    members = settled_members(flat)
+    smooth = {key: value for key, value in flat.items() if not key.startswith("drive.")}
+    if len(smooth) == len(flat):
+        return False, False
+    lost = scan_stability(smooth, members).stable & ~scan_stability(flat, members).stable
+    return bool(lost[members.stuck].any()), bool(lost[~members.stuck].any())
+
+
+def _stated(flat: Mapping[str, Any]) -> float:
+    """Return the crossover of a stage [Hz]; 1 for a controller that states none."""
+    named = bandwidth(flat)
+    return 1.0 if named is None else named
+
+
+def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
+    return faster(flat, crossover / _stated(flat))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Search over crossovers of a stage's controller, in all states in which it may settle.
+
+    `flat` has the stage's keys in SI, and `members` are these states. Parts that do not depend on the crossover are
+    computed once.
+    """
+
+    flat: Mapping[str, Any]
+    members: Members
+
+    @cached_property
+    def ends(self) -> Range:
+        return searched_crossovers(self.flat)
+
+    @cached_property
+    def at(self) -> np.ndarray:
+        """Return the crossovers [Hz] at which to look first, shape (crossovers,)."""
+        return np.geomspace(*self.ends, settings.crossover_steps)
+
+    def stable(self) -> tuple[Range, ...]:
+        """Return the ranges of crossovers at which the stage is stable in all states."""
+        return ranges_below(self.at, lambda f: self.abscissa(f).max(axis=1))
+
+    def abscissa(self, crossover: np.ndarray) -> np.ndarray:
+        """Return the real part [1/s] of the rightmost closed-loop pole, (crossovers, states)."""
+        return self._by_poles(crossover).abscissa.reshape(len(crossover), -1)
+
+    def distance(self, crossover: np.ndarray) -> np.ndarray:
+        """Return the least distance of the loop from -1, shape (crossovers, states)."""
+        omega, loops_of = self._loops
+        held = DriveTiming.of(self.flat).transfer(omega)
+        shared = np.array([distance_to_lines(loops_of(_at(self.flat, f)) * held) for f in crossover])
+        return np.minimum(shared, self._by_poles(crossover).resonant.reshape(shared.shape))
+
+    @cached_property
+    def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
+        """Return frequencies [rad/s] that resolve the loop at all crossovers, and a loop function.
+
+        The function takes the keys of a stage with any controller, and returns its loops at the frequencies. The
+        frequencies do not depend on the crossover, so that the distance from -1 is a smooth function of it.
+        """
+        grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
+        omega = np.unique(np.concatenate(grids))
+        return omega, bare_loops(self.flat, self.members, omega)
+
+    def _by_poles(self, crossover: np.ndarray) -> PoleStability:
+        return self._by_poles_at_all if crossover is self.at else self._looked_at(crossover)
+
+    @cached_property
+    def _by_poles_at_all(self) -> PoleStability:
+        return self._looked_at(self.at)
+
+    def _looked_at(self, crossover: np.ndarray) -> PoleStability:
+        """Return the stability of all states at each crossover, one crossover after the other."""
+        keys = _at(self.flat, np.repeat(crossover, len(self.members)))
+        return stability_by_poles(keys, self.members.repeated(len(crossover)))
+
+
+@dataclass(frozen=True)
+class _SearchOfGains:
+    """Search over crossovers with every set of gains that the loop may have: the searches with each, by its name."""
+
+    searches: Mapping[str, _Search]
+
+    @property
+    def ends(self) -> Range:
+        return self.searches[""].ends
+
+    @property
+    def at(self) -> np.ndarray:
+        """Return the crossovers [Hz] at which to look first, shape (crossovers,)."""
+        return self.searches[""].at
+
+    def stable(self) -> tuple[Range, ...]:
+        """Return the ranges of crossovers at which the stage is stable in all states with all gains."""
+        return reduce(shared, (search.stable() for search in self.searches.values()))
+
+    def abscissa(self, crossover: np.ndarray) -> np.ndarray:
+        """Return the real part [1/s] of the rightmost closed-loop pole, (crossovers, gains and states)."""
+        return np.hstack([search.abscissa(crossover) for search in self.searches.values()])
+
+    def distance(self, crossover: np.ndarray) -> np.ndarray:
+        """Return the least distance of the loop from -1, shape (crossovers, gains and states)."""
+        return np.hstack([search.distance(crossover) for search in self.searches.values()])
+
+    def state(self, number: int) -> tuple[Members, str]:
+        """Return the state of a column of `abscissa` and `distance`, and its gains."""
+        names, count = [*self.searches], len(self.searches[""].members)
+        return self.searches[names[number // count]].members[number % count], names[number // count]
+
 
 POSITION_TIME = "drive.position_sample_time"
 

@@ -1,4 +1,10 @@
-"""Build the loop of plant, controller and drive: closed, and cut at the actuator force.
+"""The loops of a stage: their parts, their transfer functions, and the linear cases together.
+
+Represent plant and controller of a stage as linear systems, for many states at once.
+
+The friction law has a steady state: stuck under a bias force, or sliding at a speed.
+
+Build the loop of plant, controller and drive: closed, and cut at the actuator force.
 
 Sampled loops, at one rate or several, are lifted to their common period. After that period all loops are due again. The
 controller is that of `friso.equations.sampled`, as a drive computes it. Over a period of N samples the loop is a
@@ -8,6 +14,8 @@ chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles deci
 Cut at the actuator, it has N characteristic loci. A gain or a phase common to all samples brings it to the edge of
 stability where one locus passes -1 (MacFarlane, Postlethwaite 1977, doi:10.1080/00207177708922217). So margins are
 those of a locus. With all loops at one rate, the loci are the loop's response at a frequency and at its aliases.
+
+Return a stage in one of its states as a linear system of python-control (`friso.linear`).
 """
 
 from __future__ import annotations
@@ -15,41 +23,252 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
 
-from friso.equations.blocks import Loop
-from friso.equations.component import Held
+from friso.equations.blocks import Controller, Loop
+from friso.equations.component import Component, Held, Kink
+from friso.equations.continuous import continuous_controller
+from friso.equations.joint import touching
+from friso.equations.model import REFERENCE as REFERENCE_COURSE
+from friso.equations.model import assemble
+from friso.equations.roles import Role
 from friso.equations.sampled import counter, sampled_controller
-from friso.equations.structure import ControllerForm, shared_structure
-from friso.frequency.members import Members
-from friso.frequency.parts import (
-    DISTURBANCE,
-    FORCE,
-    NOISE,
-    RATED,
-    REFERENCE,
-    STAGE,
-    VELOCITY,
-    compensator,
-    plant,
-    reference_derivatives,
-)
+from friso.equations.structure import ControllerForm, Structure, shared_structure
+from friso.equations.transmission import flanks
+from friso.errors import InputError
 from friso.frequency.settings import settings
 from friso.frequency.system import (
+    FORWARD,
     Complex,
     Declared,
     DriveTiming,
+    Members,
     System,
     behind_current_loop,
     delayed,
     fastest,
+    law_of,
+    level,
+    limit_cases,
+    limiter_in_series,
+    limiter_states,
+    motor_law_of,
     waited,
     zero_order_hold,
 )
+from friso.quantities import quoted
+from friso.stage import Stage
+from friso.stage.arguments import check_arguments
 from friso.stage.rig import LOOPS
+from friso.stage.tables import MOTOR_STATES, STATE_PREFIX, of_motor
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+
+def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """Return the steady values of a stage's friction law in each state of `members`, by name.
+
+    Each has the shape (members,). They are the values of its internal states, of its modes with memory, of the sides of
+    its kinks (where derivatives jump), and of its direction. The result is empty without friction.
+    """
+    law, forward = law_of(flat), members.forward.astype(float)
+    if law is None:
+        return {}
+    sign = 2 * forward - 1
+    at = {**flat, "velocity": sign * np.maximum(members.speed, np.finfo(float).tiny), FORWARD: forward}
+    sliding, stuck = law.sliding(at), law.stuck({**at, "bias": sign * members.bias})
+    internal = {
+        name: np.where(members.stuck, rest, moving)
+        for name, rest, moving in zip((*law.states, *law.modes), stuck, sliding, strict=True)
+    }
+    return {FORWARD: forward, **internal}
+
+
+def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """Return the steady values of the friction law at the motor in each state, by name.
+
+    The motor moves with the load and bears no bias force.
+    """
+    unbiased = replace(members, bias=np.zeros(len(members)))
+    point = operating_point(of_motor(flat), unbiased)
+    beyond = "beyond_"
+    return {
+        f"{beyond}{STATE_PREFIX}{name.removeprefix(beyond)}" if name.startswith(beyond) else f"{STATE_PREFIX}{name}": at
+        for name, at in point.items()
+    }
+
+
+FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
+FEEDFORWARD = "reference velocity", "reference acceleration", "reference jerk"
+STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
+RATED = "velocity's encoder"
+"""Name of the position signal that the drive differentiates to a velocity: the velocity encoder's, if separate."""
+
+_REFERENCE, _POSITION, _VELOCITY, *_DERIVATIVES = (
+    sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend", "r_jerk")
+)
+_CONTROLLER_INPUTS = {
+    REFERENCE: _REFERENCE,
+    STAGE: _POSITION,
+    VELOCITY: _VELOCITY,
+    **dict(zip(FEEDFORWARD, _DERIVATIVES, strict=True)),
+}
+
+
+def plant(flat: Mapping[str, Any], members: Members) -> System:
+    """Return the plant in each state of `members`, which are all stuck or all sliding.
+
+    Inputs are the forces on stage and cart [N]. Outputs are the positions of stage and cart, the joint deflection, the
+    position at the velocity's encoder [m], and the velocity of the stage [m/s]. `flat` has the keys in SI, which may be
+    arrays of shape (members,).
+    """
+    form = _plant(shared_structure(flat).standing)
+    velocity = np.where(members.forward, members.speed, -members.speed)
+    values = {**flat, **operating_point(flat, members)}
+    values |= dict.fromkeys(form.velocities, velocity)
+    values |= {**_ahead(touching, members.touched.astype(float)), **_ahead(flanks, 1.0)}
+    values |= {str(symbol): 0.0 for symbol in REFERENCE_COURSE}  # the reference rests
+    bodies = {form.cart: law_of(flat)}
+    if form.motor:
+        bodies[form.motor] = motor_law_of(flat)
+        values |= operating_point_of_motor(flat, members)
+    system = form.declared.at(values, len(members))
+    for body, law in bodies.items():
+        if law is not None:
+            stuck = members.stuck.all()
+            system = _following(system, body, law.states) if stuck else _without_constants(system, law.states)
+    return system
+
+
+def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
+    """Return the masses without friction as systems, from forces on stage and cart to positions.
+
+    There is one system for each entry of `touched`, with the limiter touched or not. Raises InputError for a
+    transmission with another nonlinearity than the friction of the guide.
+    """
+    drive = shared_structure(flat).transmission
+    if drive is not None and (drive.backlash or drive.friction != "none"):
+        actual = "a backlash" if drive.backlash else "friction at the motor"
+        raise InputError("transmission", actual, "the friction of the guide alone", "friso check, which simulates")
+    declared = _plant(replace(shared_structure(flat).standing, friction="none", friction_variant=None)).declared
+    masses = declared.at({**flat, **_ahead(touching, touched.astype(float))}, len(touched))
+    return masses.take((FORCE, DISTURBANCE), (STAGE, CART))
+
+
+def _ahead(kinks: Callable[[sp.Expr], tuple[Kink, Kink]], values: Any) -> dict[str, Any]:
+    """Return the symbols of the stops ahead and behind, by name: `values` say where the one ahead is touched.
+
+    With the limiter, members that touch it do so ahead. With a backlash, the motor stands on the flank ahead, on which
+    it pushes the load forward.
+    """
+    ahead, behind = (str(kink.beyond) for kink in kinks(sp.S.Zero))
+    return {ahead: values, behind: 0.0}
+
+
+def compensator(flat: Mapping[str, Any], members: int) -> System:
+    """Return the controller, from reference and measurements to the force [N].
+
+    Inputs are the reference, position [m] and velocity [m/s] of the stage, and velocity [m/s], acceleration [m/s^2] and
+    jerk [m/s^3] of the reference. There are `members` equal ones, unless keys are arrays. Raises InputError for a
+    controller that exerts no force.
+    """
+    form = shared_structure(flat).controller
+    assert form is not None  # a stage file has a controller
+    bare = replace(form, anti_windup=None, settings=form.settings.only("integral_leak"))
+    system = _compensator(bare).at(flat, members)
+    if not (system.c.any() or system.d.any()):
+        raise InputError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
+    return system
+
+
+def reference_derivatives(control: System) -> tuple[str, ...]:
+    """Return names of the derivatives of the reference that a controller takes."""
+    return tuple(name for name in FEEDFORWARD if control.sees(name))
+
+
+@dataclass(frozen=True)
+class _Plant:
+    """The model's own equations in symbols, with a force in place of the controller.
+
+    It has the names of all velocities, and of position and velocity of the cart and of the motor (None without a
+    transmission).
+    """
+
+    declared: Declared
+    velocities: tuple[str, ...]
+    cart: tuple[str, str]
+    motor: tuple[str, str] | None
+
+
+@cache
+def _plant(form: Structure) -> _Plant:
+    push = sp.Symbol("actuator_force", real=True)
+    seen: list[Loop] = []
+
+    def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
+        seen.append(loop)
+        return Controller(push, Component())
+
+    at_rest = replace(form, controller=None, biased=("cart",), limiter_pulls=True)  # a touched limiter stays touched
+    model = assemble(at_rest, control=control, alone=True)
+    (loop,) = seen
+    expressions = {name: output.expression for name, output in model.outputs.items()}
+    rated = loop.position if loop.rated is None else loop.rated
+    outputs = {STAGE: loop.position, CART: expressions["cart_position"], VELOCITY: loop.velocity, RATED: rated}
+    if "joint_deflection" in expressions:
+        outputs[DEFLECTION] = expressions["joint_deflection"]
+    inputs = {FORCE: push, DISTURBANCE: sp.Symbol("bias.cart", real=True)}
+    velocities = tuple(str(state.symbol) for state in model.states if state.role == Role.VELOCITY)
+    cart = (str(model.cart.position), str(model.cart.velocity))
+    motor = MOTOR_STATES if form.transmission else None
+    return _Plant(Declared(model.symbols, model.rhs, inputs, outputs), velocities, cart, motor)
+
+
+def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the names of the states that are position and velocity of the body with friction."""
+    return _plant(shared_structure(flat).standing).cart
+
+
+@cache
+def _compensator(form: ControllerForm) -> Declared:
+    speed, acceleration, jerk = _DERIVATIVES
+    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, speed, acceleration, reference_jerk=jerk)
+    control = continuous_controller(form, loop, sp.S.One, sp.S.One)
+    states = control.component.states
+    # within all limits of the controller
+    within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in control.component.kinks}
+    symbols = tuple(state.symbol for state in states)
+    force, *rates = (sp.sympify(e).subs(within) for e in (control.force, *(state.derivative for state in states)))
+    return Declared(symbols, tuple(rates), _CONTROLLER_INPUTS, {FORCE: force})
+
+
+def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:
+    """Return the system with the friction law's internal states tied to the stuck cart.
+
+    At rest the rate of these states is proportional to the velocity of the cart alone. So they differ from a multiple
+    of its position by a constant, which depends on where on the rail the cart got stuck. Nothing controls that
+    constant, and it does not matter; it would be a pole at 0.
+    """
+    position, velocity = map(system.states.index, cart)
+    a, c = system.a.copy(), system.c.copy()
+    for z in map(system.states.index, internal):
+        share = system.a[:, z, velocity]
+        for matrix in (a, c):
+            matrix[:, :, position] += share[:, None] * matrix[:, :, z]
+    return replace(system, a=a, c=c).keep([i for i, name in enumerate(system.states) if name not in internal])
+
+
+def _without_constants(system: System, internal: tuple[str, ...]) -> System:
+    """Return the system without internal states of the friction law that stay constant.
+
+    An example is the force of an element that slips. Such a state would be a pole at 0.
+    """
+    unmoved = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
+    return system.keep([i for i in range(len(system.states)) if i not in unmoved])
 
 
 @dataclass(frozen=True)
@@ -432,3 +651,96 @@ def _real_parts(poles: Complex) -> np.ndarray:
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)
     edge = np.where(poles.imag != 0, settings.undamped_ratio * size, 0.0) + ROUNDING * fastest
     return np.where(np.abs(poles.real) <= edge, 0.0, poles.real)
+
+
+@check_arguments
+def linear(stage: Stage, case: str | Members | None = None, part: str = "plant", series: bool = False) -> StateSpace:
+    """Return a stage in one state as a `control.StateSpace` in SI units, with named signals.
+
+    `case` is the name of a limit case ("stuck", "sliding", "stuck-touched", "sliding-touched", or "given" for a stage
+    that has just one; default: the first of them that the stage has), or a state such as
+    `friso.member(speed=1e-3)` [m/s], `friso.member(bias=2.0)` [N], both with `touched=True` if the limiter is.
+    `part` is one of
+
+    - "plant": from "force" on the stage and "disturbance on cart" [N] to "stage", "cart" and "joint deflection" [m];
+    - "controller": from "reference" and "stage" [m] (and "stage velocity" [m/s] if it measures that) to "force" [N];
+      one with feedforward also from "reference velocity" [m/s], "reference acceleration" [m/s^2] and "reference jerk"
+      [m/s^3], here and below;
+    - "open": the loop cut at the actuator, from "force" to minus the "force" of the controller;
+    - "closed": from "force", "reference", "disturbance on cart" and "sensor noise" [m] to "stage", "cart", "joint
+      deflection" and "force".
+
+    All are in continuous time, without sampling, delay and current loop of a drive. With `series`, a touched limiter
+    acts by the formula that Table 1 of the thesis prints, instead of in parallel with the joint. Where the cart is
+    stuck, its bristles follow it and are no states; a derivative of the measured velocity does not see the noise of the
+    sensor, which has none. Raises InputError for an unknown case or part, and for a state that the stage cannot be in.
+
+    Examples
+    --------
+    >>> import friso
+    >>> stage = friso.load(friso.example("thesis_rig"))
+    >>> friso.linear(stage, "stuck").output_labels
+    ['stage', 'cart', 'joint deflection']
+    """
+    if not isinstance(case, str | Members | None):
+        raise InputError("case", quoted(case), "the name of a limit case, or a state", "case=friso.member(speed=1e-3)")
+    flat: Mapping[str, Any] = stage.flat()
+    cases = limit_cases(flat)
+    member = _checked(flat, case) if isinstance(case, Members) else _chosen("case", case or next(iter(cases)), cases)
+    if series and member.touched.all():
+        flat, member = limiter_in_series(flat), member.with_limiter(False)
+    system = _chosen("part", part, _PARTS)(flat, member)
+    return _control(system, f"{stage.name} {part}".strip())
+
+
+def _checked(flat: Mapping[str, Any], member: Members) -> Members:
+    """Return a state of a stage unchanged, after checking that the stage can be in it.
+
+    Raises InputError for several states at once, a limiter that cannot be so, or a bias force that breaks the cart
+    away.
+    """
+    if len(member) != 1:
+        raise InputError(
+            "case", f"{len(member)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))"
+        )
+    if bool(member.touched[0]) not in limiter_states(flat):
+        state = f"a limiter that is {'' if member.touched[0] else 'not '}touched"
+        raise InputError("case", state, "what the joint allows: free with a stroke, it may be both", "touched=False")
+    least, most = -level(flat, not member.forward[0]), level(flat, bool(member.forward[0]))
+    if member.bias[0] and not least < member.bias[0] < most:
+        expected = f"between {least:g} N and {most:g} N, at which the cart breaks away"
+        raise InputError("case", f"a bias of {member.bias[0]:g} N", expected, "friso.member(bias=0.5)")
+    return member
+
+
+def _control(system: System, name: str) -> StateSpace:
+    from control import StateSpace
+
+    names = {"states": [*system.states], "inputs": [*system.inputs], "outputs": [*system.outputs]}
+    return StateSpace(system.a[0], system.b[0], system.c[0], system.d[0], name=name, **names)
+
+
+def _controller(flat: Mapping[str, Any], member: Members) -> System:
+    controller = compensator(flat, len(member))
+    measured = (REFERENCE, STAGE, VELOCITY) if controller.sees(VELOCITY) else (REFERENCE, STAGE)
+    return controller.take((*measured, *reference_derivatives(controller)), (FORCE,))
+
+
+def _at_axis(system: System) -> System:
+    """Return the system without its outputs of velocity, which only the controller uses."""
+    return system.take(system.inputs, [name for name in system.outputs if name not in (VELOCITY, RATED)])
+
+
+_PARTS: dict[str, Callable[[Mapping[str, Any], Members], System]] = {
+    "plant": lambda flat, member: _at_axis(plant(flat, member)),
+    "controller": _controller,
+    "open": open_loop,
+    "closed": lambda flat, member: _at_axis(closed_loop(flat, member)),
+}
+
+
+def _chosen(what: str, name: str, choices: Mapping[str, Any]) -> Any:
+    if name not in choices:
+        first = next(iter(choices))
+        raise InputError(what, quoted(name), f"one of {', '.join(choices)}", f'friso.linear(stage, {what}="{first}")')
+    return choices[name]

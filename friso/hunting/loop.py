@@ -172,7 +172,7 @@ def _lags(stages: Ensemble) -> np.ndarray:
 
     The stages are few enough for the memory.
     """
-    from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
+    from friso.frequency.loops import FORCE, STAGE, VELOCITY, compensator
 
     rate = stages.number("rate")
     mass = stages.number("stiffness") / rate**2

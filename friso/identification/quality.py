@@ -194,7 +194,7 @@ def _by_direction(flat: Mapping[str, Any], speed: np.ndarray, sign: np.ndarray) 
 
     Friction changes gradually from one direction to the other; the constant force is left out.
     """
-    from friso.frequency.members import steady_force  # imports SymPy, which is slow
+    from friso.frequency.system import steady_force  # imports SymPy, which is slow
 
     forward, backward = (steady_force(flat, speed, forwards) for forwards in (True, False))
     constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)

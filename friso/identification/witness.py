@@ -83,7 +83,7 @@ class Witness:
     """
 
     def __init__(self, log: Log, flat: Mapping[str, Any]) -> None:
-        from friso.frequency.parts import compensator  # imports SymPy, which is slow
+        from friso.frequency.loops import compensator  # imports SymPy, which is slow
 
         part = log.longest
         self.log, self.step = log, log.sample_time
@@ -148,7 +148,7 @@ class Witness:
         """Return the force [N] that the controller commands on the log, (samples,)."""
         if clock in self._commands:
             return self._commands[clock]
-        from friso.frequency.parts import FEEDFORWARD, REFERENCE, STAGE, VELOCITY
+        from friso.frequency.loops import FEEDFORWARD, REFERENCE, STAGE, VELOCITY
 
         step = self.step / clock
         velocity = np.diff(self.position, prepend=self.position[0]) / step
@@ -189,7 +189,7 @@ class Witness:
     def _ebb(self, clock: float) -> np.ndarray:
         """Return the force that each state of the controller causes from 1 on, by itself, (samples, states)."""
         if clock not in self._ebbs:
-            from friso.frequency.parts import FORCE
+            from friso.frequency.loops import FORCE
 
             of_states = self.system.take((), (FORCE,))
             half, one = of_states.a[0] * self.step / clock / 2, np.eye(of_states.a.shape[1])
@@ -313,7 +313,7 @@ CHANNELS = ("reference", "position", "force")
 
 def _driven(system: System, inputs: dict[str, np.ndarray], step: float) -> np.ndarray:
     """Return the force [N] of a linear controller on sampled inputs, by Tustin's rule, (samples,)."""
-    from friso.frequency.parts import FORCE
+    from friso.frequency.loops import FORCE
 
     chosen = system.take([name for name in system.inputs if name in inputs], (FORCE,))
     a, b, c, d = chosen.a[0], chosen.b[0], chosen.c[0], chosen.d[0]

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from friso.frequency.crossover import loop_bandwidth
+from friso.frequency.bode import loop_bandwidth
 from friso.remedies.machines import Goal
 from friso.remedies.settings import settings
 from friso.stage import Stage

@@ -19,7 +19,7 @@ from friso.equations.motion import pieces
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
-from friso.frequency.crossover import COMFORTABLE_MARGIN, bandwidths_at, limits, settled_margin
+from friso.frequency.bode import COMFORTABLE_MARGIN, bandwidths_at, limits, settled_margin
 from friso.hunting import find_attractors
 from friso.quantities import exactly
 from friso.remedies.caps import SpeedCap, speed_cap

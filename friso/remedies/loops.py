@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from friso.frequency.family import about_resonances, for_poles
 from friso.frequency.loops import Poles
-from friso.frequency.members import limit_cases
+from friso.frequency.margins import about_resonances, for_poles
+from friso.frequency.system import limit_cases
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 

@@ -15,7 +15,7 @@ from scipy.constants import golden
 
 from friso.equations.motion import size
 from friso.errors import InputError, StageError
-from friso.frequency.crossover import COMFORTABLE_MARGIN
+from friso.frequency.bode import COMFORTABLE_MARGIN
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import exactly
 from friso.remedies.drawn import FEWEST_MACHINES, FROM_LEAVES, HELD, SPREADS, draw_machines

@@ -17,7 +17,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
-from friso.frequency.crossover import Limits, limits, loop_bandwidth
+from friso.frequency.bode import Limits, limits, loop_bandwidth
 from friso.hunting import Case
 from friso.platform.extras import missing
 from friso.progress import Progress, silent

@@ -17,7 +17,7 @@ from scipy.stats import qmc
 
 from friso.engine.allowance import Allowance, Exhausted, allowance
 from friso.engine.arrays import ArrayColumns
-from friso.frequency.crossover import loop_bandwidths
+from friso.frequency.bode import loop_bandwidths
 from friso.remedies.catalogue import Remedy
 from friso.remedies.machines import Fleet, Goal
 from friso.remedies.settings import settings

@@ -17,8 +17,8 @@ from friso.equations.bandwidth import faster
 from friso.equations.continuous import slow_gains
 from friso.equations.settings import gain_states
 from friso.equations.structure import structure
-from friso.frequency.crossover import loop_bandwidth, settled_margin
-from friso.frequency.members import in_series
+from friso.frequency.bode import loop_bandwidth, settled_margin
+from friso.frequency.system import in_series
 from friso.hunting import (
     Case,
     Hunting,

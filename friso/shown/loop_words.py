@@ -18,7 +18,7 @@ def lost_as_built(stage: Stage) -> tuple[LoopState, ...]:
     """Return the states in which samples and delays of the drive make the loop of a stage unstable."""
     if not any(key.startswith("drive.") for key in stage.flat()):
         return ()
-    from friso.frequency.crossover import unstable_as_built  # 0.3 s to import
+    from friso.frequency.bode import unstable_as_built  # 0.3 s to import
 
     states: tuple[LoopState, LoopState] = ("sticks", "slides")
     return tuple(state for state, lost in zip(states, unstable_as_built(stage.flat()), strict=True) if lost)

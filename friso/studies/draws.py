@@ -230,7 +230,7 @@ class _Ladder:
 
     def stands_as_built(self, place: int) -> bool:
         """Tell whether the loop of the stage itself stays stable with samples and delays of its drive."""
-        from friso.frequency.crossover import unstable_as_built  # 0.3 s to import
+        from friso.frequency.bode import unstable_as_built  # 0.3 s to import
 
         return not any(unstable_as_built(at_bandwidth(self.stage.flat(), self.factor(place) * (self.own or 1.0))))
 

@@ -45,7 +45,7 @@ def test_the_parameter_study_against_the_experiment(below: float, holds: bool) -
 @pytest.mark.slow
 def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
     """At a ratio just below the one found the margin is too small; from it on it never is."""
-    from friso.frequency.crossover import settled_margin
+    from friso.frequency.bode import settled_margin
     from friso_thesis.studies.thesis.studies import thesis_rig
 
     ratio = design_rules._needed_ratio(thesis_rig().to_toml())

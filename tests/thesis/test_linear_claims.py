@@ -10,8 +10,8 @@ import pytest
 import sympy as sp
 
 from friso.frequency.bode import bode
-from friso.frequency.family import spectral_abscissa
-from friso.frequency.members import Members, limit_cases
+from friso.frequency.margins import spectral_abscissa
+from friso.frequency.system import Members, limit_cases
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.judges.control_law import (
     PRINTED_SENSITIVITY,

@@ -5,10 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from friso.frequency.bode import Bode
-from friso.frequency.crossover import Limits
+from friso.frequency.bode import Bode, Limits
 from friso.frequency.margins import Margins
-from friso.frequency.members import Members
+from friso.frequency.system import Members
 from friso.questions.bode.figures import bode_figures
 from friso.questions.bode.numbers import rows
 from friso.questions.bode.states import has_limiter, shown_states, side

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.frequency.bode import Bode, BodeCase, CascadeLoop
-from friso.frequency.crossover import COMFORTABLE_MARGIN
+from friso.frequency.bode import COMFORTABLE_MARGIN, Bode, BodeCase, CascadeLoop
 from friso.questions.bode.numbers import decibels
 from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
 from friso.shown.drawing.colours import ramp

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.frequency.bode import Bode, CascadeLoop
 from friso.frequency.margins import Margins
-from friso.frequency.members import Members
+from friso.frequency.system import Members
 from friso.shown.drawing.figure import Dash
 from friso.shown.drawing.palette import BLUE, GREY, ORANGE, SKY, VERMILLION
 from friso.shown.drawing.prefixes import with_unit

@@ -8,10 +8,9 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth
 from friso.equations.structure import structure
-from friso.frequency.bode import Bode, Unstable
-from friso.frequency.crossover import COMFORTABLE_MARGIN, Limits, Range
+from friso.frequency.bode import COMFORTABLE_MARGIN, Bode, Limits, Range, Unstable
 from friso.frequency.margins import Margins
-from friso.frequency.members import Members
+from friso.frequency.system import Members
 from friso.questions.bode.numbers import growth
 from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, with_gains
 from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit

@@ -11,7 +11,7 @@ from friso.design_method.choice import Candidate, Confirmed
 from friso.design_method.method import Design, UnfinishedDesign
 from friso.design_method.population import Corners
 from friso.design_method.verification import MachineOutcomes
-from friso.frequency.crossover import COMFORTABLE_MARGIN, Range
+from friso.frequency.bode import COMFORTABLE_MARGIN, Range
 from friso.materials import materials
 from friso.questions.design.window import limit_name, stiffest, view
 from friso.questions.design.words import hertz, size

@@ -12,7 +12,7 @@ from friso.design_method.population import Corners
 from friso.design_method.requirements import RelaxableKey, Requirement
 from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
-from friso.frequency.crossover import COMFORTABLE_MARGIN
+from friso.frequency.bode import COMFORTABLE_MARGIN
 from friso.quantities import percent, plain_factor
 from friso.questions.design import words
 from friso.questions.design.window import CrossoverBound, comfortable, lower, upper

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.design_method.method import Design
-from friso.frequency.crossover import COMFORTABLE_MARGIN, Range, searched_crossovers
+from friso.frequency.bode import COMFORTABLE_MARGIN, Range, searched_crossovers
 
 
 @dataclass(frozen=True)

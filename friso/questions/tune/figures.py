@@ -10,8 +10,7 @@ import numpy as np
 from friso.engine.simulate import simulate
 from friso.equations.motion import last_corner
 from friso.frequency.loops import response
-from friso.frequency.members import limit_cases
-from friso.frequency.system import DriveTiming
+from friso.frequency.system import DriveTiming, limit_cases
 from friso.remedies.loops import linear_flat
 from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome

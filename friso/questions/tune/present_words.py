@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from friso.frequency.crossover import loop_bandwidth
+from friso.frequency.bode import loop_bandwidth
 from friso.quantities import percent
 from friso.remedies.machines import MoveRange
 from friso.remedies.method import Advice

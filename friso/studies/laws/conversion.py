@@ -17,7 +17,7 @@ from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
 from friso.equations.friction.measured import MeasuredFriction
 from friso.errors import InputError
-from friso.frequency.members import steady_force
+from friso.frequency.system import steady_force
 from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.section import list_fields, numeric_fields

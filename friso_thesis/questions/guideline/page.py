@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.evidence import findings_on_file, value
-from friso.frequency.crossover import COMFORTABLE_MARGIN
+from friso.frequency.bode import COMFORTABLE_MARGIN
 from friso.quantities import percent
 from friso.shown.files import Content, pictures
 from friso.shown.pages import environment

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize.elementwise import find_root
 
 from friso.engine.tolerance import checked_rtol
-from friso.frequency.parts import mechanics
+from friso.frequency.loops import mechanics
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
 from friso_thesis.studies.describing.balance import TOUCHES, beyond_stroke

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
-from friso.frequency import crossover
-from friso.frequency.crossover import Range, limits
+from friso.frequency import bode
+from friso.frequency.bode import Range, limits
 from friso.hunting import Ensemble, find_margin
 from friso.stage import Stage
 from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, find_edges
@@ -185,7 +185,7 @@ def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
     Settled states are the limit cases, and all states stuck under a bias force. `changes` are keys that are changed
     first, in SI. The stage is sampled like the thesis's drive. The margin is 0 if a state is not stable.
     """
-    return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
+    return bode.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
 
 
 def holding(ranges: Sequence[Range], crossover: float) -> Range | None:

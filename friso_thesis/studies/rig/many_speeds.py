@@ -19,7 +19,7 @@ import numpy as np
 
 from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.rail import friction_factors
-from friso.frequency.members import steady_force
+from friso.frequency.system import steady_force
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identification.readings.at_bearing import machine_between
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
-from friso.frequency.crossover import settled_margin
+from friso.frequency.bode import settled_margin
 from friso.hunting.criteria import COUNTED_AFTER, FAILED, SWINGS
 from friso.quantities import percent
 from friso.stage import loads

@@ -14,10 +14,9 @@ import numpy as np
 import sympy as sp
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, as_gains, numbers
-from friso.frequency.crossover import COMFORTABLE_MARGIN, settled_margin
-from friso.frequency.family import loops
-from friso.frequency.margins import margins
-from friso.frequency.members import in_series, limit_cases, member
+from friso.frequency.bode import COMFORTABLE_MARGIN, settled_margin
+from friso.frequency.margins import loops, margins
+from friso.frequency.system import in_series, limit_cases, member
 from friso.quantities import percent
 from friso.stage import loads
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges

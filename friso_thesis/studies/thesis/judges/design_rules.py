@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import COMFORTABLE_MARGIN, settled_margin
+from friso.frequency.bode import COMFORTABLE_MARGIN, settled_margin
 from friso.hunting import find_margin
 from friso.quantities import percent
 from friso.stage import Stage, loads

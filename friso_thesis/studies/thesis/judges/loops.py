@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from friso.frequency.crossover import COMFORTABLE_MARGIN, Range
+from friso.frequency.bode import COMFORTABLE_MARGIN, Range
 from friso.frequency.margins import Margins
 from friso.frequency.settings import settings as frequency_settings
 from friso.quantities import percent

@@ -14,12 +14,19 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
-from friso.frequency.crossover import range_end, ranges_below, searched_crossovers, stable_crossovers
-from friso.frequency.family import controller_response, loops, plant_poles, plants
-from friso.frequency.margins import Margins, frequencies, margins, with_resonances
-from friso.frequency.members import Members, in_series, limit_cases
+from friso.frequency.bode import range_end, ranges_below, searched_crossovers, stable_crossovers
+from friso.frequency.margins import (
+    Margins,
+    controller_response,
+    frequencies,
+    loops,
+    margins,
+    plant_poles,
+    plants,
+    with_resonances,
+)
 from friso.frequency.settings import settings as frequency_settings
-from friso.frequency.system import DriveTiming
+from friso.frequency.system import DriveTiming, Members, in_series, limit_cases
 from friso.stage import Stage
 from friso_thesis.studies.rig.experiments.frf import CROSSOVER_SETTINGS as MEASURED_SETTINGS
 from friso_thesis.studies.thesis.studies import LOCKED

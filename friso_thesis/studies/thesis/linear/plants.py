@@ -14,15 +14,11 @@ from scipy.signal import find_peaks
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.bode import PRESCRIBED_SPEEDS
-from friso.frequency.crossover import Range, ranges_below
-from friso.frequency.family import loops, plant_poles, plants, spectral_abscissa
-from friso.frequency.loops import closed_loop
-from friso.frequency.margins import frequencies
-from friso.frequency.members import Members, law_of, limit_cases, limiter_in_series, member, speeds
-from friso.frequency.parts import DISTURBANCE, FORCE, STAGE, cart_states, operating_point, plant
+from friso.frequency.bode import PRESCRIBED_SPEEDS, Range, ranges_below
+from friso.frequency.loops import DISTURBANCE, FORCE, STAGE, cart_states, closed_loop, operating_point, plant
+from friso.frequency.margins import frequencies, loops, plant_poles, plants, spectral_abscissa
 from friso.frequency.settings import settings
-from friso.frequency.system import DriveTiming
+from friso.frequency.system import DriveTiming, Members, law_of, limit_cases, limiter_in_series, member, speeds
 from friso.stage.tables import friction_law
 
 SPEED_COUNT = 257
