@@ -176,7 +176,7 @@ def hunting_locked_rig() -> Values:
 def hunting_limiter() -> Values:
     import numpy as np
 
-    from friso.engine.simulate import output_variables
+    from friso.engine.batch import output_variables
     from friso.hunting import CYCLE_RTOL, Ensemble, find_cycles, multipliers
     from friso.stage import load
 

@@ -18,7 +18,7 @@ import numpy as np
 
 import friso
 from benchmarks.report import print_table
-from friso.engine.processor import PROCESSOR_VARIABLE, processor
+from friso.engine.machine_code import PROCESSOR_VARIABLE, processor
 from friso.studies.execute import local_crew
 from friso.studies.study import Request, Study
 from friso.studies.sweep import run_in_memory

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 import friso
-from friso.engine.driven import run_driven
+from friso.engine.batch import run_driven
 from friso.identification.logs.log import Log
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.output_error.settings import OutputErrorSettings

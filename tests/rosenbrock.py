@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from friso.engine.tableaus.tableau import Tableau
+from friso.engine.tableaus import Tableau
 
 Real = np.longdouble
 

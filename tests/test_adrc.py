@@ -12,7 +12,7 @@ from test_cascade import sampled_forces
 from variants import limit, lugre, stage, there_and_back
 
 import friso
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.adrc import crossing_ratio
 from friso.errors import InputError

@@ -45,8 +45,8 @@ from friso.app.serve import Server, listening
 from friso.app.server import application
 from friso.app.work import Work, Workshop
 from friso.axis import LINEAR
-from friso.engine.overtaken import Overtaken, ended_by, go_on, going_first, is_first
 from friso.engine.settings import BuildSettings
+from friso.engine.side_by_side import Overtaken, ended_by, go_on, going_first, is_first
 from friso.errors import InputError, LogError
 from friso.identification.logs.mapping import sidecar
 from friso.shown.drawing.drawable import drawable

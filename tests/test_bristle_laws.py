@@ -21,7 +21,7 @@ from variants import (
 )
 
 import friso
-from friso.engine.driven import Inputs, run_driven
+from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.equations.driven import Driven
 from friso.equations.structure import structure

@@ -16,7 +16,8 @@ import pytest
 from patience import LIMIT
 from systems import posix
 
-from friso.engine import building, cache, prune
+from friso.engine import building, cache
+from friso.engine import cache as prune
 from friso.engine.cache import SECONDS_OF_A_DAY
 from friso.engine.settings import BuildSettings
 from friso.platform import private
@@ -26,7 +27,7 @@ BUILDER = """
 import os
 
 from friso.engine.cache import keep
-from friso.engine.kinds import ArrayKind
+from friso.engine.machine_code import ArrayKind
 from friso.engine.machine_code import object_code
 from friso.engine.scalar_code import scalar_llvm
 
@@ -42,7 +43,7 @@ import sys
 import numpy as np
 from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest
-from friso.engine.kinds import ArrayKind
+from friso.engine.machine_code import ArrayKind
 from friso.engine.machine_code import Loops, load_object
 
 (entry,) = built_entries([CodeRequest(sys.argv[1], "a stand-in", "stand_in_builder", b"task")])

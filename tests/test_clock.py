@@ -15,9 +15,8 @@ from scipy.linalg import expm
 
 from friso.engine import simd_math
 from friso.engine.arrays import Results, Status, Tables
-from friso.engine.batch import RunOptions, options_of, prepare, run_batch
+from friso.engine.batch import RunOptions, options_of, prepare, run_batch, simulate
 from friso.engine.kernel import Kernel, KernelRequest, empty_results, kernel, kernels
-from friso.engine.simulate import simulate
 from friso.equations.as_built import NEUTRAL, AsBuilt, _command
 from friso.equations.blocks import Loop
 from friso.equations.component import Held, key, state

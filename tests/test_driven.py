@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from plain_axis import DRAG, KI, KP, MASS, TIME, plain_axis
 
-from friso.engine.driven import Inputs, run_driven
+from friso.engine.batch import Inputs, run_driven, simulate
 from friso.engine.kernel import kernel
-from friso.engine.simulate import simulate
 from friso.equations.driven import Driven
 from friso.equations.structure import structure
 from friso.stage import Stage

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from variants import HOLD, dwell, elasto_plastic, gains, load_dependent, lugre, release, rolling, stage, van_dijk
 
 import friso
-from friso.engine.driven import Inputs, run_driven
+from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
 from friso.hunting import Ensemble, HuntingDoubt, find_cycles

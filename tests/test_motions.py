@@ -15,7 +15,7 @@ from variants import gains, limit, lugre, release, stage
 
 import friso
 from benchmarks.truth.by_hand import by_hand
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.equations import motion
 from friso.equations.motions.profile import LIMITS, plan
 from friso.equations.reference import value

@@ -17,9 +17,7 @@ from variants import VARIANTS
 import friso
 from friso.engine import driver, scalar_code, vector_code
 from friso.engine.kernel import driver_kinds, kernel
-from friso.engine.layout import FUNCTIONS
-from friso.engine.machine_code import optimised
-from friso.engine.processor import PROCESSOR_VARIABLE, Processor, loadable, processor
+from friso.engine.machine_code import FUNCTIONS, PROCESSOR_VARIABLE, Processor, loadable, optimised, processor
 from friso.equations.structure import structure
 
 STICK_SLIP = Path(__file__).parent.parent / "examples" / "lugre_stick_slip.toml"

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from friso.engine.kinds import argument_kind
-from friso.engine.machine_code import Loops, load_object, object_code
+from friso.engine.machine_code import Loops, argument_kind, load_object, object_code
 from friso.engine.scalar_code import scalar_llvm, take_next
 
 HALF, WAYS = 0.5, (1, -1)

@@ -9,8 +9,7 @@ import pytest
 from patience import LIMIT, wait_until
 
 from friso.engine import side_by_side as module
-from friso.engine.overtaken import Overtaken, ended_by, go_on
-from friso.engine.side_by_side import cores_to_use, side_by_side
+from friso.engine.side_by_side import Overtaken, cores_to_use, ended_by, go_on, side_by_side
 
 
 @pytest.mark.parametrize("cores", [1, 2])

@@ -8,11 +8,10 @@ import pytest
 from compiled import in_all
 from variants import VARIANTS
 
-from friso.engine import roots, simd_math, vector_code
+from friso.engine import simd_math, vector_code
+from friso.engine import simd_math as roots
 from friso.engine.kernel import kernel
-from friso.engine.layout import LANES
-from friso.engine.machine_code import optimised
-from friso.engine.processor import processor
+from friso.engine.machine_code import LANES, optimised, processor
 from friso.equations.structure import structure
 
 WIDE = {8: "zmm|ymm", 4: "ymm"}.get(LANES, "")

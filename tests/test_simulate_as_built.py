@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import friso
 import friso.equations.motion
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.equations.rail import friction_factors
 from friso.stage import Stage
 from friso.stage.rig import is_as_built

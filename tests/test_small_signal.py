@@ -9,9 +9,8 @@ from scipy.optimize import least_squares
 
 import friso
 from friso.engine.arrays import Status
-from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.batch import RunOptions, run_chunks, sampled_outputs
 from friso.engine.kernel import Kernel, kernel
-from friso.engine.simulate import sampled_outputs
 from friso.equations.structure import structure
 from friso.frequency.loops import closed_loop, operating_point
 from friso.frequency.system import Members, member

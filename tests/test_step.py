@@ -14,7 +14,7 @@ from compiled import aligned, step
 from variants import VARIANTS, plain_module
 
 from friso.engine.kernel import Kernel, kernel
-from friso.engine.layout import ROW
+from friso.engine.machine_code import ROW
 from friso.engine.simd_math import quarter_sine
 from friso.engine.tableaus import TABLEAUS
 from friso.equations import motion

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import rosenbrock
 
-from friso.engine.tableaus import TABLEAUS
-from friso.engine.tableaus.tableau import Tableau
+from friso.engine.tableaus import TABLEAUS, Tableau
 
 METHODS = pytest.mark.parametrize("method", TABLEAUS.values(), ids=TABLEAUS)
 Real = np.longdouble

@@ -11,7 +11,7 @@ from scipy import signal
 from scipy.io import savemat
 
 import friso
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.equations.bandwidth import faster
 from friso.frequency.loops import FORCE, REFERENCE, compensator, poles
 from friso.frequency.system import DriveTiming, limit_cases

@@ -22,7 +22,7 @@ from friso import Stage, load, loads
 from friso.app import questions
 from friso.design_method.prepare import isolated
 from friso.engine.allowance import allowance
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.equations.bandwidth import sped_up
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.equations.motion import size

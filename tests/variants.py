@@ -8,7 +8,7 @@ from types import ModuleType
 import maxwell_slip as maxwell_slip
 
 import friso
-from friso.engine.module_source import write_module
+from friso.engine.build import write_module
 from friso.engine.tableaus import TABLEAUS
 from friso.equations.model import assemble
 from friso.equations.structure import structure

@@ -14,7 +14,7 @@ import friso
 from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.by_hand import ByHand, by_hand
 from benchmarks.truth.draws import draw
-from friso.engine.simulate import SIMULATION_RTOL
+from friso.engine.batch import SIMULATION_RTOL
 from friso.stage import Stage
 
 WITHIN = 1e-2

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from friso.app.frames import frame
-from friso.engine.overtaken import ASKER, Overtaken, ended_by, go_on, going_first
+from friso.engine.side_by_side import ASKER, Overtaken, ended_by, go_on, going_first
 from friso.errors import InputError
 
 Job = Callable[["Work"], Iterator[dict[str, Any]]]

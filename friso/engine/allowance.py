@@ -1,6 +1,10 @@
-"""Limit how much may be computed to answer one question, counted in work.
+"""How far a computation may go: its work, and its tolerance.
+
+Limit how much may be computed to answer one question, counted in work.
 
 Work is counted rather than time, so that the answer is equal on every machine.
+
+Check the relative tolerance that a user gives.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ from typing import NoReturn
 import numpy as np
 
 from friso.engine.settings import work_settings
+from friso.errors import InputError
 
 
 class Exhausted(Exception):
@@ -88,3 +93,13 @@ def allowance(work: float = np.inf) -> Iterator[Allowance]:
         yield some
     finally:
         _CURRENT.reset(token)
+
+
+TIGHTEST_RTOL, LOOSEST_RTOL = 1e-12, 1e-2
+
+
+def checked_rtol(rtol: float) -> float:
+    """Return `rtol` if the solver can meet it. Raises InputError otherwise."""
+    if not TIGHTEST_RTOL <= rtol <= LOOSEST_RTOL:
+        raise InputError("rtol", f"{rtol:g}", "a number from 1e-12 to 1e-2", "rtol=1e-6")
+    return rtol

@@ -1,6 +1,12 @@
-"""Run many stages of one structure, and return the results chunk by chunk.
+"""Run many stages of one structure at once, or one stage with a dense record.
+
+Run many stages of one structure, and return the results chunk by chunk.
 
 Runs are prepared in NumPy. Each core then computes several at once, one per lane of a vector register.
+
+Run many stages that follow one log, sample by sample.
+
+Simulate one run of a stage as a time response.
 """
 
 from __future__ import annotations
@@ -8,19 +14,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.allowance import current_allowance
+from friso.axis import axis_of
+from friso.engine.allowance import checked_rtol, current_allowance
 from friso.engine.arrays import STATISTICS, Batch, BatchOptions, Results, Status, new_queue
-from friso.engine.kernel import Kernel, columns, empty_results
-from friso.engine.layout import LANES
-from friso.engine.overtaken import current_flag, go_on
+from friso.engine.kernel import Kernel, columns, empty_results, kernel
+from friso.engine.machine_code import LANES
 from friso.engine.settings import room_settings, step_settings
-from friso.engine.side_by_side import cores_to_use, results_of
+from friso.engine.side_by_side import cores_to_use, current_flag, go_on, results_of
 from friso.equations import motion
 from friso.equations.reference import moved_on
+from friso.equations.structure import structure
+from friso.errors import InputError
+from friso.stage import Stage
+from friso.version import VERSION
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -258,3 +271,211 @@ def run_batch(kernel: Kernel, batch: Batch, settings: BatchOptions, results: Res
             settings.cancel[0] = 1
             raise
     go_on()
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Inputs of driven runs: reference [m], shape (n,), and force on the stage [N].
+
+    The force has the shape (n,), or (runs, n) for individual forces, and adds to the controller's. Reference and force
+    are sampled every `sample_time` [s]. The velocity at each sample is the central difference of the reference, and
+    linear between samples. The force is linear too, or constant if `held`, as in a sampled drive.
+    """
+
+    reference: np.ndarray
+    force: np.ndarray
+    sample_time: float
+    held: bool = True
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Return the velocity of the reference at the samples [m/s], shape (n,)."""
+        return np.gradient(self.reference, self.sample_time)
+
+    @property
+    def segments(self) -> np.ndarray:
+        """Return the pieces of the reference, with the force, for the engine: (forces, n + 1, 6).
+
+        There is one piece per sample, and one for the end. `forces` is 1 for a common force.
+        """
+        n, force = len(self.reference), np.atleast_2d(self.force)
+        rows = np.zeros((len(force), n + 1, 6))
+        rows[:, :, 0] = np.arange(n + 1) * self.sample_time
+        rows[:, :-1, 1], rows[:, :-1, 4] = self.reference, force
+        rows[:, :-1, 2] = self.velocity
+        rows[:, :-2, 3] = np.diff(rows[0, :-1, 2]) / self.sample_time
+        if not self.held:
+            rows[:, :-2, 5] = np.diff(force) / self.sample_time
+        return rows
+
+
+@dataclass(frozen=True)
+class DrivenRuns:
+    """States at the samples, (runs, n, states), and numbers held in between, (runs, n, held).
+
+    `numbers` are the numbers of the runs, and `statuses` their outcomes.
+    """
+
+    numbers: np.ndarray
+    states: np.ndarray
+    held: np.ndarray
+    statuses: np.ndarray
+
+
+def run_driven(
+    kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
+) -> Iterator[DrivenRuns]:
+    """Run stages that follow the log `inputs`, from the states `starts`, in chunks.
+
+    `flat` has the keys of the stages, of one structure, with SI numbers or arrays of shape (runs,); `starts` has the
+    shape (runs, kept). The states of a failed run are NaN from the failure on, and the run has its status.
+    """
+    count, shared = len(inputs.reference), inputs.segments if np.ndim(inputs.force) == 1 else None
+    options = RunOptions(
+        rtol=rtol,
+        bands=(0.0, 0.0),
+        record_from=np.inf,
+        least_swing=np.inf,
+        budget=room_settings.driven_steps_per_sample * count,
+    )
+    size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
+    settings = options_of(replace(options, interval=inputs.sample_time))
+    at_once = int(np.clip(room_settings.driven_samples / count, *room_settings.driven_runs))
+    for first in range(0, runs, at_once):
+        numbers = np.arange(first, min(first + at_once, runs))
+        batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
+        periods = np.full(len(numbers), inputs.sample_time)
+        batch = batch._replace(
+            segments=replace(inputs, force=inputs.force[numbers]).segments if shared is None else shared,
+            first_steps=periods,
+            longest=periods,
+            windows=np.full(len(numbers), -1),
+        )
+        results = empty_results(len(numbers), 1, count + 1, len(kernel.full_state))
+        run_batch(kernel, batch, settings, results, options.threads)
+        states, held = np.split(results.samples, [len(kernel.states)], axis=2)
+        yield DrivenRuns(numbers, states[:, :-1], held[:, 1:], results.statuses)
+
+
+def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:
+    """Return the keys of the numbered stages, with a motion as long as the log.
+
+    The motion is a step of a `size` [m], by which the equations are scaled.
+    """
+    part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
+    duration = len(inputs.reference) * inputs.sample_time
+    return part | {"motion.kind": "step", "motion.size": size, "motion.duration": duration}
+
+
+SIMULATION_RTOL = 1e-9
+"""Default tolerance. A force limit that winds up, and contacts, multiply errors by up to 1e7."""
+
+
+def simulate(stage: Stage, rtol: float = SIMULATION_RTOL, sample_time: float | None = None) -> xr.Dataset:
+    """Simulate a stage's own motion, and return its time response.
+
+    Variables over `time` [s] are, as far as the stage has them:
+
+    - reference, position, velocity and error;
+    - force and its shares (the controller's terms);
+    - cart position and velocity;
+    - joint deflection and force;
+    - friction force and bristle deflection.
+
+    The extrema of position minus reference are over `turning_point`. Each variable has `units`, those of the stage's
+    kind of axis, and a `long_name`. `attrs` hold the stage as TOML text, rtol, status, steps and rejected steps.
+    `sample_time` [s] is by default a 20 000th of the duration; samples are interpolated between the solver's steps. A
+    run that fails has NaN from there on, and the reason in `status`. Raises InputError for a sample time or a tolerance
+    that is not usable.
+    """
+    flat = stage.flat()
+    duration = flat["motion.duration"]
+    interval = usual_interval(duration) if sample_time is None else checked_interval(sample_time, duration)
+    shape = kernel(structure(flat))
+    (runs,) = run_chunks(shape, flat, 1, RunOptions(rtol=checked_rtol(rtol), interval=interval))
+    time = np.arange(runs.results.samples.shape[1]) * interval
+    return _dataset(stage, shape, flat, runs, time, rtol)
+
+
+def usual_interval(duration: float) -> float:
+    """Return the interval between samples [s] of a run of a duration [s] for which none is given."""
+    return duration / room_settings.samples_by_default
+
+
+def checked_interval(interval: float, duration: float) -> float:
+    """Return the interval between samples [s] if a run of this duration [s] can have it.
+
+    Raises InputError if the run would have too many samples, or none.
+    """
+    least = duration / room_settings.most_samples
+    if not least <= interval <= duration:
+        text, expected = f"{interval:g} s", f"from {least:g} s to the duration, {duration:g} s"
+        raise InputError("sample_time", text, expected, "1 ms")
+    return interval
+
+
+def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
+    """Return the model's outputs, such as forces, at times [s], each of shape (samples,).
+
+    They are computed from states, shape (states, samples). `flat` has the stage's keys in SI.
+    """
+    parameters = [v[0] for v in shape.values({**flat, "motion.size": motion.size(flat)}, 1)]
+    rows = motion.pieces(flat, 1)[0]
+    active = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
+    elapsed, reference = time - active[:, 0], active[:, 1:].T
+    modes = shape.modes(states, elapsed, reference, parameters)
+    outputs = shape.module.outputs(states, modes, elapsed, reference, parameters)
+    return [np.broadcast_to(np.asarray(output, dtype=float), time.shape) for output in outputs]
+
+
+def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
+    """Return the model's outputs, such as forces, as variables over "time", with their units.
+
+    They are computed from states, shape (states, samples), at the times [s]. `flat` has the stage's keys in SI.
+    """
+    arrays, kind = sampled_outputs(shape, flat, states, time), axis_of(flat)
+    return {
+        name: ("time", array, {"units": kind.unit(unit), "long_name": label})
+        for (name, (unit, label)), array in zip(shape.outputs.items(), arrays, strict=True)
+    }
+
+
+def time_axis(time: np.ndarray) -> dict[str, Any]:
+    """Return the coordinate "time" [s]."""
+    return {"time": ("time", time, {"units": "s", "long_name": "time"})}
+
+
+def _dataset(
+    stage: Stage, shape: Kernel, flat: dict[str, Any], runs: Runs, time: np.ndarray, rtol: float
+) -> xr.Dataset:
+    """Return the signals of a run as a dataset over time, with units, names and its status."""
+    import xarray as xr
+
+    results = runs.results
+    variables = output_variables(shape, flat, results.samples[0].T, time)
+    turns = slice(0, int(results.turn_counts[0]))
+    label = "turning points of position - reference"
+    variables["turning_time"] = (
+        "turning_point",
+        results.turn_times[0, turns],
+        {"units": "s", "long_name": f"times of the {label}"},
+    )
+    variables["turning_deviation"] = (
+        "turning_point",
+        results.turn_values[0, turns],
+        {"units": "m", "long_name": label},
+    )
+    response = xr.Dataset(
+        variables,
+        coords=time_axis(time),
+        attrs={
+            "name": stage.name,
+            "stage": stage.to_toml(),
+            "friso": VERSION,
+            "rtol": rtol,
+            "status": Status(int(results.statuses[0])).text,
+            "steps": int(runs.statistic("attempted")[0]),
+            "rejected": int(runs.statistic("rejected")[0]),
+        },
+    )
+    return stage.axis_kind.with_units(response)

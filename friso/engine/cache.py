@@ -1,4 +1,6 @@
-"""Store compiled code on disk, private to the user.
+"""The cache of compiled kernels, and what is removed from it.
+
+Store compiled code on disk, private to the user.
 
 An entry is a file with machine code and its module. Only code that this user alone can have written is loaded
 (`private.py`); anything else, and a damaged file, is built anew. Locks separate processes that build at the same time.
@@ -7,6 +9,8 @@ An entry is named after the generated source, the compiler and the processor; a 
 friso's own sources, gives the name of its entry. So a start of an unchanged friso generates nothing, and a change of
 friso that does not change the generated code compiles nothing. Code that has not been used for long is deleted
 (`prune`).
+
+Delete compiled code that has not been used for long.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ import re
 import sys
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache
@@ -33,13 +37,15 @@ from types import CodeType, ModuleType
 
 import llvmlite
 import numpy as np
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from platformdirs import user_cache_dir
 
-from friso.engine.processor import processor
+from friso.engine.machine_code import processor
+from friso.engine.settings import build_settings
 from friso.platform.leftovers import locked_folder, temporary_folder
 from friso.platform.private import make_private, read_private, write_private
 from friso.platform.system import cause_of, path_of, remove_folder
+from friso.platform.whole_file import PARTIAL
 from friso.version import VERSION
 
 logger = logging.getLogger("friso")
@@ -288,17 +294,7 @@ def _compiled_with() -> str:
     return _digest(*(_without_words(file.read_text(encoding="utf-8")) for file in files))
 
 
-_INCLUDED = (
-    "arrays",
-    "kinds",
-    "layout",
-    "machine_code",
-    "processor",
-    "roots",
-    "scalar_code",
-    "simd_math",
-    "vector_code",
-)
+_INCLUDED = ("arrays", "machine_code", "scalar_code", "simd_math", "vector_code")
 
 
 def _file_name(name: str) -> str:
@@ -329,3 +325,41 @@ def _module(name: str, source: str, compiled: CodeType) -> ModuleType:
     sys.modules[spec.name] = module
     loader.exec_module(module)
     return module
+
+
+def prune(folder: Path) -> None:
+    """Delete compiled code that has not been used for long, and leftovers of killed processes.
+
+    If the folder is still too large, the code unused for longest goes next. Files that another process is writing stay.
+    """
+    try:
+        with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
+            size, now = 0, time.time()
+            for used, file, length in sorted(_used(folder), reverse=True):
+                size += length
+                age = now - used
+                unfinished = file.suffix == PARTIAL and age > SECONDS_OF_A_DAY
+                if (
+                    unfinished
+                    or age > build_settings.kept_time
+                    or (age > SECONDS_OF_A_DAY and size > build_settings.kept_size)
+                ):
+                    _delete(file)
+    except (Timeout, OSError) as error:  # another process is pruning, too
+        logger.debug("old kernels are left: %s", error)
+
+
+def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
+    """Yield each entry, request and draft: time of its last use [s], path, and size [bytes]."""
+    for file in folder.iterdir():
+        if file.suffix in (ENTRY, REQUEST, PARTIAL):
+            status = file.lstat()
+            yield status.st_mtime, file, status.st_size
+
+
+def _delete(file: Path) -> None:
+    try:
+        with entry_lock(file).acquire(blocking=False):
+            file.unlink()
+    except (Timeout, PermissionError):  # it is in use
+        return

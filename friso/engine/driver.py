@@ -3,7 +3,7 @@
 A vector register has several lanes, each of which computes one run. The numbers of all lanes are in a buffer, B, from
 which the model's step reads and to which it writes. This code is compiled once per machine (`friso.engine.scalar_code`)
 for models of any size. Sizes and row numbers of a model are in its `layout`, with the addresses of its step
-(`friso.engine.layout.Layout`).
+(`friso.engine.machine_code.Layout`).
 """
 
 from math import pi
@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Status
-from friso.engine.layout import AXES, ROW
+from friso.engine.machine_code import AXES, ROW
 from friso.engine.scalar_code import call_at, take_next
 from friso.engine.simd_math import sine
 from friso.equations.reference import TONE

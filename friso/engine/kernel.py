@@ -16,9 +16,16 @@ import numpy as np
 from friso.engine.arrays import STATISTICS, Batch, BatchOptions, Results, new_queue
 from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, Compiled
-from friso.engine.kinds import CompiledKind, argument_kind
-from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
-from friso.engine.machine_code import Loops, load_object
+from friso.engine.machine_code import (
+    FUNCTIONS,
+    LANES,
+    LOOKED_UP,
+    CompiledKind,
+    Loops,
+    ModelLayout,
+    argument_kind,
+    load_object,
+)
 from friso.equations.as_built import AsBuilt
 from friso.equations.dragged import Dragged
 from friso.equations.driven import Driven

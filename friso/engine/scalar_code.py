@@ -21,7 +21,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from friso.engine.kinds import FLOAT, INT, TRUTH, ArrayKind, CompiledKind, NumberKind, RecordKind, argument_kind
+from friso.engine.machine_code import FLOAT, INT, TRUTH, ArrayKind, CompiledKind, NumberKind, RecordKind, argument_kind
 from friso.engine.vector_code import FASTMATH, syntax
 
 _INT64, _DOUBLE, _BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
@@ -44,7 +44,7 @@ def _types(kind: CompiledKind) -> Sequence[ir.Type]:
 def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) -> ir.Module:
     """Translate a function into LLVM code, with a function `run` that calls it.
 
-    `run` takes the address of the packed arguments (`friso.engine.kinds.Packing`); `kinds` are their types.
+    `run` takes the address of the packed arguments (`friso.engine.machine_code.Packing`); `kinds` are their types.
     """
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")

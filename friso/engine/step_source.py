@@ -12,11 +12,10 @@ from typing import Any
 
 import sympy as sp
 
-from friso.engine.elimination import eliminate
-from friso.engine.layout import AXES, ROW, SCALARS, Layout
-from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
+from friso.engine.machine_code import AXES, ROW, SCALARS, Layout
+from friso.engine.printing import Constants, Rename, eliminate, print_scalar, reciprocals
 from friso.engine.settings import step_settings
-from friso.engine.tableaus.tableau import Tableau
+from friso.engine.tableaus import Tableau
 from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
 

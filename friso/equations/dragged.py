@@ -27,7 +27,7 @@ def dragged(form: Dragged) -> Model:
     """Return the equations of a friction law on a body that follows a reference.
 
     The reference gives position [m], velocity [m/s] and acceleration [m/s^2] at every sample, as in
-    `friso.engine.driven.run_driven`.
+    `friso.engine.batch.run_driven`.
     """
     import sympy as sp
 

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.allowance import Exhausted, allowance
+from friso.engine.allowance import Exhausted, allowance, checked_rtol
 from friso.engine.arrays import Status
-from friso.engine.batch import Runs, run_chunks
+from friso.engine.batch import SIMULATION_RTOL, Runs, run_chunks, sampled_outputs, simulate
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.engine.side_by_side import side_by_side
-from friso.engine.simulate import SIMULATION_RTOL, sampled_outputs, simulate
-from friso.engine.tolerance import checked_rtol
 from friso.equations.motion import size, stands
 from friso.equations.structure import structure
 from friso.hunting.advice import BandwidthAdvice, advised

@@ -10,8 +10,7 @@ import numpy as np
 
 from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, code_digest
-from friso.engine.kinds import ArrayKind
-from friso.engine.machine_code import Loops, load_object
+from friso.engine.machine_code import ArrayKind, Loops, load_object
 from friso.equations import motion
 from friso.hunting import turning
 from friso.hunting.settings import check_settings

@@ -202,7 +202,7 @@ def tolerance_of(value: str | float) -> float:
 
     Raises InputError unless it is a number from 1e-12 to 1e-2.
     """
-    from friso.engine.tolerance import checked_rtol
+    from friso.engine.allowance import checked_rtol
 
     try:
         return checked_rtol(float(value))

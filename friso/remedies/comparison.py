@@ -12,9 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from friso.engine.arrays import ArrayColumns
-from friso.engine.batch import part_of, run_chunks
+from friso.engine.batch import part_of, run_chunks, usual_interval
 from friso.engine.kernel import kernel
-from friso.engine.simulate import usual_interval
 from friso.equations.motion import last_corner, rests
 from friso.equations.structure import shared_structure
 from friso.errors import InputError

@@ -12,8 +12,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from friso.engine.allowance import checked_rtol
 from friso.engine.kernel import KernelRequest, kernels
-from friso.engine.tolerance import checked_rtol
 from friso.equations.bandwidth import range_example
 from friso.equations.motion import rests
 from friso.errors import InputError

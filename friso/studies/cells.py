@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Results, Status
-from friso.engine.batch import RunOptions, Runs, part_of, run_chunks
+from friso.engine.batch import RunOptions, Runs, part_of, run_chunks, usual_interval
 from friso.engine.kernel import empty_results, kernel
-from friso.engine.simulate import usual_interval
 from friso.equations.structure import Structure, decisive_keys, structure
 from friso.hunting import Motions, StageAttractors, find_attractors, judge_runs, sketch_attractors
 from friso.hunting.criteria import FAILED

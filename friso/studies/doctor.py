@@ -100,7 +100,7 @@ DEVELOPMENT = ("test", "docs", "bench")
 
 def _processor() -> str:
     """Return the processor for which code is compiled, and its register width."""
-    from friso.engine.processor import processor
+    from friso.engine.machine_code import processor
 
     chosen = processor()
     return f"{chosen.name}, {chosen.triple}: registers of {chosen.lanes} numbers ({64 * chosen.lanes} bits)"

@@ -34,7 +34,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from friso.engine.cache import FOLDER_VARIABLE, cache_folder, remove_if_passing
-from friso.engine.overtaken import go_on
+from friso.engine.side_by_side import go_on
 from friso.errors import InputError
 from friso.platform.system import interrupts_held
 from friso.stage import Stage

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.engine.allowance import checked_rtol
 from friso.engine.cache import code_digest, machine
-from friso.engine.tolerance import checked_rtol
 from friso.equations.motion import rests
 from friso.errors import InputError
 from friso.hunting import cannot_hunt

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.axis import axis_of
+from friso.engine.allowance import checked_rtol
 from friso.engine.arrays import STATISTICS, Status
-from friso.engine.simulate import checked_interval, time_axis, usual_interval
-from friso.engine.tolerance import checked_rtol
+from friso.engine.batch import checked_interval, time_axis, usual_interval
 from friso.equations.as_built import AsBuilt
 from friso.errors import InputError
 from friso.hunting.measures import BANDS, Measures, SampledSolver, bands_of, measure_traces
@@ -34,7 +34,7 @@ LOGGED = {"position": ("measured_position", "m", "position that the drive reads"
 def response(stage: Stage, rtol: float | None = None, sample_time: float | None = None, seed: int = 0) -> xr.Dataset:
     """Run a stage's own motion on its real drive, and return its time response.
 
-    Variables over `time` [s] are those of `friso.engine.simulate`, the encoder reading and the command. Samples
+    Variables over `time` [s] are those of `friso.engine.batch`, the encoder reading and the command. Samples
     coincide with the drive's; by default there are some twenty thousand. Noise is drawn from `seed`. Raises InputError
     for a sample time that is not a multiple of the drive's.
     """

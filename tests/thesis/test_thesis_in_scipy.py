@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from benchmarks.ode23s import ATOL, LARGEST, RTOL, ode23s, parameters
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso_thesis.studies.thesis.claims import Evidence, Finding, by_peak_count, registered
 from friso_thesis.studies.thesis.evidence import run_response
 from friso_thesis.studies.thesis.linear import Linear, analysed

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.allowance import allowance
+from friso.engine.allowance import allowance, checked_rtol
+from friso.engine.batch import output_variables, time_axis
 from friso.engine.kernel import KernelRequest, kernels
-from friso.engine.simulate import output_variables, time_axis
-from friso.engine.tolerance import checked_rtol
 from friso.equations.roles import Role
 from friso.equations.structure import Structure, structure
 from friso.hunting.attractors import Attractors, Target, attractors

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from friso.engine.driven import Inputs
+from friso.engine.batch import Inputs
 from friso.identification.output_error.parameters import FitParameter, stages
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import refine_fit

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from friso.engine.arrays import Status
-from friso.engine.driven import DrivenRuns, Inputs, run_driven
+from friso.engine.batch import DrivenRuns, Inputs, run_driven
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.controllers.pid_gains import KD, KP, proportional_derivative
 from friso.equations.driven import HELD_FORCE, Driven

@@ -7,10 +7,10 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
+from friso.engine.batch import SIMULATION_RTOL, simulate
 from friso.engine.kernel import kernels
-from friso.engine.simulate import SIMULATION_RTOL, simulate
 from friso.errors import InputError
-from friso.hunting import LONG_RUN_RTOL, Case, needed_kernels
+from friso.hunting import LONG_RUN_RTOL, Case, ParameterMargin, needed_kernels
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import LOGGER, Changes, LengthLike, Seed, StageLike, Tolerance, Whole
@@ -24,7 +24,6 @@ from friso.studies.settings import settings
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from friso.hunting import ParameterMargin
     from friso.hunting.criteria import Verdict
     from friso.remedies.catalogue import Suggestion
     from friso.shown.files import Files

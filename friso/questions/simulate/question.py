@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.engine.arrays import Status
-from friso.engine.simulate import SIMULATION_RTOL
+from friso.engine.batch import SIMULATION_RTOL
 from friso.errors import InputError
 from friso.hunting.measures import Measures, measured_run
 from friso.interface import inputs
@@ -162,7 +162,7 @@ def simulate(
         chosen, name, study = _cell(Path(cell), [str(number) for number in index], set)
         continuous = continuous or not runs_as_built(chosen, study.metrics)  # as the study ran it
         usual = study.rtol if continuous else None
-    from friso.engine.simulate import simulate as simulated
+    from friso.engine.batch import simulate as simulated
 
     inputs.mention_unstable_loop(chosen)
     if is_as_built(chosen) and not continuous:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.equations.motion import last_corner
 from friso.frequency.loops import response
 from friso.frequency.system import DriveTiming, limit_cases

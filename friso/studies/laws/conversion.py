@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from friso.engine.driven import Inputs, run_driven
+from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
 from friso.equations.friction.measured import MeasuredFriction

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from friso.engine.tolerance import checked_rtol
+from friso.engine.allowance import checked_rtol
 from friso.equations.component import key
 from friso.equations.model import assemble
 from friso.equations.structure import Structure, shared_structure

@@ -23,10 +23,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.engine.allowance import checked_rtol
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
-from friso.engine.tolerance import checked_rtol
 from friso.equations.imposed import FREQUENCY, HARMONIC, imposed_form
 from friso.equations.roles import Role
 from friso.errors import InputError

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize.elementwise import find_root
 
-from friso.engine.tolerance import checked_rtol
+from friso.engine.allowance import checked_rtol
 from friso.frequency.loops import mechanics
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.equations.controllers.van_dijk import ALPHA
 from friso.studies.study import Request
 from friso.studies.sweep import sweep

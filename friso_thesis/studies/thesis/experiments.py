@@ -14,7 +14,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from friso.engine.simulate import simulate
+from friso.engine.batch import simulate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import record
 from friso.identification.readings.friction_position import FrictionPosition, friction_position

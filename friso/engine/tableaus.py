@@ -1,9 +1,77 @@
-"""Rodas5P: order 5(4), 8 stages, L-stable, stiffly accurate, dense output of order 4.
+"""Hold the coefficients of Rosenbrock methods, transformed to avoid matrix products.
+
+The products are those with the Jacobian.
+
+Hairer & Wanner, Solving ODEs II (1996), Sec. IV.7: stage i solves (1/(gamma h) - J) k_i = f(t + time_i h, x + sum_j
+a_ij k_j) + h rate_i df/dt + sum_j c_ij/h k_j. Stiffly accurate: the last stage adds k to the solution, and this k is
+the error estimate. Between the ends, x(theta) = (1 - theta) x_0 + theta (x_1 + (1 - theta) (d_1 + theta (d_2 + ...)))
+with d_m = sum_j dense_mj k_j.
+
+Rodas4: order 4(3), 6 stages, L-stable, stiffly accurate, dense output of order 3.
+
+Hairer & Wanner, Solving ODEs II (1996), Sec. VI.4 and their code RODAS (method 1).
+
+Rodas5P: order 5(4), 8 stages, L-stable, stiffly accurate, dense output of order 4.
 
 Steinebach 2023, doi:10.1007/s10543-023-00967-x.
 """
 
-from friso.engine.tableaus.tableau import Tableau
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """A Rosenbrock method: rows of `a` and `c`, nodes, time weights and dense output.
+
+    Rows are for the stages after the first.
+    """
+
+    name: str
+    order: int
+    error_order: int
+    gamma: float
+    a: tuple[tuple[float, ...], ...]
+    c: tuple[tuple[float, ...], ...]
+    time: tuple[float, ...]
+    rate: tuple[float, ...]
+    dense: tuple[tuple[float, ...], ...]
+
+    @property
+    def stages(self) -> int:
+        return len(self.time)
+
+
+_A5 = (1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950)
+
+RODAS4 = Tableau(
+    name="Rodas4",
+    order=4,
+    error_order=3,
+    gamma=0.25,
+    a=(
+        (1.544,),
+        (0.9466785280815826, 0.2557011698983284),
+        (3.314825187068521, 2.896124015972201, 0.9986419139977817),
+        _A5,
+        (*_A5, 1.0),
+    ),
+    c=(
+        (-5.6688,),
+        (-2.430093356833875, -0.2063599157091915),
+        (-0.1073529058151375, -9.594562251023355, -20.47028614809616),
+        (7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160),
+        (8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054),
+    ),
+    time=(0.0, 0.386, 0.21, 0.63, 1.0, 1.0),
+    rate=(0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0),
+    dense=(
+        (10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823, 1.025137723295662),
+        (-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386, -6.594389125716872),
+    ),
+)
+
 
 _A6 = (-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946)
 
@@ -89,3 +157,6 @@ RODAS5P = Tableau(
         ),
     ),
 )
+
+
+TABLEAUS = {tableau.name: tableau for tableau in (RODAS4, RODAS5P)}
