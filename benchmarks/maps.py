@@ -19,9 +19,8 @@ from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from friso.platform.system import usable_cores
 from friso.stage import Stage
 from friso.studies.axes import Samples
-from friso.studies.execute import local_crew, processes
 from friso.studies.study import Request, Study
-from friso.studies.sweep import run_in_memory, run_in_store
+from friso.studies.sweep import local_crew, processes, run_in_memory, run_in_store
 from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 
 RTOLS = (1e-4, 1e-6)

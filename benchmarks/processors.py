@@ -19,9 +19,8 @@ import numpy as np
 import friso
 from benchmarks.report import print_table
 from friso.engine.machine_code import PROCESSOR_VARIABLE, processor
-from friso.studies.execute import local_crew
 from friso.studies.study import Request, Study
-from friso.studies.sweep import run_in_memory
+from friso.studies.sweep import local_crew, run_in_memory
 
 LEVELS = {"": "this machine", "x86-64-v4": "AVX-512", "x86-64-v3": "AVX2", "x86-64-v2": "SSE4.2", "x86-64": "SSE2"}
 """Processors by LLVM's name, most able first, and their usual names."""

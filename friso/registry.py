@@ -1,4 +1,4 @@
-"""Registries of what modules declare, by name, from a folder of friso and from installed packages."""
+"""Registries of what friso declares, by name, in a table or in the modules of a folder, and of installed packages."""
 
 from __future__ import annotations
 
@@ -18,31 +18,33 @@ Item = TypeVar("Item")
 
 
 class Registry(Generic[Item]):
-    """What modules declare under the name `attribute`, by the name of the module.
+    """What is declared of one kind, by name: in a table, in the modules of a folder, by installed packages.
 
-    A module `break_away.py` declares "break-away", unless `dashes` are declined. The modules are those of a `package`,
-    and, if there is a `group` of entry points, those that installed packages name in it; what the latter declare must
-    be of a `kind`. Names and their descriptions, the first line of each module's docstring, are read without importing
-    any module. A module is imported when its declaration is first asked for. The package may declare more in a table,
-    TABLE, as (declared, description), by name. `added` takes what is declared elsewhere, in the same way.
+    A module `place` with a table TABLE declares everything there, as (declared, description) by name. A package without
+    a table has a module for each, which declares it under the name `attribute`: `break_away.py` declares "break-away",
+    unless `dashes` are declined. Of such modules, names and descriptions, the first line of each module's docstring,
+    are read without importing any. If there is a `group` of entry points, so do the modules that installed packages
+    name in it; what these declare must be of a `kind`. A module is imported when its declaration is first asked for.
+    `added` takes what is declared elsewhere, as a table does.
     """
 
-    def __init__(self, package: str, attribute: str, group: str = "", kind: type = object, dashes: bool = True) -> None:
-        self.package, self.attribute, self.group, self.kind = package, attribute, group, kind
+    def __init__(self, place: str, attribute: str, group: str = "", kind: type = object, dashes: bool = True) -> None:
+        self.place, self.attribute, self.group, self.kind = place, attribute, group, kind
         self.dash = "-" if dashes else "_"
         self.added: dict[str, tuple[Item, str]] = {}
 
     @cached_property
-    def _own(self) -> dict[str, str]:
-        """Return friso's own modules by name; of an entry in the table, the package."""
-        modules = iter_modules(import_module(self.package).__path__)
-        own = {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
-        return own | dict.fromkeys(self._listed, self.package)
+    def _listed(self) -> dict[str, tuple[Item, str]]:
+        """Return what friso's own table declares; empty for a folder of modules."""
+        return getattr(import_module(self.place), "TABLE", {})
 
     @cached_property
-    def _listed(self) -> dict[str, tuple[Item, str]]:
-        """Return what the table of friso's own package declares."""
-        return getattr(import_module(self.package), "TABLE", {})
+    def _own(self) -> dict[str, str]:
+        """Return friso's own modules by name; of an entry in a table, the table's."""
+        if self._listed:
+            return dict.fromkeys(self._listed, self.place)
+        modules = iter_modules(import_module(self.place).__path__)
+        return {module.name.replace("_", self.dash): f"{self.place}.{module.name}" for module in modules}
 
     @property
     def installed(self) -> Mapping[str, str]:

@@ -51,7 +51,7 @@ from friso.errors import InputError, LogError
 from friso.identification.logs.mapping import sidecar
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Cloud, Figure, Panel, Series
-from friso.studies.execute import local_crew
+from friso.studies.sweep import local_crew
 
 RIG = Path(friso.example("thesis_rig"))
 STICK_SLIP = Path(friso.example("lugre_stick_slip"))

@@ -8,7 +8,7 @@ from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.stage import Stage
 from friso.studies.contradiction import Standing, contradiction, standing_of
-from friso.studies.friction_levels import friction_levels
+from friso.studies.draws import friction_levels
 
 STEP = 1e-3
 

@@ -16,12 +16,11 @@ from patience import LIMIT
 from refusals import refused
 
 from friso.stage import Stage
-from friso.studies import execute
-from friso.studies.execute import connected
+from friso.studies import sweep as execute
 from friso.studies.settings import StudySettings
 from friso.studies.store import Store
 from friso.studies.study import Request
-from friso.studies.sweep import run_in_memory, run_in_store, sweep
+from friso.studies.sweep import connected, run_in_memory, run_in_store, sweep
 
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 

@@ -16,7 +16,7 @@ from friso.equations.structure import structure
 from friso.frequency.loops import plant
 from friso.frequency.system import member
 from friso.hunting import Ensemble, find_cycles
-from friso.studies.laws.conversion import measure_friction
+from friso.studies.laws import measure_friction
 from friso_thesis.studies.describing.function import describing
 
 pytestmark = pytest.mark.xdist_group("gms")

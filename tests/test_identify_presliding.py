@@ -24,7 +24,7 @@ from friso.identification.readings.common import deflections, jackknife, record
 from friso.identification.sources import recognised
 from friso.progress import silent
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import with_friction
+from friso.studies.laws import with_friction
 from friso_thesis.studies.rig.experiments.presliding import EXPERIMENT, GENTLE, LOOP_COUNT, loop_log, presliding_log
 from friso_thesis.studies.rig.outcome import excite, locked_stage, rig_log, travel
 

@@ -19,14 +19,7 @@ from friso.frequency.system import steady_force
 from friso.identification.readings.common import stribeck_curve
 from friso.stage import Stage, element_keys
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import (
-    compared,
-    convert,
-    convertible,
-    hysteresis_loop,
-    measure_friction,
-    with_friction,
-)
+from friso.studies.laws import compared, convert, convertible, hysteresis_loop, measure_friction, with_friction
 
 LUGRE = VARIANTS["rigid"]
 

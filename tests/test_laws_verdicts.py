@@ -12,8 +12,7 @@ from variants import VARIANTS, gains, lugre, release, stage
 from friso.hunting import AttractionEnd, BandwidthWindow
 from friso.questions.check.laws import laws_document, laws_rows, laws_sentences
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import convert
-from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, verdicts_by_law
+from friso.studies.laws import LawVerdict, Trial, VerdictsByLaw, convert, verdicts_by_law
 
 RIGID = VARIANTS["rigid"]
 PD = stage(release(), friction=lugre(2), controller=gains(kp=1000, kd=20, tau=1e-3))

@@ -15,10 +15,9 @@ from patience import LIMIT
 from systems import posix
 
 from friso.stage import Stage
-from friso.studies.execute import processes
 from friso.studies.store import Store
 from friso.studies.study import Request, cells_of
-from friso.studies.sweep import run_in_memory, run_in_store, sweep
+from friso.studies.sweep import processes, run_in_memory, run_in_store, sweep
 
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 
@@ -67,7 +66,7 @@ def test_a_process_that_is_killed_costs_nothing_that_is_done(rig: Stage, tmp_pat
 
 PARENT = """
 import time
-from friso.studies.execute import processes
+from friso.studies.sweep import processes
 
 with processes(1) as crew:
     crew.executor.submit(time.sleep, 0).result()

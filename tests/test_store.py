@@ -26,11 +26,10 @@ from systems import posix
 import friso as friso_api
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
-from friso.studies.execute import local_crew
 from friso.studies.settings import StudySettings
 from friso.studies.store import Store, _sum_at, read_store
 from friso.studies.study import Request, Study, study_of
-from friso.studies.sweep import run_in_store, sweep
+from friso.studies.sweep import local_crew, run_in_store, sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}

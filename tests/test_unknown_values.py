@@ -9,7 +9,7 @@ from inside import friso_inside
 
 import friso
 from friso.stage import Stage
-from friso.studies.laws.conversion import convert
+from friso.studies.laws import convert
 
 KEY = "friction.bristle_stiffness"
 

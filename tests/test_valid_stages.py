@@ -20,7 +20,7 @@ from friso.equations.structure import structure
 from friso.interface.answer import Answer
 from friso.stage import Stage
 from friso.stage.plausible import idle_encoder, implausible_values
-from friso.studies.laws.conversion import convert
+from friso.studies.laws import convert
 from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import SAMPLE_TIME, own_motion
 from friso_thesis.studies.rig.moves_on_rails import with_joint

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.truth.draws import FORMS, Form, draw
 from friso.stage import Stage
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import with_friction
+from friso.studies.laws import with_friction
 
 JOINTS = (Form("rigid"), Form("free"), Form("locked"))
 """Structures that are taken from `benchmarks.truth`."""

@@ -21,9 +21,8 @@ from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
 from friso.studies.cells import of_runs_alone, runs_as_built
 from friso.studies.edges import fine_edges
-from friso.studies.execute import local_crew
 from friso.studies.study import Study
-from friso.studies.sweep import run_in_memory
+from friso.studies.sweep import local_crew, run_in_memory
 
 
 def _studies(stage: Stage, all_axes: Sequence[Mapping[str, Any]], metric: str) -> list[Study]:

@@ -17,11 +17,10 @@ from friso.hunting.criteria import ATTRACTED
 from friso.progress import Progress, silent
 from friso.studies.axes import SAMPLE, SweptAxis
 from friso.studies.cells import flat_cells
-from friso.studies.execute import Crew
 from friso.studies.metric import in_order, metrics
 from friso.studies.settings import settings
 from friso.studies.study import Dimension, Study
-from friso.studies.sweep import run_in_memory
+from friso.studies.sweep import Crew, run_in_memory
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -220,9 +220,9 @@ def cells_of(block: CellBlock) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
-_STUDIES = ("axes", "cells", "metric", "settings", "study")
+_STUDIES = ("axes", "cells", "metric", "metrics", "settings", "study")
 _DECISIVE = (
-    *("quantities.py", "stage", "equations", "engine", "hunting", "studies/metrics"),
+    *("quantities.py", "stage", "equations", "engine", "hunting"),
     *(f"studies/{name}.py" for name in _STUDIES),
 )
 """Parts of the package that determine the numbers of a cell."""

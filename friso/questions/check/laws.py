@@ -17,8 +17,7 @@ from friso.stage.stage import declared_keys
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from friso.studies.laws.conversion import MeasuredKind
-    from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
+    from friso.studies.laws import LawVerdict, MeasuredKind, Trial, VerdictsByLaw
 
 SHOWN: Mapping[MeasuredKind, str] = {
     "curve": "steady friction over speed",

@@ -18,7 +18,7 @@ from friso.platform.interrupts import answers_interrupts
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
-from friso.studies.draws import Draws
+from friso.studies.draws import Draws, FrictionLevels
 from friso.studies.settings import settings
 
 if TYPE_CHECKING:
@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from friso.hunting.criteria import Verdict
     from friso.remedies.catalogue import Suggestion
     from friso.shown.files import Files
-    from friso.studies.friction_levels import FrictionLevels
-    from friso.studies.laws.verdicts import VerdictsByLaw
+    from friso.studies.laws import VerdictsByLaw
 
 
 MACHINES_DIFFER = "machines drawn from the uncertain keys differ"
@@ -70,7 +69,7 @@ class CheckAnswer(Answer):
         """Return for which friction a stage would hunt whose stage file states none; None for any other."""
         if self.stage.states_friction:
             return None
-        from friso.studies.friction_levels import friction_levels
+        from friso.studies.draws import friction_levels
 
         return friction_levels(self.stage)
 
@@ -230,7 +229,7 @@ def checked_stage(
         except KeyboardInterrupt:
             cut = True
     if laws and not cut:
-        from friso.studies.laws.verdicts import verdicts_by_law
+        from friso.studies.laws import verdicts_by_law
 
         across = verdicts_by_law(chosen, loose, progress=progress)
     return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut, stage_file=stage_file)

@@ -38,11 +38,10 @@ from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
 from friso.studies.axes import AxisValues, Samples
 from friso.studies.cells import of_runs_alone, runs_as_built
-from friso.studies.execute import Crew, local_crew
 from friso.studies.store import Store, holds_all, in_memory, read_store
 from friso.studies.store_files import ReadOnlyStoreError
 from friso.studies.study import Study
-from friso.studies.sweep import fill, run_in_memory
+from friso.studies.sweep import Crew, fill, local_crew, run_in_memory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -308,12 +307,12 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
         expected = f"1 worker or more, up to the {most} cores that may be used"
         raise inputs.wrong("workers", str(workers), expected, "1")
     if scheduler is not None:
-        from friso.studies.execute import connected
+        from friso.studies.sweep import connected
 
         with connected(scheduler) as crew:
             yield crew
     elif workers is not None:
-        from friso.studies.execute import processes
+        from friso.studies.sweep import processes
 
         with processes(workers) as crew:
             yield crew

@@ -20,9 +20,9 @@ from friso.platform.system import shell_word
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues, Samples
-from friso.studies.execute import Crew
 from friso.studies.metric import METRICS, metrics, with_usual
 from friso.studies.study import Request, Study, study_of
+from friso.studies.sweep import Crew
 
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
 
@@ -139,7 +139,7 @@ def coloured_by(study: Study, metric: str) -> str:
 
 def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     """Build the refusal of a large study, with its time and disk space estimated by a trial."""
-    from friso.studies.execute import run_scattered
+    from friso.studies.sweep import run_scattered
 
     run_scattered(trial, np.arange(crew.size), crew)  # compiles the kernels
     start = time.perf_counter()

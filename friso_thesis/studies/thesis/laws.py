@@ -1,7 +1,7 @@
 """Judge the thesis's conclusions under each friction law.
 
 Some survive other laws, and some hold for LuGre alone. The friction of the rig is converted to every other law
-(`friso.studies.laws.conversion`), the maps are computed again, and the same judges apply the same criteria.
+(`friso.studies.laws`), the maps are computed again, and the same judges apply the same criteria.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.studies.laws.conversion import LawConversion, MeasuredKind, compared
-from friso.studies.laws.verdicts import kept_laws
+from friso.studies.laws import LawConversion, MeasuredKind, compared, kept_laws
 from friso_thesis.studies.thesis.claims import (
     Claim,
     ClaimJudgement,
