@@ -19,7 +19,7 @@ from friso.design_method.method import design
 from friso.design_method.spec import load_spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
-from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.closed_forms import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -1,4 +1,4 @@
-"""A clamped plate bent like a leaf, by Ritz's method: the slow twin of friso/leaf_springs/plate.py.
+"""A clamped plate bent like a leaf, by Ritz's method: the slow twin of friso/leaf_springs/mechanism.py.
 
 Kirchhoff's energy of a plate (length L, width w, Poisson's ratio nu) whose ends stay parallel and move against each
 other, in units of its flexural rigidity. The deflection is a sum of products X(x) Y(y): the cubic of a beam, and

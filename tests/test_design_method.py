@@ -26,9 +26,8 @@ from friso.hunting.measures import measured_run
 from friso.leaf_springs import beams as beams_module
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import BeamFailure
-from friso.leaf_springs.closed_model import closed_form_model
-from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import Mechanism
+from friso.leaf_springs.closed_forms import closed_form_model
+from friso.leaf_springs.mechanism import Evaluation, Mechanism
 from friso.stage import Stage
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -120,7 +120,7 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
     def fail(*_: object) -> None:
         raise BeamFailure("The beams find no equilibrium.")
 
-    monkeypatch.setattr("friso.leaf_springs.both_models.beams", fail)
+    monkeypatch.setattr("friso.leaf_springs.beams.beams", fail)
     with pytest.raises(typer.Exit) as leave:
         command(path, as_json=True)
     assert leave.value.exit_code == 1

@@ -15,11 +15,11 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from friso.leaf_springs import closed_forms, closed_model, plate
-from friso.leaf_springs.beam_system import BeamFailure, Configuration, LeafBeams
-from friso.leaf_springs.beams import beams
-from friso.leaf_springs.closed_model import closed_form_model
-from friso.leaf_springs.joint import first_interfering, parasitic_mode
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs import closed_forms as closed_model
+from friso.leaf_springs import mechanism as plate
+from friso.leaf_springs.beams import BeamFailure, Configuration, LeafBeams, beams
+from friso.leaf_springs.closed_forms import closed_form_model, first_interfering, parasitic_mode
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, block_inertia
 from friso.leaf_springs.settings import LeafSpringSettings
 

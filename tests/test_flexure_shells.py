@@ -13,9 +13,8 @@ import pytest
 import shells
 
 from friso.leaf_springs.beams import beams
-from friso.leaf_springs.closed_model import closed_form_model
-from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import Mechanism, MovingBody, block_inertia
+from friso.leaf_springs.closed_forms import closed_form_model
+from friso.leaf_springs.mechanism import Evaluation, Mechanism, MovingBody, block_inertia
 from friso.materials import materials
 
 LeafModel = Callable[[Mechanism, float], Evaluation]

@@ -9,7 +9,7 @@ from refusals import refused
 import friso
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
-from friso.leaf_springs.joint import parasitic_mode
+from friso.leaf_springs.closed_forms import parasitic_mode
 from friso.leaf_springs.mechanism import Mechanism, block_inertia
 from friso.materials import materials
 from friso.stage import Stage, load, loads, save, violations

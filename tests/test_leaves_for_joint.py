@@ -15,7 +15,7 @@ from friso.design_method.prepare import outline
 from friso.design_method.spec import read_spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
-from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.closed_forms import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.tune.blocks import further_files
 from friso.questions.tune.question import TuneAnswer

@@ -25,8 +25,8 @@ from friso.design_method.requirements import (
 from friso.design_method.settings import settings
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import BeamFailure, beams
-from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.closed_forms import first_interfering
+from friso.leaf_springs.mechanism import Evaluation
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from friso.frequency.margins import (
 )
 from friso.frequency.settings import settings as frequency_settings
 from friso.frequency.system import DriveTiming, Members
-from friso.leaf_springs.evaluation import Evaluation
+from friso.leaf_springs.mechanism import Evaluation
 from friso.stage import Stage
 
 AROUND_A_MODE = np.sinh(np.linspace(-7.0, 7.0, 71))

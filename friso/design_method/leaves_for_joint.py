@@ -21,8 +21,7 @@ from friso.design_method.spec import read_spec
 from friso.equations.breakaway import least_breakaway
 from friso.errors import InputError
 from friso.leaf_springs.beams import BeamFailure
-from friso.leaf_springs.closed_forms import drive_stiffness, loaded_drive_stiffness
-from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.closed_forms import drive_stiffness, first_interfering, loaded_drive_stiffness
 from friso.quantities import exactly
 from friso.stage import Stage
 

@@ -17,7 +17,7 @@ from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.leaf_springs import closed_forms
-from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.closed_forms import first_interfering
 from friso.leaf_springs.mechanism import STANDARD_GRAVITY, Mechanism
 
 

@@ -1,22 +1,419 @@
-"""Model the mechanism as geometrically exact beams (exudyn), nonlinear over the stroke.
+"""The mechanisms as beams: their system, their modes, and both models side by side.
+
+Model the leaves of a mechanism as geometrically exact beams of exudyn.
+
+The module computes forces, stiffness and mass of the nodes. Only this module knows exudyn. A leaf is a chain of equal
+two-node elements of constant strain. Three corrections keep few elements exact:
+
+- An element misses bending because its moment is taken as constant. That bending is added to its shear flexibility
+  (residual bending flexibility: h^2/(12 E I) per force).
+- The bent middle of an element carries mass beyond the straight line between its nodes. That mass is added to its
+  rotary inertia (rho A h^2/6).
+- What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the stiffness of the
+  plate in parallel motion, under a constant torque, and under the torque that a force across the deflected leaf adds.
+
+Compute modes and buckling load of straight leaves and their stage.
+
+Stiffness and mass of one leaf suffice. A leaf between held ends moves along x, y and z and twists, each independently
+of the others. Its lowest modes of each kind describe it completely, together with the shapes that it takes statically
+when the stage moves (Craig & Bampton 1968, doi:10.2514/3.4741).
+
+Model the mechanism as geometrically exact beams (exudyn), nonlinear over the stroke.
 
 The stage is pushed along z. Leaves and stage then move in the x-z plane alone. The stiffness of the deflected mechanism
 has all six coordinates: three in the plane (x, z, about y) and three across it (y, about x, about z), which stay
 independent. Nodes between cart and stage are eliminated leaf by leaf.
+
+Evaluate leaf springs by both models at one stroke.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
-from friso.leaf_springs import closed_forms, plate
-from friso.leaf_springs.beam_modes import Reduced, buckling_load, modes
-from friso.leaf_springs.beam_system import LEAF_ELEMENTS, BeamFailure, Condensed, Configuration, LeafBeams
-from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import Mechanism
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs import mechanism as plate
+from friso.leaf_springs.closed_forms import SHEAR_COEFFICIENT, axial, body_mass, closed_form_model, edgewise_shear
+from friso.leaf_springs.mechanism import Evaluation, Mechanism, Mode
 from friso.leaf_springs.settings import settings
+from friso.stage import Stage
+
+LEAF_ELEMENTS = 16
+"""Elements along a leaf; its modes are reported at the nodes between them."""
+
+NODE_COORDINATES = 6
+"""Coordinates of a node: displacements along x, y, z and angles of successive rotations about them."""
+
+
+class BeamFailure(RuntimeError):
+    """Error: a mechanism that the beam model cannot evaluate."""
+
+
+class LeafBeams:
+    """The identical leaves of a mechanism with free ends, as beams in exudyn.
+
+    exudyn holds one leaf and evaluates each leaf in turn. States and forces have shape (leaves, nodes, 6), with the
+    cart end first.
+    """
+
+    def __init__(self, mechanism: Mechanism, elements: int = LEAF_ELEMENTS) -> None:
+        """Build one leaf with the given number of elements in exudyn."""
+        self.count, self.nodes = int(mechanism.leaves), elements + 1
+        import exudyn  # package of an extra
+
+        self._container: Any = exudyn.SystemContainer()
+        self._system: Any = self._container.AddSystem()
+        _add_leaf(self._system, mechanism, elements)
+        self._system.Assemble()
+        settings: Any = exudyn.SimulationSettings()
+        settings.solution.file.write = False
+        settings.solution.sensors.active = False
+        settings.staticSolver.verboseMode = 0
+        self._solver: Any = exudyn.MainSolverStatic()
+        self._solver.InitializeSolver(self._system, settings)
+
+    def forces(self, state: np.ndarray) -> np.ndarray:
+        """Return the forces and moments [N, N m] that hold the nodes in a state, (leaves, nodes, 6)."""
+        return -np.array([self._forces(leaf) for leaf in state]).reshape(state.shape)
+
+    def stiffness(self, state: np.ndarray) -> np.ndarray:
+        """Return the tangent stiffness of each leaf in a state, (leaves, 6 * nodes, 6 * nodes)."""
+        return np.array([self._stiffness(leaf) for leaf in state])
+
+    def mass(self) -> np.ndarray:
+        """Return the mass matrix of an undeflected leaf, shape (6 * nodes, 6 * nodes)."""
+        self._move(np.zeros((self.nodes, NODE_COORDINATES)))
+        self._solver.ComputeMassMatrix(self._system)
+        return np.array(self._solver.GetSystemMassMatrix())
+
+    def _move(self, leaf: np.ndarray) -> None:
+        if not np.all(np.isfinite(leaf)):
+            raise BeamFailure("The beams have no finite state: check that all dimensions are positive numbers.")
+        self._system.systemData.SetODE2Coordinates(leaf.ravel())
+
+    def _forces(self, leaf: np.ndarray) -> np.ndarray:
+        self._move(leaf)
+        self._solver.ComputeODE2RHS(self._system)
+        return np.array(self._solver.GetSystemResidual())
+
+    def _stiffness(self, leaf: np.ndarray) -> np.ndarray:
+        self._move(leaf)
+        factors = {"scalarFactor_ODE2": -1, "scalarFactor_ODE2_t": 0, "scalarFactor_ODE1": 0}
+        self._solver.ComputeJacobianODE2RHS(self._system, **factors)
+        return np.array(self._solver.GetSystemJacobian())
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Displacements of leaves and stage in the plane of motion.
+
+    `inner` holds the displacements of the nodes between the ends (leaves, nodes, 3), `stage` those of the stage (x, z,
+    about y).
+    """
+
+    inner: np.ndarray
+    stage: np.ndarray
+
+    @classmethod
+    def rest(cls, leaves: LeafBeams) -> Configuration:
+        """Return the configuration in which leaves and stage are not displaced."""
+        return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
+
+    def plus(self, rate: Configuration, factor: float = 1.0) -> Configuration:
+        """Return the configuration plus `factor` times the displacements in `rate`."""
+        return Configuration(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
+
+    def state(self, offsets: np.ndarray) -> np.ndarray:
+        """Return the state of all nodes, shape (leaves, nodes, 6).
+
+        `offsets` [m] are the places of the leaves along z.
+        """
+        x, z, turn = self.stage
+        leaves, inner, _ = self.inner.shape
+        state = np.zeros((leaves, inner + 2, NODE_COORDINATES))
+        state[:, 1:-1, 0::2] = self.inner
+        state[:, -1, 0] = x + np.sin(turn) * offsets
+        state[:, -1, 2] = z + (np.cos(turn) - 1) * offsets
+        state[:, -1, 4] = turn
+        return state
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """The leaves condensed onto the stage: their inner nodes are eliminated.
+
+    `follow` (leaves, inner coordinates, 3) tells how inner nodes move with the stage. `settle` (leaves, inner
+    coordinates) tells how they move under forces that are out of balance. `force` (3,) and `stiffness` (3, 3) act on
+    the stage.
+    """
+
+    follow: np.ndarray
+    settle: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+
+    @classmethod
+    def of(
+        cls, stiffness: np.ndarray, forces: np.ndarray, which: int, ends: np.ndarray, bend: tuple[int, float]
+    ) -> Condensed:
+        """Condense the stiffness of the leaves and the forces on their nodes onto the stage.
+
+        Of each node, the coordinates `which`, `which` + 2 and `which` + 4 are used. `ends` (leaves, 3, 3) tells how the
+        leaf ends follow the stage. If the stage turns, the leaf ends move along arcs. `bend` has the index of this
+        rotation, and the stiffness [N m/rad] that the forces at the ends add to it.
+        """
+        matrices = stiffness[:, NODE_COORDINATES + which :: 2, NODE_COORDINATES + which :: 2]
+        out = forces[:, 1:, which::2].reshape(len(forces), -1)
+        inside, border = slice(None, -3), slice(-3, None)
+        back = np.swapaxes(ends, 1, 2)
+        across = matrices[:, inside, border] @ ends
+        solved = np.linalg.solve(matrices[:, inside, inside], np.concatenate([across, out[:, inside, None]], axis=2))
+        follow, settle = -solved[:, :, :3], -solved[:, :, 3]
+        felt = np.swapaxes(across, 1, 2)
+        left = np.sum(back @ matrices[:, border, border] @ ends + felt @ follow, axis=0)
+        left[bend[0], bend[0]] += bend[1]
+        force = np.sum(back @ out[:, border, None] + felt @ settle[:, :, None], axis=0)[:, 0]
+        return cls(follow, settle, force, left)
+
+
+def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
+    """Add the nodes and elements of a leaf to a system of exudyn."""
+    h = float(mechanism.length) / elements
+    middles = h * (np.arange(elements // 2) + 0.5)
+    compliances = zip(_curl(mechanism, h, middles), _twist(mechanism, h, middles), strict=True)
+    half = [_section(mechanism, h, *pair) for pair in compliances]
+    nodes = [
+        system.AddNode({"nodeType": "RigidBodyRxyz", "referenceCoordinates": [i * h, 0, 0, 0, 0, 0], "Vshow": False})
+        for i in range(elements + 1)
+    ]
+    beam = {"objectType": "BeamGeometricallyExact", "length": h, "Vshow": False}
+    for i, section in enumerate(half[::-1] + half):
+        system.AddObject({**beam, "nodeNumbers": nodes[i : i + 2], "sectionData": section})
+
+
+def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
+    """Return the cross-section of an element of length h [m].
+
+    `curl` and `twist` are the compliances in bending and torsion relative to a plain beam.
+    """
+    weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
+    shears = (edgewise_shear(mechanism), strong), (SHEAR_COEFFICIENT * mechanism.shear * mechanism.area, weak)
+    torsion = mechanism.torsional_rigidity / twist
+    edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for shear, bending in shears)
+    bulge = mechanism.area * h**2 / 6
+    import exudyn
+
+    section: Any = exudyn.BeamSection()
+    section.stiffnessMatrix = np.diag([axial(mechanism), edgewise, flatwise, torsion, weak, strong])
+    section.massPerLength = mechanism.density * mechanism.area
+    moments = [mechanism.bending + mechanism.edgewise, mechanism.bending + bulge, mechanism.edgewise + bulge]
+    section.inertia = mechanism.density * np.diag(moments)
+    return section
+
+
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+
+def _inside(h: float, middles: np.ndarray) -> np.ndarray:
+    """Return four integration points [m] in each element, shape (elements, 4).
+
+    Elements of length `h` [m] have their `middles` [m], shape (elements,), counted from the middle of the leaf.
+    """
+    return middles[:, None] + GAUSS_POINTS * h / 2
+
+
+def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+    """Return the bending compliance of elements relative to a plain beam, shape (elements,).
+
+    Its mean over an element is weighted by the square of the moment in parallel motion.
+    """
+    s = _inside(h, middles)
+    compliance = plate.compliance_profile(s, *mechanism.plate_shape)
+    return (compliance * s**2) @ GAUSS_WEIGHTS / (s**2 @ GAUSS_WEIGHTS)
+
+
+def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+    """Return the torsional compliance of elements relative to a plain beam, shape (elements,).
+
+    Under a constant torque, the leaf then has the stiffness of the plate (`plate.free_twist`). The compliance is also
+    tilted along the leaf. The stiffness of the plate then holds, too, under the torque s^3 that a force across the
+    deflected leaf adds, with s from -1 to 1.
+
+    At the middle of an element of length h, in half lengths of the leaf, this torque is s^3 + s h^2/2. The reason is
+    that elements of constant strain represent the curved leaf as arcs (found by comparison; 1/n^2 errors of the
+    stiffness along y vanish).
+    """
+    s, end = 2 * _inside(h, middles) / mechanism.length, 2 * middles / mechanism.length
+    even = plate.free_twist(s * mechanism.length / 2, *mechanism.plate_shape) @ GAUSS_WEIGHTS / 2
+    odd = (plate.cubic_twist(s, *mechanism.plate_shape) * s**3) @ GAUSS_WEIGHTS / 2
+    return plate.tilted(even, end**3 + end * (2 * h / mechanism.length) ** 2 / 2, end, odd.sum())
+
+
+COUPLED_KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
+"""Coordinates of a node that couple while the leaf is straight, with the number of modes between held ends: bending,
+bending in its plane, torsion, stretching."""
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A straight leaf reduced to the motion of its stage end and a few modes of its own.
+
+    `static` (nodes, 6, 6) holds the shapes of the leaf for unit motions of the stage end. `inner` (nodes, 6, modes)
+    holds its modes between held ends at unit modal mass, and `squares` (modes,) their circular frequencies squared
+    [1/s^2]. `stiffness` and `mass` (6, 6) are those at the stage end. `coupling` (modes, 6) is the mass that couples
+    both kinds of motion.
+    """
+
+    static: np.ndarray
+    inner: np.ndarray
+    squares: np.ndarray
+    stiffness: np.ndarray
+    mass: np.ndarray
+    coupling: np.ndarray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
+        """Reduce a leaf to its stage end and a few modes.
+
+        `stiffness` [N/m, N, N m] and `mass` [kg, kg m, kg m^2] are those of its nodes. The torsion of the beam is
+        replaced by the torsion of a plate.
+        """
+        size, twisted = len(stiffness), (slice(3, None, NODE_COORDINATES),) * 2
+        stiffness, mass = stiffness.copy(), mass.copy()
+        stiffness[twisted], mass[twisted] = _torsion(mechanism, size // NODE_COORDINATES)
+        static, parts, squares = np.zeros((size, NODE_COORDINATES)), [], []
+        static[-NODE_COORDINATES:] = np.eye(NODE_COORDINATES)
+        for kind, number in COUPLED_KINDS:
+            inside = np.add.outer(np.arange(NODE_COORDINATES, size - NODE_COORDINATES, NODE_COORDINATES), kind).ravel()
+            clamped = stiffness[np.ix_(inside, inside)]
+            static[inside] = -np.linalg.solve(clamped, stiffness[inside, -NODE_COORDINATES:])
+            values, vectors = eigh(clamped, mass[np.ix_(inside, inside)])
+            shapes = np.zeros((size, min(number, len(values))))
+            shapes[inside] = vectors[:, :number]
+            parts.append(shapes)
+            squares.append(values[:number])
+        inner, moved = np.hstack(parts), mass @ static
+        return cls(
+            static.reshape(-1, NODE_COORDINATES, static.shape[1]),
+            inner.reshape(-1, NODE_COORDINATES, inner.shape[1]),
+            np.concatenate(squares),
+            static.T @ stiffness @ static,
+            static.T @ moved,
+            inner.T @ moved,
+        )
+
+
+def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return torsional stiffness and mass of the nodes of a leaf that cannot warp at its ends.
+
+    Both matrices have the shape (nodes, nodes). Elements are cubic; rates of twist at inner nodes are those of static
+    equilibrium. Beams lack warping, which matters more for modes than for statics.
+    """
+    h = float(mechanism.length) / (nodes - 1)
+    rigidity = float(mechanism.torsional_rigidity)
+    warping = rigidity / float(plate.warping_rate(mechanism.width, mechanism.poisson)) ** 2
+    signs = np.array([[1, 1, -1, 1], [1, 1, -1, 1], [-1, -1, 1, -1], [1, 1, -1, 1]])
+    lengths = np.outer([1, h, 1, h], [1, h, 1, h])
+    bent = np.array([[12, 6, 12, 6], [6, 4, 6, 2], [12, 6, 12, 6], [6, 2, 6, 4]]) * signs / h**3
+    turned = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / (30 * h)
+    moved = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420
+    polar = float(mechanism.density * (mechanism.bending + mechanism.edgewise))
+    stiffness, mass = np.zeros((2 * nodes, 2 * nodes)), np.zeros((2 * nodes, 2 * nodes))
+    for i in range(0, 2 * nodes - 2, 2):
+        stiffness[i : i + 4, i : i + 4] += (warping * bent + rigidity * turned) * lengths
+        mass[i : i + 4, i : i + 4] += polar * moved * lengths
+    follow = np.zeros((2 * nodes, nodes))
+    follow[::2] = np.eye(nodes)
+    inside = slice(3, -1, 2)
+    follow[inside] = -np.linalg.solve(stiffness[inside, inside], stiffness[inside, ::2])
+    return follow.T @ stiffness @ follow, follow.T @ mass @ follow
+
+
+def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
+    """Return the lowest modes of stage and leaves, and all modes in which the stage moves much.
+
+    The drive mode comes first, the others by frequency.
+    """
+    ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
+    count = len(leaf.squares)
+    size = NODE_COORDINATES + count * len(rows)
+    stiffness, mass = np.zeros((size, size)), np.eye(size)
+    stage = slice(0, NODE_COORDINATES)
+    stiffness[stage, stage] = _gathered(ends, leaf.stiffness)
+    body = body_mass(mechanism)
+    mass[stage, stage] = body + _gathered(ends, leaf.mass)
+    np.fill_diagonal(stiffness[NODE_COORDINATES:, NODE_COORDINATES:], np.tile(leaf.squares, len(rows)))
+    # pattern k of the leaves acts with the weights rows[k]
+    mass[NODE_COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(
+        -1, NODE_COORDINATES
+    )
+    mass[stage, NODE_COORDINATES:] = mass[NODE_COORDINATES:, stage].T
+    squares, vectors = eigh(stiffness, mass)
+    lowest = []
+    for square, vector in zip(squares, vectors.T, strict=True):
+        moves = vector[stage] @ body @ vector[stage] > settings.stage_energy_share
+        if len(lowest) >= settings.reported_modes and not moves:
+            continue
+        amplitudes = rows.T @ vector[NODE_COORDINATES:].reshape(len(rows), count)
+        moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
+        moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], amplitudes)
+        sign = 1.0 if moved.flat[np.argmax(np.abs(moved))] >= 0 else -1.0  # of the largest displacement of a leaf
+        frequency = np.sqrt(max(square, 0.0)) / (2 * np.pi)
+        lowest.append(Mode.of(mechanism, frequency, sign * vector[stage], sign * moved))
+    drive = max(lowest, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
+    return (replace(drive, name="drive"), *(mode for mode in lowest if mode is not drive))
+
+
+def end_motions(offsets: np.ndarray) -> np.ndarray:
+    """Return the motion of the leaves' stage ends per small motion of the stage, (leaves, 6, 6).
+
+    `offsets` [m], shape (leaves,), are the places of the leaves along z.
+    """
+    ends = np.tile(np.eye(NODE_COORDINATES), (len(offsets), 1, 1))
+    ends[:, 0, 4], ends[:, 1, 3] = offsets, -offsets
+    return ends
+
+
+def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Add up a matrix (6, 6) at each leaf's stage end to the matrix that acts on the stage.
+
+    `ends` (leaves, 6, 6) tells how the stage ends of the leaves follow the stage.
+    """
+    return np.einsum("lea,ef,lfb->ab", ends, matrix, ends)
+
+
+def _rows(offsets: np.ndarray) -> np.ndarray:
+    """Return orthonormal patterns of motion among the leaves, one in each row.
+
+    The first is uniform, the second linear in the position of the leaf, and the rest complete the set. `offsets` [m],
+    shape (leaves,), are the places of the leaves along z.
+    """
+    powers = np.vander(np.arange(len(offsets)) - (len(offsets) - 1) / 2, increasing=True)
+    return np.linalg.qr(powers)[0].T
+
+
+def buckling_load(mechanism: Mechanism, leaves: LeafBeams, straight: np.ndarray, load: float) -> float:
+    """Return the least load [N] along all leaves together at which the stage sways.
+
+    `straight` is the stiffness of a leaf without load. `load` [N] is a guess, at which the problem is linearised.
+    """
+    state = np.zeros((1, leaves.nodes, NODE_COORDINATES))
+    strain = load / float(mechanism.leaves * axial(mechanism))
+    state[:, :, 0] = -strain * np.linspace(0, float(mechanism.length), leaves.nodes)
+    loaded = leaves.stiffness(state)[0]
+    # all leaves bend identically; the stage's pitch stretches them
+    moving = np.add.outer(np.arange(NODE_COORDINATES, len(straight), NODE_COORDINATES), (2, 4)).ravel()
+    without, with_load = (int(mechanism.leaves) * matrix[np.ix_(moving, moving)] for matrix in (straight, loaded))
+    softening = without - with_load
+    without[-1, -1] += axial(mechanism) / mechanism.length * mechanism.offset_squares
+    last = len(moving) - 1
+    largest = eigh(softening, without, eigvals_only=True, subset_by_index=(last, last))[0]
+    return float(load / largest)
+
 
 PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 """Coordinates of the stage in the plane of motion, and across it, as slices of six."""
@@ -214,3 +611,48 @@ def _across(mechanism: Mechanism, turn: float, stiffness: np.ndarray, forces: np
     # convert angles of successive rotations to rotations about fixed axes
     angles = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -np.tan(turn)], [0.0, 0.0, 1 / tilt]])
     return angles.T @ successive @ angles
+
+
+BEAMS, CLOSED = "Beams", "Closed forms"
+"""Names of the models."""
+
+
+@dataclass(frozen=True)
+class BothModels:
+    """The leaf springs of a stage at a stroke, by closed forms and by beams.
+
+    `beams` is None where the beam model has no solution; `failure` gives the reason.
+    """
+
+    stage: Stage
+    closed: Evaluation
+    beams: Evaluation | None
+    failure: str = ""
+
+    @property
+    def best(self) -> Evaluation:
+        """Return the more exact evaluation: beams, if they have a solution."""
+        return self.beams or self.closed
+
+    @property
+    def models(self) -> dict[str, Evaluation]:
+        """Return the evaluations by the name of the model."""
+        models = {} if self.beams is None else {BEAMS: self.beams}
+        return {**models, CLOSED: self.closed}
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Return the mechanism that was evaluated."""
+        return self.closed.mechanism
+
+
+def both_models(stage: Stage, mechanism: Mechanism, stroke: float) -> BothModels:
+    """Evaluate the leaf springs of a stage at a stroke [m].
+
+    If the beam model fails, the result has the reason.
+    """
+    simple = closed_form_model(mechanism, stroke)
+    try:
+        return BothModels(stage, simple, beams(mechanism, stroke))
+    except BeamFailure as failure:
+        return BothModels(stage, simple, None, str(failure))

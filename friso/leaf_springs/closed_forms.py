@@ -1,18 +1,31 @@
-"""Evaluate the mechanism by closed forms, for one or for a million geometries at once.
+"""The mechanisms in closed forms, and the joint of a stage that follows from them.
+
+Evaluate the mechanism by closed forms, for one or for a million geometries at once.
 
 Sources: Soemers, Design Principles for Precision Mechanisms (2010), ch. 2; Awtar, Slocum & Sevincer (2007),
 doi:10.1115/1.2717231, for the deflected leaf; plate.py for the effect of clamps on a wide leaf. Stiffness in N/m,
 forces in N, lengths in m, frequencies in Hz; arrays of one shape throughout.
+
+Evaluate one mechanism at a stroke by closed forms.
+
+A deflected leaf is a curved beam, whose 6 x 6 stiffness follows from the energy of unit loads (Castigliano).
+
+Derive joint stiffness and parasitic mode of the equations of motion from leaf springs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from friso.leaf_springs import plate
-from friso.leaf_springs.mechanism import Mechanism
+from friso.errors import InputError
+from friso.leaf_springs import mechanism as plate
+from friso.leaf_springs.mechanism import Evaluation, Mechanism, Mode, along_motion
+from friso.leaf_springs.settings import settings
+from friso.stage.flexure import register_derivation
 
 SHEAR_COEFFICIENT = 5 / 6
 """Fraction of a rectangle's area that carries shear (Timoshenko's coefficient)."""
@@ -271,3 +284,255 @@ def drive_mode(frequencies: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.argmax(np.nan_to_num((shapes[..., 2, :] / frequencies) ** 2, posinf=np.inf), axis=-1)
+
+
+def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
+    """Evaluate the mechanism by closed forms over its stroke [m].
+
+    The drive stiffness is equal at all deflections.
+    """
+    deflections = np.linspace(0.0, stroke, settings.closed_deflections)
+    drive = drive_stiffness(mechanism) * np.ones(settings.closed_deflections)
+    return Evaluation(
+        model="closed forms",
+        mechanism=mechanism,
+        deflections=deflections,
+        forces=drive * deflections,
+        drive=drive,
+        support_x=support_x(mechanism, deflections),
+        support_y=support_y(mechanism, deflections),
+        stiffness=np.array([stage_stiffness_at(mechanism, deflection) for deflection in (0.0, stroke)]),
+        modes=_modes(mechanism),
+        stress=float(max_stress(mechanism, stroke)),
+        shortening=float(shortening(mechanism, stroke)),
+        buckling=float(buckling_load(mechanism)),
+    )
+
+
+def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
+    """Return the modes of stage and leaves by closed forms.
+
+    In some modes the leaves bend in phase with the stage; in the others they move while the stage is at rest.
+    """
+    frequencies, shapes = modes(mechanism)
+    drive = int(drive_mode(frequencies, shapes))
+    first = replace(_mode(mechanism, frequencies[drive], shapes[:, drive]), name="drive")
+    others = [_mode(mechanism, frequencies[k], shapes[:, k]) for k in range(7) if k != drive]
+    return (first, *sorted([*others, *_unlike(mechanism), _torsion_mode(mechanism)], key=lambda mode: mode.frequency))
+
+
+def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
+    """Build a mode from its frequency [Hz] and its shape at unit modal mass, (7,).
+
+    The shape has the stage's six coordinates, then the bending of the leaves.
+    """
+    stage, leaves = shape[:6], following(mechanism, shape[:6])
+    leaves[:, :, 2] += shape[6] / np.sqrt(mechanism.leaves * mechanism.leaf_mass) * _clamped_shape()
+    return Mode.of(mechanism, frequency, stage, leaves)
+
+
+def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
+    """Return how the leaves' middle lines follow a motion of the stage, (leaves, POINTS, 3).
+
+    The motion has shape (6,), and the leaves follow statically.
+    """
+    s = np.linspace(0.0, 1.0, settings.mode_shape_points)
+    by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)
+    x, y, z, turn_x, turn_y, turn_z = stage
+    return np.array(
+        [
+            np.stack(
+                [
+                    (x + turn_y * offset) * s,
+                    (y - turn_x * offset) * by_place + turn_z * by_slope,
+                    z * by_place - turn_y * by_slope,
+                ],
+                axis=1,
+            )
+            for offset in mechanism.offsets
+        ]
+    )
+
+
+def _unlike(mechanism: Mechanism) -> list[Mode]:
+    """Return the modes in which the leaves bend against each other, with the stage at rest."""
+    count, leaf_mass = int(mechanism.leaves), float(mechanism.leaf_mass)
+    modes = []
+    for k in range(1, count):
+        wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # patterns of the leaves, orthogonal to each other
+        leaves = np.zeros((count, settings.mode_shape_points, 3))
+        leaves[:, :, 2] = wave[:, None] * _clamped_shape() / np.sqrt(leaf_mass * np.sum(wave**2))
+        frequency = float(leaf_bending(mechanism))
+        modes.append(Mode("leaf bending, out of phase", frequency, 0.0, 0.0, 0.0, np.zeros(6), leaves))
+    return modes
+
+
+def _clamped_shape() -> np.ndarray:
+    """Return the first bending mode of a clamped beam at even places, with mean square 1."""
+    x = CLAMPED_ROOT * np.linspace(0.0, 1.0, settings.mode_shape_points)
+    ratio = (np.cosh(CLAMPED_ROOT) - np.cos(CLAMPED_ROOT)) / (np.sinh(CLAMPED_ROOT) - np.sin(CLAMPED_ROOT))
+    return np.cosh(x) - np.cos(x) - ratio * (np.sinh(x) - np.sin(x))
+
+
+def _torsion_mode(mechanism: Mechanism) -> Mode:
+    """Return the first torsional mode of the leaves, whose middle lines stay at rest."""
+    leaves = np.zeros((int(mechanism.leaves), settings.mode_shape_points, 3))
+    return Mode("leaf torsion", float(leaf_torsion(mechanism)), 0.0, 0.0, 0.0, np.zeros(6), leaves)
+
+
+def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
+    """Return the stiffness (6, 6) of the stage at its reference point, at a `deflection` [m].
+
+    The stage is kept parallel. Elasticity is linear about the deflected shape. The forces that hold the shape are too
+    small to matter as long as they are small against the buckling load.
+    """
+    leaf = leaf_stiffness(mechanism, deflection)
+    stiffness = np.zeros((6, 6))
+    for offset in mechanism.offsets:
+        shift = np.eye(6)
+        shift[0, 4], shift[1, 3] = offset, -offset
+        stiffness += shift.T @ leaf @ shift
+    return stiffness
+
+
+def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
+    """Return the stiffness matrix (6, 6) at the end of one deflected leaf.
+
+    The leaf is bent by `deflection` [m] into the shape 3 s^2 - 2 s^3, s being the fraction of its length.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(settings.gauss_points)
+    x, weight = (nodes + 1) / 2 * mechanism.length, weights / 2 * mechanism.length
+    share = x / mechanism.length
+    height, slope = deflection * (3 * share**2 - 2 * share**3), 6 * deflection / mechanism.length * (share - share**2)
+    loads, (per, arc) = _resultants(mechanism, deflection, x, height, slope), _per(mechanism, x, weight, slope)
+    compliance = np.einsum("pij,pik,pi,p->jk", loads, loads, per, arc)
+    return np.linalg.inv(compliance)
+
+
+def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the compliance of a short piece of a leaf, per force and moment, (points, 6).
+
+    The piece is at a point x [m]. Also returned is the arc length, (points,), for which each point stands: its `weight`
+    in the integral along x, lengthened by the `slope` of the leaf. All arguments have the shape (points,).
+    """
+    s = x - mechanism.length / 2
+    sheared = 1 / (SHEAR_COEFFICIENT * mechanism.shear * mechanism.area)
+    shape, ends = mechanism.plate_shape, 2 * s / mechanism.length
+    compliance = (plate.cubic_twist(ends, *shape) * ends**3) @ weight
+    free = plate.tilted(plate.free_twist(s, *shape) * weight, ends**3, ends, compliance) / weight
+    twist = free / (mechanism.torsional_rigidity)
+    curl = plate.compliance_profile(s, *mechanism.plate_shape) / (mechanism.young * mechanism.bending)
+    columns = (
+        1 / axial(mechanism),
+        1 / edgewise_shear(mechanism),
+        sheared,
+        twist,
+        curl,
+        1 / (mechanism.young * mechanism.edgewise),
+    )
+    return np.stack(np.broadcast_arrays(*columns), axis=1), weight * np.sqrt(1 + slope**2)
+
+
+def _resultants(
+    mechanism: Mechanism, deflection: float, x: np.ndarray, height: np.ndarray, slope: np.ndarray
+) -> np.ndarray:
+    """Return forces and moments at points of a leaf per unit load at its end, (points, 6, 6).
+
+    They act along and about tangent, width and normal of the leaf. The points have the coordinate x [m], and the
+    `height` [m] and `slope` of the deflected leaf, each of shape (points,).
+    """
+    cosine, sine = 1 / np.sqrt(1 + slope**2), slope / np.sqrt(1 + slope**2)
+    turn = np.zeros((len(x), 3, 3))
+    turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cosine, sine, 1.0, -sine, cosine
+    arm_x, arm_z = mechanism.length - x, deflection - height
+    moment = np.zeros((len(x), 3, 3))  # arm x force
+    moment[:, 0, 1], moment[:, 1, 0], moment[:, 1, 2], moment[:, 2, 1] = -arm_z, arm_z, -arm_x, arm_x
+    full = np.zeros((len(x), 6, 6))
+    full[:, :3, :3] = turn
+    full[:, 3:, :3] = turn @ moment
+    full[:, 3:, 3:] = turn
+    return full
+
+
+@register_derivation("flexure")
+def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `joint.stiffness` and the keys of [parasitic] for leaf springs in closed form.
+
+    Raises InputError if a single mechanism buckles under its load.
+    """
+    with np.errstate(all="ignore"):  # the rules of the stage file find numbers that make no mechanism
+        mechanism = Mechanism.of(flat)
+        frequency, share = parasitic_mode(mechanism)
+        stiffness, buckling = loaded_drive_stiffness(mechanism), buckling_load(mechanism)
+    if np.ndim(stiffness) == 0 and mechanism.load >= buckling > 0:
+        expected = f"less than the buckling load of the leaves, {float(buckling):.4g} N"
+        example = f'load = "{float(buckling) / 3:.2g} N"'
+        raise InputError("flexure.load", f"{float(mechanism.load):.4g} N", expected, example)
+    keys = {
+        "joint.stiffness": stiffness,
+        "parasitic.frequency": frequency,
+        "parasitic.mass": share / (1 + share) * mechanism.body.mass,
+        "parasitic.damping_ratio": mechanism.damping_ratio,
+    }
+    return {key: value if np.ndim(value) else float(value) for key, value in keys.items()}
+
+
+@dataclass(frozen=True)
+class VisibleModes:
+    """All modes of mechanisms except their drive mode, as arrays of shape (..., 7).
+
+    `frequency` is in Hz; `residue` is the residue times the mass of the stage, positive where actuator and sensor move
+    in phase. Residues are 0 at the drive mode. `visible` marks the modes that actuator and sensor both see.
+    """
+
+    frequency: np.ndarray
+    residue: np.ndarray
+    visible: np.ndarray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> VisibleModes:
+        """Compute the modes by closed forms, and decide which of them are visible."""
+        frequency, shapes = modes(mechanism)
+        pushed, measured = (along_motion(mechanism, at, shapes) for at in (mechanism.actuation, mechanism.sensor))
+        internal = np.arange(7) != drive_mode(frequency, shapes)[..., None]
+        residue = np.where(internal, pushed * measured * np.asarray(mechanism.body.mass)[..., None], 0.0)
+        least = settings.visible_peak * 2 * np.asarray(mechanism.damping_ratio)[..., None]
+        return cls(frequency, residue, np.abs(residue) > least)
+
+    def at(self, mode: np.ndarray) -> tuple[Any, Any]:
+        """Return frequency [Hz] and residue of the mode with number `mode`, all of shape (...).
+
+        For a mechanism without any visible mode the frequency is infinite and the residue 0.
+        """
+        both = ((self.frequency, np.inf), (self.residue, 0.0))
+        visible, at = self.visible.any(axis=-1), mode[..., None]
+        frequency, residue = (
+            np.where(visible, np.take_along_axis(quantity, at, axis=-1)[..., 0], none)[()] for quantity, none in both
+        )
+        return frequency, residue
+
+
+def first_interfering(mechanism: Mechanism) -> Any:
+    """Return the frequency [Hz] of the lowest mode that disturbs control; infinite without one.
+
+    Actuator and sensor both see the mode, and it is not the drive mode.
+    """
+    visible = VisibleModes.of(mechanism)
+    return visible.at(np.argmin(np.where(visible.visible, visible.frequency, np.inf), axis=-1))[0]
+
+
+def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
+    """Return frequency [Hz] and residue of the mode whose resonance stands highest in the plant.
+
+    Residues are multiplied by the stage's mass. The mode has the largest residue over the square of its frequency. If
+    no mode is visible, the leaves' own mode is returned with the least residue that the equations allow.
+
+    In the equations, a part m_p of the stage's mass m moves on a spring, which gives the residue m_p/(m (m - m_p)). It
+    is never negative. If actuator and sensor move against each other, only the size of the residue counts.
+    """
+    visible = VisibleModes.of(mechanism)
+    height = np.where(visible.visible, np.abs(visible.residue), 0.0) / np.maximum(visible.frequency, 1e-9) ** 2
+    frequency, residue = visible.at(np.argmax(height, axis=-1))
+    leaves = leaf_bending(mechanism)
+    size = np.maximum(np.abs(residue), settings.least_residue)
+    return np.where(np.isfinite(frequency), frequency, leaves)[()], size[()]

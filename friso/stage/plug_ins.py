@@ -78,7 +78,7 @@ FRISO = {
     "friso.controllers": ("friso.equations.controllers", "friso.identification.state_space_controller"),
     "friso.friction": ("friso.equations.friction",),
     "friso.motions": ("friso.equations.motions", "friso.identification.recorded_motion"),
-    "friso.derivations": ("friso.leaf_springs.joint", "friso.equations.conditions"),
+    "friso.derivations": ("friso.leaf_springs.closed_forms", "friso.equations.conditions"),
 }
 """Modules that register friso's own sections of the stage file, by group.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from friso.leaf_springs.both_models import BothModels
-from friso.leaf_springs.evaluation import Evaluation
+from friso.leaf_springs.beams import BothModels
+from friso.leaf_springs.mechanism import Evaluation
 from friso.questions.flexure.figures import COLOURS, flexure_figures
 from friso.questions.flexure.numbers import rows
 from friso.questions.flexure.words import sentences, warnings

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels
-from friso.leaf_springs.evaluation import Evaluation, Mode
-from friso.leaf_springs.mechanism import Mechanism
+from friso.leaf_springs.beams import BEAMS, CLOSED, BothModels
+from friso.leaf_springs.mechanism import Evaluation, Mechanism, Mode
 from friso.materials import materials
 from friso.questions.flexure.drawing import block_size, drawing_figure
 from friso.shown.drawing.figure import Array, Axis, Dash, Figure, Markers, Panel, Series

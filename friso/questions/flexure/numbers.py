@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from friso.leaf_springs.both_models import BothModels
-from friso.leaf_springs.evaluation import Evaluation, Mode
+from friso.leaf_springs.beams import BothModels
+from friso.leaf_springs.mechanism import Evaluation, Mode
 from friso.quantities import percent
 from friso.shown.drawing.prefixes import NOTHING, with_unit
 

@@ -63,7 +63,7 @@ def flexure(
     deflection = _stroke(stroke, chosen, mechanism)
     need("design", "friso flexure")
     progress(0, 0, "bending the leaves")
-    from friso.leaf_springs.both_models import both_models
+    from friso.leaf_springs.beams import both_models
 
     return FlexureAnswer(both_models(chosen, mechanism, deflection))
 

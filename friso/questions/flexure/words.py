@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from friso.leaf_springs.both_models import BothModels
-from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import AXES, STANDARD_GRAVITY
+from friso.leaf_springs.beams import BothModels
+from friso.leaf_springs.mechanism import AXES, STANDARD_GRAVITY, Evaluation
 from friso.quantities import percent
 from friso.questions.flexure.numbers import megapascals, newtons_per
 from friso.shown.drawing.prefixes import listed, with_unit

@@ -14,7 +14,7 @@ import numpy as np
 from friso.axis import axis_shown
 from friso.design_method.geometry import Geometry
 from friso.equations.breakaway import breakaway, least_breakaway
-from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.closed_forms import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive

@@ -13,8 +13,7 @@ from itertools import product
 import numpy as np
 
 from friso.leaf_springs.beams import beams
-from friso.leaf_springs.evaluation import Evaluation
-from friso.leaf_springs.mechanism import Mechanism, MovingBody, block_inertia
+from friso.leaf_springs.mechanism import Evaluation, Mechanism, MovingBody, block_inertia
 from friso.materials import materials
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
