@@ -18,13 +18,12 @@ from refusals import refused
 from snapshots import Snapshots
 
 import friso
-from friso.design_method import controller, method
-from friso.design_method.geometry import Geometry, Sheet
+from friso.design_method import method, verification
 from friso.design_method.method import Design, NoDesign
-from friso.design_method.population import Corners
 from friso.design_method.requirements import Relaxation
 from friso.design_method.settings import DesignSettings
-from friso.design_method.spec import Position, Spec, load_spec
+from friso.design_method.spec import Geometry, Position, Sheet, Spec, load_spec
+from friso.design_method.verification import Corners
 from friso.interface.output_folder import OutputFolder
 from friso.progress import Progress
 from friso.quantities import outwards
@@ -90,7 +89,7 @@ def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small() -> Iterator[None]:
-    with SMALL.in_use(), patched({controller: {"DAMPING_RATIOS": np.array([0.1, 0.7])}}):
+    with SMALL.in_use(), patched({verification: {"DAMPING_RATIOS": np.array([0.1, 0.7])}}):
         yield
 
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import friso
-from friso.design_method.geometry import Geometry, Sheet, box, round_geometries, sheets
-from friso.design_method.population import corners, random_machines, typical_move
 from friso.design_method.prepare import assumed, by_rules, outline, prepared, with_leaves
-from friso.design_method.spec import Spec, load_spec, read_spec
+from friso.design_method.spec import Geometry, Sheet, Spec, box, load_spec, read_spec, round_geometries, sheets
+from friso.design_method.verification import corners, random_machines, typical_move
 from friso.frequency.bode import rigid_bandwidth
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

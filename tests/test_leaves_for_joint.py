@@ -9,10 +9,8 @@ import pytest
 from snapshots import Snapshots
 
 from friso import Stage, load, loads
-from friso.design_method.geometry import Sheet, mechanisms
-from friso.design_method.leaves_for_joint import leaves_for_joint
-from friso.design_method.prepare import outline
-from friso.design_method.spec import read_spec
+from friso.design_method.prepare import leaves_for_joint, outline
+from friso.design_method.spec import Sheet, mechanisms, read_spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.closed_forms import first_interfering

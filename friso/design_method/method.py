@@ -12,27 +12,37 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.choice import Candidate, ChosenLeaves, Confirmed, chosen, confirmed, front
-from friso.design_method.controller import (
+from friso.design_method.prepare import by_rules, prepared, with_leaves
+from friso.design_method.requirements import (
+    Candidate,
+    ChosenLeaves,
+    Confirmed,
+    LeafTask,
+    Relaxation,
+    chosen,
+    confirmed,
+    front,
+    relaxed_requirements,
+)
+from friso.design_method.settings import settings
+from friso.design_method.spec import Spec
+from friso.design_method.verification import (
+    Corners,
     DesignedController,
+    HuntingMap,
     Modal,
+    Population,
+    Verification,
     choose_controller,
     comfortable,
     comfortable_below,
-    dampings,
-)
-from friso.design_method.population import (
-    Corners,
-    Population,
     corners,
+    dampings,
     edges_over,
+    hunting_map,
     rigid,
+    verification,
 )
-from friso.design_method.prepare import by_rules, prepared, with_leaves
-from friso.design_method.requirements import LeafTask, Relaxation, relaxed_requirements
-from friso.design_method.settings import settings
-from friso.design_method.spec import Spec
-from friso.design_method.verification import HuntingMap, Verification, hunting_map, verification
 from friso.engine.side_by_side import both
 from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER

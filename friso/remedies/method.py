@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from friso.axis import LINEAR
-from friso.design_method.leaves_for_joint import leaves_for_joint
+from friso.design_method.prepare import leaves_for_joint
 from friso.engine.allowance import Allowance, Exhausted, allowance
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.choice import Candidate, Confirmed
-from friso.design_method.geometry import Geometry
 from friso.design_method.method import Design, NoDesign, UnfinishedDesign
-from friso.design_method.population import Corners
-from friso.design_method.requirements import Relaxation
+from friso.design_method.requirements import Candidate, Confirmed, Relaxation
 from friso.design_method.settings import settings
-from friso.design_method.verification import MachineOutcomes
+from friso.design_method.spec import Geometry
+from friso.design_method.verification import Corners, MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.questions.design.figures import design_figures
 from friso.questions.design.steps import requirement_rows, steps

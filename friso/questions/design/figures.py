@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.design_method.choice import Candidate, Confirmed
 from friso.design_method.method import Design, UnfinishedDesign
-from friso.design_method.population import Corners
-from friso.design_method.verification import MachineOutcomes
+from friso.design_method.requirements import Candidate, Confirmed
+from friso.design_method.verification import Corners, MachineOutcomes
 from friso.frequency.bode import COMFORTABLE_MARGIN, Range
 from friso.materials import materials
 from friso.questions.design.window import limit_name, stiffest, view

@@ -8,9 +8,8 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.design_method.method import Design
-from friso.design_method.population import Corners
 from friso.design_method.requirements import RelaxableKey, Requirement
-from friso.design_method.verification import MachineOutcomes
+from friso.design_method.verification import Corners, MachineOutcomes
 from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
 from friso.frequency.bode import COMFORTABLE_MARGIN
 from friso.quantities import percent, plain_factor

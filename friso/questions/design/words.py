@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.geometry import Geometry
 from friso.design_method.method import Design, LeavesAndCrossover, Need, NoDesign, UnfinishedDesign
-from friso.design_method.population import Corners
 from friso.design_method.requirements import Relaxation
-from friso.design_method.verification import MachineOutcomes
+from friso.design_method.spec import Geometry
+from friso.design_method.verification import Corners, MachineOutcomes
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.platform.system import shell_word
 from friso.quantities import outwards, percent

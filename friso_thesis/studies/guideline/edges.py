@@ -2,7 +2,7 @@
 
 An edge is the lowest crossover from which on the cycle is not known to attract. Other attractors above it, such as an
 asymmetric cycle, are looked for only after a jump and where no orbit could be closed. `friso.hunting.margin` and
-`friso.design_method.population`, by contrast, survey all attractors.
+`friso.design_method.verification`, by contrast, survey all attractors.
 
 Where no orbit could be closed, long simulations from many starts give evidence: a swing that lasts to the end.
 """
