@@ -25,7 +25,7 @@ from friso.axis import speaking_of
 from friso.equations.bandwidth import sped_up
 from friso.frequency.bode import loop_bandwidth
 from friso.questions.tune.words import answer
-from friso.remedies.caps import speed_cap
+from friso.remedies.catalogue import speed_cap
 from friso.remedies.machines import Fleet, Goal, draw_fleet
 from friso.remedies.method import Advice, tune
 from friso.remedies.verified import Performance, confirmed, missed_parts, moving, unsettled_parts

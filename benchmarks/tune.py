@@ -28,8 +28,7 @@ from friso.questions.tune.words import changes
 from friso.remedies.catalogue import BANDWIDTH, Remedy
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import machines_of_search, tune
-from friso.remedies.search import Budget, Search
-from friso.remedies.trials import modulus_margins, moves_of_points
+from friso.remedies.search import Budget, Search, modulus_margins, moves_of_points
 from friso.remedies.verified import NO_VARIABLES, Performance, moving
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations

@@ -18,7 +18,7 @@ from friso.equations.controllers.adrc import crossing_ratio
 from friso.errors import InputError
 from friso.frequency.margins import margins
 from friso.frequency.system import limit_cases
-from friso.remedies.loops import linear_flat
+from friso.remedies.catalogue import linear_flat
 from friso.stage import Stage
 
 MASS, RATIO = 1.7, 5.0

@@ -26,11 +26,9 @@ from friso.questions.compare.blocks import compare_document, rows, sentences
 from friso.remedies import comparison as study
 from friso.remedies import machines as drawing
 from friso.remedies import method
-from friso.remedies.catalogue import BANDWIDTH
+from friso.remedies.catalogue import BANDWIDTH, linear_flat, linear_loops
 from friso.remedies.comparison import FASTER, ISOLATOR, LOCKED, Compared, Comparison, MachineMeasures, compare
-from friso.remedies.drawn import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
-from friso.remedies.loops import linear_flat, linear_loops
-from friso.remedies.machines import draw_common, draw_fleet
+from friso.remedies.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_common, draw_fleet, draw_machines
 from friso.shares import quantile_interval, share
 from friso.stage import Stage, element_keys, load
 from friso.stage.controllers import as_tuned

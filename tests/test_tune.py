@@ -34,14 +34,21 @@ from friso.hunting.measures import measured_run
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.words import unseen
 from friso.remedies import verified
-from friso.remedies.caps import SpeedCap, speed_cap
-from friso.remedies.catalogue import BANDWIDTH, Remedy, of_key, remedies, suggestion
-from friso.remedies.least import ChangeSize, change_size, least_factors
+from friso.remedies.catalogue import BANDWIDTH, Remedy, SpeedCap, of_key, remedies, speed_cap, suggestion
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
-from friso.remedies.method import Advice, pairs, tune
-from friso.remedies.search import Budget, Search, TriedPoints
+from friso.remedies.method import Advice, ChangeSize, change_size, least_factors, pairs, tune
+from friso.remedies.search import (
+    Attraction,
+    Budget,
+    Moves,
+    Search,
+    TriedPoints,
+    attraction,
+    modulus_margins,
+    moves_of_points,
+    quantile,
+)
 from friso.remedies.settings import RemedySettings, settings
-from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.stage.controllers import controller_of
 from friso.stage.correlations import Correlations
 

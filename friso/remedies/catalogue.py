@@ -1,4 +1,10 @@
-"""List the remedies with the keys that they change, the smallest change first.
+"""The catalogue of remedies, with what limits their keys and what their loops must hold.
+
+Cap the speed of the controller that is advised where nobody stated what the machine allows.
+
+Judge the linear loops of many machines: which are stable, and with which margin.
+
+List the remedies with the keys that they change, the smallest change first.
 
 Gains, bandwidth and joint are variables of an optimiser on logarithmic scales. The isolator suggested to a rigid stage
 that hunts comes from a survey of a few joints.
@@ -8,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,15 +25,120 @@ from friso.equations.motion import pieces
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
-from friso.frequency.bode import COMFORTABLE_MARGIN, bandwidths_at, limits, settled_margin
+from friso.frequency.bode import COMFORTABLE_MARGIN, bandwidths_at, limits, loop_bandwidth, settled_margin
+from friso.frequency.loops import Poles
+from friso.frequency.margins import about_resonances, for_poles
+from friso.frequency.system import limit_cases
 from friso.hunting import find_attractors
 from friso.quantities import exactly
-from friso.remedies.caps import SpeedCap, speed_cap
-from friso.remedies.loops import linear_flat
 from friso.remedies.machines import Goal
 from friso.remedies.settings import settings
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import FILTERS_KEY, controller_of, settings_of
+
+CapReason = Literal["stated", "least", "sampling", "mode", "unknown"]
+"""What caps the speed: the user's limit of the bandwidth, the least speed that works, the sampling of the drive, the
+lowest mode, or that no mode is known."""
+
+
+@dataclass(frozen=True)
+class SpeedCap:
+    """The largest `factor` by which a controller is made faster unasked, and the `reason` for it.
+
+    No gain goes beyond that of the present controller made faster by the factor.
+    """
+
+    factor: float
+    reason: CapReason
+
+    def above(self, least: float) -> SpeedCap:
+        """Return the cap once a controller that is `least` times as fast works, and nothing faster is needed."""
+        if self.reason == "stated":
+            return self
+        return SpeedCap(min(self.factor, settings.faster_than_least * max(1.0, least)), "least")
+
+
+def speed_cap(stage: Stage, goal: Goal) -> SpeedCap:
+    """Return how much faster a controller may become.
+
+    The bandwidth of the loop may reach a fraction of the sampling rate or of the lowest mode, whichever is less; where
+    no mode is known, a multiple of the present bandwidth. A cap never asks for a slower controller.
+    """
+    if goal.bandwidth_limit is not None:
+        return SpeedCap(settings.fastest_factor, "stated")
+    flat, own = stage.flat(), loop_bandwidth(stage)
+    caps, mode = [], flat.get("parasitic.frequency")
+    if mode is not None and np.isfinite(own):
+        caps.append(SpeedCap(settings.mode_share * mode / own, "mode"))
+    else:
+        caps.append(SpeedCap(settings.fastest_unasked, "unknown"))
+    if (sample_time := flat.get("drive.sample_time")) and np.isfinite(own):
+        caps.append(SpeedCap(settings.sampling_share / sample_time / own, "sampling"))
+    least = min(caps, key=lambda cap: cap.factor)
+    return SpeedCap(min(max(1.0, least.factor), settings.fastest_factor), least.reason)
+
+
+FREQUENCIES_PER_DECADE, SLOWEST_FACTOR, FASTEST_FACTOR = 25, 0.1, 10.0
+"""Frequencies at which loops are evaluated: per decade, apart from those near resonances; the lowest, over the slowest
+pole; the highest, over the fastest pole, or half the sampling frequency."""
+
+REFINEMENT_ROUNDS, REFINED_FREQUENCIES = 2, 9
+"""Refinements of the frequency at which a loop comes closest to -1, and number of frequencies in each."""
+
+
+def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys from which the linear loops of machines are computed, with SI values.
+
+    `flat` has the machines' keys. The drive's loop for the motor current has the bandwidth of the `stage` on all
+    machines. The ratio of true to assumed motor constant becomes a factor of the controller's gains. The cable is left
+    out.
+    """
+    current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
+    ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
+    return {**flat, **{key: ratio * flat[key] for key in map(controller.key, controller.loop_gain)}, **current_loop}
+
+
+@dataclass(frozen=True)
+class LoopRobustness:
+    """Stability and margin of the linear loop of each machine, arrays of shape (count,).
+
+    `stable` is true if the loop is stable in all limit cases of the joint and the friction. `margin` is the least
+    modulus margin among the cases, 0 if it is not stable.
+    """
+
+    stable: np.ndarray
+    margin: np.ndarray
+
+
+def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobustness:
+    """Return stability and margin of machines' linear loops, in the limit cases of a stage.
+
+    `flat` has the machines' keys, such as "masses.cart", with SI numbers or arrays (count,).
+    """
+    stable, margin = np.ones(count, bool), np.full(count, np.inf)
+    for limit_case in limit_cases(stage.flat()).values():
+        for which, (settles, distance) in for_poles(flat, limit_case.repeated(count), _robustness):
+            stable[which] &= settles
+            margin[which] = np.minimum(margin[which], distance)
+    return LoopRobustness(stable, np.where(stable, margin, 0.0))
+
+
+def _robustness(loops: Poles) -> tuple[np.ndarray, np.ndarray]:
+    """Return which loops are stable, and the least distance of each from -1, both (loops,)."""
+    size, rows = np.abs(loops.continuous), np.arange(len(loops.closed))
+    low = SLOWEST_FACTOR * float(np.median(size.min(axis=1)))
+    high = min(loops.drive.highest, FASTEST_FACTOR * float(size.max()))
+    even = np.geomspace(low, high, int(FREQUENCIES_PER_DECADE * np.log10(high / low)) + 2)
+    resonant = np.nan_to_num(about_resonances(loops), nan=high)
+    omega = np.sort(np.concatenate([np.broadcast_to(even, (len(rows), len(even))), resonant], axis=1), axis=1)
+    distance = loops.distance(omega)
+    for _ in range(REFINEMENT_ROUNDS):
+        closest = distance.argmin(axis=1)
+        before, after = (omega[rows, np.clip(closest + step, 0, omega.shape[1] - 1)] for step in (-1, 1))
+        omega = np.linspace(before, after, REFINED_FREQUENCIES, axis=1)
+        distance = loops.distance(omega)
+    return loops.abscissa < 0, distance.min(axis=1)
+
 
 KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
 """Function that takes the keys so far, in SI, and values of a variable, and returns the keys that change."""

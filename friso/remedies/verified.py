@@ -30,12 +30,19 @@ from friso.hunting import (
     kernels_to_judge,
     unstable,
 )
-from friso.remedies.catalogue import BANDWIDTH, Remedy
-from friso.remedies.loops import linear_flat
+from friso.remedies.catalogue import BANDWIDTH, Remedy, linear_flat
 from friso.remedies.machines import Fleet, Goal, MoveRange
-from friso.remedies.search import TriedPoints
+from friso.remedies.search import (
+    Attraction,
+    Moves,
+    TriedPoints,
+    attraction,
+    modulus_margins,
+    moves_of_points,
+    quantile,
+    timing,
+)
 from friso.remedies.settings import settings
-from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
 from friso.shares import DOUBT_PROBABILITY, Share, quantile_interval, share
 from friso.stage import Stage
 

@@ -80,7 +80,7 @@ def compare(
     if len({one.axis_kind for one in chosen}) > 1:
         raise inputs.wrong("stage", "axes that turn and axes that do not", "axes of one kind", '"rig.toml"')
     from friso.remedies import comparison
-    from friso.remedies.drawn import FEWEST_MACHINES, MOST_MACHINES
+    from friso.remedies.machines import FEWEST_MACHINES, MOST_MACHINES
 
     inputs.whole_number(machines, "machines", FEWEST_MACHINES, MOST_MACHINES, "2000")
     for one in chosen:

@@ -11,7 +11,7 @@ from friso.engine.batch import simulate
 from friso.equations.motion import last_corner
 from friso.frequency.loops import response
 from friso.frequency.system import DriveTiming, limit_cases
-from friso.remedies.loops import linear_flat
+from friso.remedies.catalogue import linear_flat
 from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome
 from friso.shown.drawing.figure import Axis, Dash, Figure, Panel, Series
