@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from friso.equations.rail import friction_factors, gaussian_field
 from friso.stage.rig import Floor
-from friso.virtual_rig.surroundings import floor_acceleration, variance_below
+from friso.virtual_rig.task import floor_acceleration, variance_below
 
 SURE = 5.0
 """Standard errors within which an estimate has to lie: 1 in 1.7 million does not."""

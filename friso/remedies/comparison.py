@@ -28,8 +28,7 @@ from friso.stage import Stage
 from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations
 from friso.stage.rig import is_as_built
-from friso.virtual_rig.response import measured_recording
-from friso.virtual_rig.run import run_flat, with_complete_drive
+from friso.virtual_rig.run import measured_recording, run_flat, with_complete_drive
 from friso.virtual_rig.task import SAMPLE_TIME, motion_task
 
 RUN_RTOL = 1e-6

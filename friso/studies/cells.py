@@ -70,8 +70,7 @@ def built_runs(
     `cancel` is set, no further chunk begins.
     """
     # 0.1 s to import, of use for real drives alone
-    from friso.virtual_rig.response import measured_recording
-    from friso.virtual_rig.run import run_flat, with_complete_drive
+    from friso.virtual_rig.run import measured_recording, run_flat, with_complete_drive
     from friso.virtual_rig.task import motion_task
 
     timing = [np.broadcast_to(flat[key], (count,)) for key in TIMING if key in flat]

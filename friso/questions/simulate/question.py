@@ -53,7 +53,7 @@ class SimulateAnswer(Answer):
     def measures(self) -> Measures:
         """Return measures of the run's end, such as outcome, swing and settling time."""
         if self.as_built:
-            from friso.virtual_rig.response import measured_response
+            from friso.virtual_rig.run import measured_response
 
             return measured_response(self.stage, self.result)
         return measured_run(self.stage, self.result.attrs["rtol"])
@@ -166,7 +166,7 @@ def simulate(
 
     inputs.mention_unstable_loop(chosen)
     if is_as_built(chosen) and not continuous:
-        from friso.virtual_rig.response import response as run_as_built
+        from friso.virtual_rig.run import response as run_as_built
 
         response = run_as_built(chosen, tolerance or usual, interval)
     else:
