@@ -20,8 +20,8 @@ from friso.engine import building, cache
 from friso.engine import cache as prune
 from friso.engine.cache import SECONDS_OF_A_DAY
 from friso.engine.settings import BuildSettings
-from friso.platform import private
-from friso.platform.whole_file import PARTIAL
+from friso.platform import files
+from friso.platform.files import PARTIAL
 
 BUILDER = """
 import os
@@ -304,24 +304,24 @@ def test_what_belongs_to_others_or_is_open_to_them_is_not_read(
 ) -> None:
     before = os.umask(0)
     try:
-        private.make_private(tmp_path / "a" / "b")
+        files.make_private(tmp_path / "a" / "b")
     finally:
         os.umask(before)
     assert mode(tmp_path / "a") == mode(tmp_path / "a" / "b") == 0o700
     file, link, pipe = tmp_path / "file", tmp_path / "link", tmp_path / "pipe"
-    private.write_private(file, b"content")
+    files.write_private(file, b"content")
     link.symlink_to(file)
     os.mkfifo(pipe)
-    assert private.read_private(file) == b"content"
+    assert files.read_private(file) == b"content"
     for path in (link, pipe):
         with pytest.raises(OSError, match=r"link|no file|levels"):
-            private.read_private(path)
+            files.read_private(path)
     file.chmod(0o620)
     with pytest.raises(PermissionError):
-        private.read_private(file)
+        files.read_private(file)
     folder = copied / "kernels"
     folder.chmod(0o755)
-    for path, use in ((entry(copied), private.read_private), (folder, private.make_private)):
+    for path, use in ((entry(copied), files.read_private), (folder, files.make_private)):
         with monkeypatch.context() as patch:
             belongs_to_another(path, patch)
             with pytest.raises(PermissionError, match="belongs to another user"):

@@ -12,8 +12,8 @@ import pytest
 
 import friso
 from friso.errors import InputError
-from friso.platform import extras
-from friso.platform.extras import EXTRAS
+from friso.platform import installed
+from friso.platform.installed import EXTRAS
 
 ROOT = Path(__file__).parents[1]
 
@@ -73,7 +73,7 @@ def test_the_extras_are_those_of_the_package() -> None:
 def test_what_needs_an_extra_says_so_before_it_computes(
     monkeypatch: pytest.MonkeyPatch, extra: str, asked: Callable[[], Any]
 ) -> None:
-    monkeypatch.setattr(extras, "is_installed", lambda package: package not in EXTRAS[extra])
+    monkeypatch.setattr(installed, "is_installed", lambda package: package not in EXTRAS[extra])
     monkeypatch.setattr("friso.engine.batch.run_batch", None)  # nothing runs
     with pytest.raises(InputError) as refused:
         asked()

@@ -133,8 +133,8 @@ from pathlib import Path
 from unittest.mock import patch
 
 from friso.app.uploads import plain_name
-from friso.platform.bounded_file import content_of
-from friso.platform.private import read_private
+from friso.platform.files import content_of
+from friso.platform.files import read_private
 from friso.platform.system import cause_of, check_free, delete_file, name_new_file, name_refused, path_of, remove_folder
 from friso.platform.system import replace_file, shell_word
 

@@ -221,7 +221,7 @@ def test_save_refuses_what_may_not_be_written(tmp_path: Path, rig: Stage, monkey
         save(rig, file, overwrite=True)
     with refused():
         save(rig, tmp_path / "missing" / "rig.toml")
-    monkeypatch.setattr("friso.platform.paths.name_refused", lambda path: f"{path.name} is a device")
+    monkeypatch.setattr("friso.platform.files.name_refused", lambda path: f"{path.name} is a device")
     with pytest.raises(InputError, match=r"con\.toml is a device"):
         save(rig, tmp_path / "con.toml")
     assert ([*tmp_path.iterdir()], file.read_text()) == ([file], "mine")

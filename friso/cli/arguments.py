@@ -14,7 +14,7 @@ from typer import BadParameter
 from typer.models import ArgumentInfo
 
 from friso.errors import InputError
-from friso.platform import paths
+from friso.platform import files
 from friso.platform.system import shell_word
 
 
@@ -38,9 +38,9 @@ def with_checked_paths(function: Callable[..., None]) -> Callable[..., None]:
         """Check every path among the options, then call the function."""
         for name, value in options.items():
             for path in value if isinstance(value, list) else [value]:
-                if isinstance(path, Path) and (flaw := paths.flaw_of(path)):
+                if isinstance(path, Path) and (flaw := files.flaw_of(path)):
                     key, example = _named(function, name)
-                    raise InputError(key, flaw, paths.EXPECTED, example)
+                    raise InputError(key, flaw, files.EXPECTED, example)
         function(**options)
 
     return command

@@ -17,7 +17,7 @@ from friso.drives.questions import UserAnswers, moving_mass, refuse_open
 from friso.drives.settings import drive_settings
 from friso.errors import InputError, shortened
 from friso.escapes import one_line
-from friso.platform.paths import flaw_of
+from friso.platform.files import flaw_of
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.stage.tables_of_files import text_of

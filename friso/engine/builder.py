@@ -1,6 +1,6 @@
 """Program that fills the cache: ``python -m friso.engine.builder FOLDER``.
 
-It receives pairs, the name of a module and a task (`friso.platform.helper_process`). The module's `build(folder, task)`
+It receives pairs, the name of a module and a task (`friso.platform.interrupts`). The module's `build(folder, task)`
 compiles the task into the cache's FOLDER. The program returns the name of the entry, or the OSError that prevented it.
 """
 
@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 
 from friso.engine.settings import build_settings
-from friso.platform.helper_process import answer_questions
+from friso.platform.interrupts import answer_questions
 
 
 def main(folder: Path) -> None:

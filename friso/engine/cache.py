@@ -42,10 +42,9 @@ from platformdirs import user_cache_dir
 
 from friso.engine.machine_code import processor
 from friso.engine.settings import build_settings
+from friso.platform.files import PARTIAL, make_private, read_private, write_private
 from friso.platform.leftovers import locked_folder, temporary_folder
-from friso.platform.private import make_private, read_private, write_private
 from friso.platform.system import cause_of, path_of, remove_folder
-from friso.platform.whole_file import PARTIAL
 from friso.version import VERSION
 
 logger = logging.getLogger("friso")

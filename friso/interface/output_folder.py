@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.errors import InputError
-from friso.platform import paths
+from friso.platform import files
 from friso.platform.interrupts import raise_what_waits
 from friso.platform.leftovers import locked_folder, remove_leftovers
 from friso.platform.system import cause_of, check_free, delete_file, name_new_file, replace_file, shell_word
@@ -93,7 +93,7 @@ def refuse_place(option: str, path: Path) -> None:
     files.
     """
     example = f"{option} report" if option.startswith("--") else ""
-    if why := paths.unwritable(path):
+    if why := files.unwritable(path):
         raise InputError(option, *why, example)
     if any(_is_store(folder) for folder in Path(os.path.abspath(path)).parents):
         raise InputError(option, f"{path}, in a store of friso map", "a place outside of it", example)

@@ -1,4 +1,8 @@
-"""Find modules that installed packages add to friso by entry points, by group.
+"""What is installed beside friso: extras, and packages that add to it.
+
+List optional dependencies ("extras") of commands, and say how to install them.
+
+Find modules that installed packages add to friso by entry points, by group.
 
 Names come from the metadata of packages; a module is imported only when it is needed. A name that is taken, or a module
 that cannot be used, is reported in one sentence and skipped.
@@ -12,10 +16,45 @@ from collections.abc import Mapping
 from contextlib import redirect_stdout
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
 from friso.errors import InputError
+
+EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo"), "fmu": ("fmpy",)}
+"""Packages of each extra that commands or what they write need, by the extra's name in pyproject.toml.
+`friso.identification.logs.confined` lists packages of log formats."""
+
+
+def install(extra: str) -> str:
+    """Return the command that installs an extra."""
+    return f'pip install "friso[{extra}]"'
+
+
+def is_installed(package: str) -> bool:
+    """Tell whether a package is installed, without importing it."""
+    try:
+        return find_spec(package) is not None
+    except ValueError:  # a module of that name made by hand
+        return False
+
+
+def missing(extra: str) -> list[str]:
+    """Return the packages of an extra that are not installed."""
+    return [package for package in EXTRAS[extra] if not is_installed(package)]
+
+
+def need(extra: str, subject: str) -> None:
+    """Check that an extra is installed, before anything is computed.
+
+    Raises InputError if it is not. The message names the `subject`, a command or an option, and says how to install the
+    extra.
+    """
+    if packages := missing(extra):
+        actual = f"an installation of friso without {' and '.join(packages)}"
+        raise InputError(subject, actual, f"the extra {extra}", install(extra))
+
 
 LOGGER = logging.getLogger("friso")
 

@@ -26,7 +26,7 @@ from friso.equations.structure import structure
 from friso.errors import InputError, StageError
 from friso.frequency.bode import Limits, limits, loop_bandwidth
 from friso.hunting import Case
-from friso.platform.extras import missing
+from friso.platform.installed import missing
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import BANDWIDTH, Remedy, SpeedCap, linear_flat, remedies, speed_cap, with_bandwidth
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet

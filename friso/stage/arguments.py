@@ -17,7 +17,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from friso.errors import InputError
-from friso.platform import paths
+from friso.platform import files
 from friso.quantities import quoted
 from friso.stage.stage import Stage
 from friso.stage.tables_of_files import read_stage
@@ -303,6 +303,6 @@ def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool)
         raise InputError(name, quoted(value), words, f"{key}={example}" if example else "")
     if _PATH_KINDS & {*kinds}:
         for path in value if _is_list(value, _is_path) else [value]:
-            if _is_path(path) and (flaw := paths.flaw_of(path)):
+            if _is_path(path) and (flaw := files.flaw_of(path)):
                 example = next(kind.example for part, kind in kinds.items() if part in _PATH_KINDS)
-                raise InputError(name, flaw, paths.EXPECTED, f"{name}={example}")
+                raise InputError(name, flaw, files.EXPECTED, f"{name}={example}")

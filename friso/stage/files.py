@@ -6,9 +6,9 @@ import os
 from pathlib import Path
 
 from friso.errors import InputError
-from friso.platform import paths
+from friso.platform import files
+from friso.platform.files import whole_file
 from friso.platform.system import check_free
-from friso.platform.whole_file import whole_file
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import Stage
 from friso.stage.tables_of_files import read_stage, reason_of, stage_of
@@ -55,7 +55,7 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
     >>> friso.save(stage, "heavier.toml")  # doctest: +SKIP
     """
     place = Path(path)
-    if why := paths.unwritable(place):
+    if why := files.unwritable(place):
         raise InputError("path", *why, 'path="stage.toml"')
     if os.path.lexists(place) and not (overwrite and place.is_file()):
         raise InputError("", "a file that already exists", "a new file, or overwrite=True", origin=str(place))

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from friso.errors import InputError, StageError
 from friso.escapes import one_line
-from friso.platform.bounded_file import LargeFileError, content_of
+from friso.platform.files import LargeFileError, content_of
 from friso.platform.system import cause_of, shell_word
 from friso.quantities import quoted
 from friso.stage.stage import Stage, changed

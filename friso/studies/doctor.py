@@ -19,7 +19,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.resources import files
 from pathlib import Path
 
-from friso.platform.extras import EXTRAS, install
+from friso.platform.installed import EXTRAS, install
 from friso.platform.leftovers import temporary_folder
 from friso.platform.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.stage import Stage

@@ -28,7 +28,7 @@ from filelock import FileLock, Timeout
 from pydantic import TypeAdapter
 
 from friso.errors import StoreError
-from friso.platform.bounded_file import content_of
+from friso.platform.files import PARTIAL, content_of, is_partial, whole_file
 from friso.platform.interrupts import hold_interrupts
 from friso.platform.leftovers import is_leftover, remove_leftover
 from friso.platform.system import (
@@ -40,7 +40,6 @@ from friso.platform.system import (
     rename_folder,
     shell_word,
 )
-from friso.platform.whole_file import PARTIAL, is_partial, whole_file
 
 MOST_BYTES = 64 << 20
 """Largest file of a store [bytes]: six times the largest chunk, which has incompressible texts."""

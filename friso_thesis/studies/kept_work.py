@@ -19,8 +19,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from friso.engine.cache import code_digest, machine
+from friso.platform.files import whole_file
 from friso.platform.system import remove_folder
-from friso.platform.whole_file import whole_file
 from friso.studies.store_files import stored
 from friso.studies.study import equations_version
 

@@ -22,7 +22,7 @@ from friso.errors import LogError
 from friso.identification.logs import binary
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.settings import settings
-from friso.platform.extras import install, is_installed
+from friso.platform.installed import install, is_installed
 from friso.platform.system import LIMITS_MEMORY
 
 CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)

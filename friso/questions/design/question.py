@@ -14,7 +14,7 @@ from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import AS_BUILT, Changes, FrequencyLike, StageLike
-from friso.platform.extras import need
+from friso.platform.installed import need
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
 from friso.stage import Stage, numeric_keys

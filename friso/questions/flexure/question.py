@@ -8,7 +8,7 @@ from friso.errors import InputError
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, LengthLike, StageLike, read_stage, text_of, wrong
 from friso.leaf_springs.mechanism import Mechanism
-from friso.platform.extras import need
+from friso.platform.installed import need
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage

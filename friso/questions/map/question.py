@@ -21,7 +21,7 @@ from friso.hunting import is_moved_evenly
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import LOGGER, Address, AxisPoints, Changes, MetricName, StageLike, Tolerance
-from friso.platform.extras import need
+from friso.platform.installed import need
 from friso.platform.system import MOST_PROCESSES, cause_of, path_of, shell_word, usable_cores
 from friso.progress import Progress, silent
 from friso.questions.map.study import (

@@ -25,7 +25,7 @@ from friso.interface.inputs import (
     StageLike,
     TimeLike,
 )
-from friso.platform.extras import install, missing
+from friso.platform.installed import install, missing
 from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.quantities import Bound, Quantity, positive, quoted

@@ -16,7 +16,7 @@ from friso.design_method.spec import Geometry
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.leaf_springs.closed_forms import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
-from friso.platform.extras import install
+from friso.platform.installed import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import ClaimName, StudyName, Tolerance, tolerance_of
-from friso.platform.extras import need
+from friso.platform.installed import need
 from friso.progress import Progress, silent
 from friso_thesis.studies.thesis.plausible import DRAW_COUNT
 from friso_thesis.studies.thesis.reproduce import MAP_POINTS
