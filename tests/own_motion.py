@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from friso.quantities import Quantity, Value, any_sign, positive
-from friso.stage.motion import Motion, Piece, ReferenceForm, Tone, register_motion
+from friso.stage.rig import Motion, Piece, ReferenceForm, Tone, register_motion
 
 
 @register_motion

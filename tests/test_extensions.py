@@ -31,7 +31,7 @@ from friso.interface.question import HUNTS, QUESTIONS
 from friso.progress import Progress
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.stage import Stage
-from friso.stage.foreign import foreign
+from friso.stage.arguments import foreign
 from friso.studies.metric import METRICS, MapFinding, Metric, Word
 from friso_thesis.studies.rig.experiments import RIG_EXPERIMENTS, RigExperiment
 from friso_thesis.studies.rig.outcome import Outcome, RigLog

@@ -20,7 +20,7 @@ from friso.errors import InputError
 from friso.frequency.loops import FORCE, REFERENCE, STAGE, VELOCITY, compensator
 from friso.frequency.system import limit_cases
 from friso.stage import Stage, numeric_keys
-from friso.stage.filters import FILTER_RULE, FILTERS, FilterSection, filter_forms
+from friso.stage.controllers import FILTER_RULE, FILTERS, FilterSection, filter_forms
 from friso.studies.axes import SweptAxis, check_links, linked, read_axis
 
 PLACE = "controller.filters"

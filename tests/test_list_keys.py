@@ -13,7 +13,7 @@ from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.stage import Stage, numeric_keys, parse_set, violations
 from friso.stage.correlations import Correlations, correlations_text, draw, read_correlations
-from friso.stage.plug_ins import plug_ins
+from friso.stage.section import plug_ins
 from friso.studies.axes import SweptAxis, check_links, linked, read_axis
 from friso.studies.cells import allowed_cells, flat_cells
 

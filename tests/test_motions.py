@@ -21,7 +21,7 @@ from friso.equations.motions.profile import LIMITS, plan
 from friso.equations.reference import value
 from friso.hunting import dwells, tracking
 from friso.stage import Stage
-from friso.stage.motion import motion_of
+from friso.stage.rig import motion_of
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import own_motion
 

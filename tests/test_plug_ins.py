@@ -9,7 +9,7 @@ import pytest
 
 from friso.engine.kernel import KernelRequest
 from friso.equations.imposed import Imposed
-from friso.stage.plug_ins import PlugIn, plug_in_of, plug_ins
+from friso.stage.section import PlugIn, plug_in_of, plug_ins
 from friso.stage.tables import friction_law
 
 LAW = '''

@@ -24,7 +24,7 @@ from friso.engine.cache import cache_folder
 from friso.errors import InputError
 from friso.interface.starting import example
 from friso.platform.early import SIGNALS
-from friso.stage.files import load
+from friso.stage.arguments import load
 from friso.stage.tables_of_files import text_of
 
 ADDRESS = "127.0.0.1"

@@ -244,7 +244,7 @@ def _plug_ins() -> str:
     """
     if not any(map(installed_modules, ("friso.controllers", "friso.friction", "friso.motions"))):
         return ""
-    from friso.stage.foreign import installed
+    from friso.stage.arguments import installed
 
     names = installed()
     return f"From other packages: {', '.join(names)}." if names else ""

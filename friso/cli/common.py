@@ -98,7 +98,7 @@ def print_document(document: Mapping[str, Any], files: Iterable[Path] = ()) -> N
 
     Bytes of a file name that are no UTF-8 are written out, such as "\xff"; JSON has no half characters.
     """
-    from friso.stage.foreign import foreign
+    from friso.stage.arguments import foreign
 
     written = {"files": [str(file) for file in files], "plug_ins": foreign()}
     print(_HALF.sub(r"\\\\x\1", json.dumps({**document, **written}, allow_nan=False)))

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from friso.stage.controllers import FILTERS_KEY, FORCE_LIMIT, controller_of
-from friso.stage.filters import FEEDBACK, FORWARD
-from friso.stage.lists import row_keys
+from friso.stage.controllers import FEEDBACK, FILTERS_KEY, FORCE_LIMIT, FORWARD, controller_of
+from friso.stage.section import row_keys
 
 ABOVE, MAIN, BELOW, LAST, LOWEST = range(5)
 """Lines of a drawing, from top to bottom."""

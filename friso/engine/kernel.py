@@ -33,8 +33,8 @@ from friso.equations.imposed import Imposed
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, carrying_force
 from friso.stage import Section
-from friso.stage.motion import QUADRATIC
-from friso.stage.plug_ins import plug_ins
+from friso.stage.rig import QUADRATIC
+from friso.stage.section import plug_ins
 from friso.stage.tables import friction_law
 
 KernelForm = Structure | Imposed | Driven | AsBuilt

@@ -21,14 +21,17 @@ from friso.equations.component import STEADY, TIME, Component, Held, key
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import (
     ANTI_WINDUP_TIME,
+    FEEDBACK,
     FILTERS_KEY,
     FORCE_LIMIT,
+    FORWARD,
     INNER_WINDOWS,
     SCHEDULES,
     ControllerSection,
+    FilterRule,
     FrictionSettings,
+    Polynomial,
 )
-from friso.stage.filters import FEEDBACK, FORWARD, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
 
 

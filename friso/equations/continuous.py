@@ -25,8 +25,7 @@ from friso.equations.blocks import (
 from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TIME, Component, Kink, Output, Role, State, Switch, sine, state
 from friso.equations.structure import ControllerForm, controller_form
-from friso.stage.controllers import BACK_CALCULATION, AntiWindup
-from friso.stage.filters import FilterRule, Polynomial
+from friso.stage.controllers import BACK_CALCULATION, AntiWindup, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
 
 UNWINDING_BAND = sp.Rational(1, 1000)

@@ -23,7 +23,7 @@ from friso.equations.masses import Body, parasitic_force, position_outputs
 from friso.equations.reference import declared
 from friso.equations.structure import ControllerForm, Structure
 from friso.equations.transmission import BACKLASH, at_motor, transmission, transmission_deflection
-from friso.stage.motion import QUADRATIC, ReferenceForm
+from friso.stage.rig import QUADRATIC, ReferenceForm
 from friso.stage.tables import BRAKING, MOTOR_MASS, friction_law
 
 REFERENCE = declared().inputs

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.equations.motions.settings import settings
 from friso.equations.reference import at_rest, moved_on, value
-from friso.stage.motion import DURATION, ReferenceForm, Stand, Tone, motion_of
+from friso.stage.rig import DURATION, ReferenceForm, Stand, Tone, motion_of
 
 
 def form_of(flat: Mapping[str, Any]) -> ReferenceForm:

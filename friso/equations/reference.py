@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.stage.motion import QUADRATIC, ReferenceForm
+from friso.stage.rig import QUADRATIC, ReferenceForm
 
 if TYPE_CHECKING:
     import sympy as sp

@@ -30,8 +30,7 @@ from friso.equations.blocks import (
 from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, Held, Role, clipped, key, sine, state
 from friso.equations.structure import ControllerForm
-from friso.stage.controllers import BACK_CALCULATION, AntiWindup
-from friso.stage.filters import FilterRule, Polynomial
+from friso.stage.controllers import BACK_CALCULATION, AntiWindup, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
 
 SAMPLE_TIME = key("drive.sample_time")

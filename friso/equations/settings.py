@@ -16,7 +16,7 @@ import numpy as np
 from friso.equations.breakaway import breakaway, sliding
 from friso.equations.continuous import slow_gains
 from friso.stage.controllers import INNER_WINDOWS, SCHEDULES, ControllerSection, controller_of, settings_of
-from friso.stage.lists import element_keys
+from friso.stage.section import element_keys
 from friso.stage.tables import moving_mass
 
 FlatMachine = Mapping[str, Any]

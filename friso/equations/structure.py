@@ -13,20 +13,22 @@ from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLERS,
     DEFAULT_ANTI_WINDUP,
+    FILTER_RULE,
     FILTERS_KEY,
     FORCE_LIMIT,
     KIND,
     NO_SETTINGS,
     AntiWindup,
     ControllerSection,
+    FilterForm,
+    FilterRule,
     FrictionSettings,
     controller_of,
+    filter_forms,
     settings_of,
 )
-from friso.stage.filters import FILTER_RULE, FilterForm, FilterRule, filter_forms
-from friso.stage.motion import KIND as MOTION_KIND
-from friso.stage.motion import QUADRATIC, ReferenceForm, motion_of
-from friso.stage.rig import LOOPS, IntegralRule
+from friso.stage.rig import KIND as MOTION_KIND
+from friso.stage.rig import LOOPS, QUADRATIC, IntegralRule, ReferenceForm, motion_of
 from friso.stage.tables import BACKLASH, BRAKING, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction, friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]

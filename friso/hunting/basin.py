@@ -27,7 +27,7 @@ from friso.hunting.settings import basin_settings
 from friso.shares import share_interval
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-from friso.stage.motion import motion_of
+from friso.stage.rig import motion_of
 
 
 @dataclass(frozen=True)

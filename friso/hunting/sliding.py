@@ -21,7 +21,7 @@ from friso.hunting.motions import some_of
 from friso.hunting.rows import spans
 from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
-from friso.stage.motion import DURATION
+from friso.stage.rig import DURATION
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from friso.hunting.criteria import settling_of_traces
 from friso.hunting.measures import LAST_QUARTER, bands_of, measuring_options
 from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
-from friso.stage.motion import DURATION, motion_of
+from friso.stage.rig import DURATION, motion_of
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pydantic import field_validator
 from friso.axis import axis_of
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, Value, any_sign, as_toml, positive, quoted
-from friso.stage.motion import DURATION, Motion, Piece, register_motion
+from friso.stage.rig import DURATION, Motion, Piece, register_motion
 from friso.stage.section import Rule
 from friso.stage.tables import TIME_ROUNDING
 

@@ -21,8 +21,7 @@ from friso.intervals import Span
 from friso.quantities import Number, Quantity
 from friso.stage import Stage
 from friso.stage.controllers import Controllers
-from friso.stage.lists import Coefficients, Several
-from friso.stage.section import Section, Table, TableArray, Variants
+from friso.stage.section import Coefficients, Section, Several, Table, TableArray, Variants
 from friso.version import VERSION
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -29,8 +29,8 @@ from friso.stage import Stage, numeric_keys
 from friso.stage.arguments import MOST_SEED
 from friso.stage.controllers import CONTROLLER, as_tuned
 from friso.stage.correlations import Correlations, Sample, allowed_draws, draw
-from friso.stage.lists import element_keys
-from friso.stage.motion import motion_of
+from friso.stage.rig import motion_of
+from friso.stage.section import element_keys
 from friso.stage.tables import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, RATIO, TRANSMISSION, motor_mass
 
 FEWEST_MACHINES, MOST_MACHINES = 20, 100_000

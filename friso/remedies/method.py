@@ -44,8 +44,7 @@ from friso.remedies.verified import (
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 from friso.stage.correlations import Correlations
-from friso.stage.motion import motion_of
-from friso.stage.rig import AS_BUILT
+from friso.stage.rig import AS_BUILT, motion_of
 
 PARTS = ("joint.", "flexure.")
 """Prefixes of keys that describe parts to be bought."""

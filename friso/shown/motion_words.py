@@ -11,7 +11,7 @@ from friso.equations.motion import initial_displacement, reference, rests
 from friso.hunting import MORE_WORK, Dwell, StickSlipSpeeds, Tracking
 from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage import Stage
-from friso.stage.motion import motion_of
+from friso.stage.rig import motion_of
 
 
 def following_sentence(tracking: Tracking) -> str:

@@ -22,7 +22,7 @@ from friso.shown.drawing.prefixes import listed
 from friso.shown.files import Content, image, pictures
 from friso.shown.glossary import Glossary
 from friso.stage import Stage
-from friso.stage.foreign import foreign
+from friso.stage.arguments import foreign
 from friso.version import VERSION
 
 

@@ -10,8 +10,7 @@ from pydantic import create_model, model_validator
 from friso.errors import StageError
 from friso.materials import DENSITY, STRENGTH, YOUNG, materials
 from friso.quantities import Bound, Number, Quantity, Value, any_sign, at_least_1, positive, quoted
-from friso.stage.plug_ins import load_own
-from friso.stage.section import Rule, UncertainSection, nearest_name
+from friso.stage.section import Rule, UncertainSection, load_own, nearest_name
 
 Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
 """Function of a stage's keys in SI that computes further keys; values may be arrays."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from friso.axis import ROTARY
 from friso.quantities import Quantity, any_sign
-from friso.stage.lists import element_keys
+from friso.stage.section import element_keys
 from friso.stage.stage import Stage
 from friso.stage.tables import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, TRANSMISSION, moving_mass
 

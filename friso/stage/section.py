@@ -1,9 +1,35 @@
-"""Define the base of all stage-file tables: strict keys, errors, rules, and variants."""
+"""Tables of a stage file and their keys: sections, arrays, and kinds that other packages add.
+
+Define keys that take an array: of values, or of tables.
+
+Examples are `element_stiffness = ["40 N/um", "30 N/um"]` and `[[controller.filters]]`. In `Stage.flat` every element
+has a key of its own, numbered from 1, such as friction.element_stiffness.2. A table in an array has such a key for each
+of its own keys, such as controller.filters.2.frequency.
+
+Register sections from other packages and files, and find them again in another process.
+
+Friso's own sections are named here. Installed packages name theirs in entry points, which are read if a name in a stage
+file is not friso's own.
+
+A kernel is built in a separate process, which gets the plug-ins with its task. A plug-in is a friction law or a
+controller from another package, from one file, or from the script that runs.
+
+Define the base of all stage-file tables: strict keys, errors, rules, and variants.
+"""
+
+from __future__ import annotations
 
 import difflib
+import hashlib
+import importlib
+import importlib.util
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import count, takewhile
+from math import isfinite
+from pathlib import Path
 from types import NoneType
 from typing import Any, ClassVar, Self, TypeVar, get_args
 
@@ -21,9 +47,232 @@ from pydantic_core import CoreSchema, core_schema
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
+from friso.platform.installed import installed_modules, leave_out, load_module
 from friso.quantities import Number, Quantity, as_toml, quoted
-from friso.stage.lists import Rows, Several, Values, row_keys
-from friso.stage.plug_ins import load_installed, load_own, plug_in_of
+
+_WORDS = {1: "one", 2: "two"}
+
+
+class Values(tuple[Any, ...]):
+    """An array of values, dimensioned or bare."""
+
+    @property
+    def text(self) -> list[Any]:
+        """Return the values, each as the user wrote it."""
+        return [getattr(value, "text", value) for value in self]
+
+
+class Rows(tuple[Any, ...]):
+    """An array of tables."""
+
+    @property
+    def text(self) -> list[Any]:
+        """Return the rows as the user wrote them."""
+        return [row.as_written() for row in self]
+
+
+@dataclass(frozen=True)
+class Several:
+    """A key that takes an array of at least `least` and, if stated, at most `most` values.
+
+    `examples` are two such values. With `alone`, a single value may stand for an array of one.
+    """
+
+    of: Quantity | Number
+    examples: tuple[str, ...]
+    least: int = 2
+    most: int | None = None
+    alone: bool = False
+
+    def on(self, kind: AxisKind) -> Self:
+        """Return this declaration for an axis of another kind, with its units."""
+        examples = tuple(replace(self.of, example=text).on(kind).example for text in self.examples)
+        return replace(self, of=self.of.on(kind), examples=examples)
+
+    @property
+    def expected(self) -> str:
+        """Say in words what values the key accepts."""
+        if self.alone:
+            return f"one value or an array of up to {self.most}, each {self.of.expected}"
+        count = f"{_WORDS[self.least]} or more" if self.most is None else f"{self.least} to {self.most}"
+        return f"an array of {count}, each {self.of.expected}"
+
+    @property
+    def written_example(self) -> str:
+        """Return an example of the array as it stands in a file."""
+        quote = '"' if isinstance(self.of, Quantity) else ""
+        return f"[{', '.join(f'{quote}{example}{quote}' for example in self.examples)}]"
+
+    def read(self, raw: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
+        """Return the values of an array, or with `alone` of a single value, too.
+
+        Each element is read by `read_one`, by default as `of` reads it. Raises InputError for a wrong length or a wrong
+        element, whose number it names.
+        """
+        if self.alone and not isinstance(raw, list | tuple):
+            raw = [raw]
+        size = len(raw) if isinstance(raw, list | tuple) else None
+        if size is None or size < self.least or size > (self.most or size):
+            hint = "not an array" if size is None else f"of {size}"
+            raise InputError("", quoted(raw if size is None else [*raw], hint), self.expected, self.written_example)
+        read, values = read_one or self.of.read, []
+        for number, item in enumerate(raw, start=1):
+            try:
+                values.append(read(item))
+            except InputError as error:
+                raise error.under(str(number)) from None
+        return Values(values)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._read_on_axis)
+
+    def _read_on_axis(self, raw: Any, info: ValidationInfo) -> Values:
+        return self.on(info.context or LINEAR).read(raw)
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """A key that takes an array of numbers that are varied only together.
+
+    `roots` may be complex, written as texts.
+    """
+
+    examples: tuple[Any, ...]
+    roots: bool = False
+
+    @property
+    def expected(self) -> str:
+        """Say in words what values the key accepts."""
+        return f"an array of numbers{', complex ones as texts' if self.roots else ''}"
+
+    @property
+    def written_example(self) -> str:
+        """Return an example of the array as it stands in a file."""
+        return f"[{', '.join(as_toml(example) for example in self.examples)}]"
+
+    def read(self, raw: Any) -> Values:
+        """Return the values of an array of numbers; complex numbers stay texts.
+
+        Raises InputError for anything but an array, or under the number of an element that is no finite number. Only
+        `roots` may be written as texts.
+        """
+        if not isinstance(raw, list | tuple):
+            raise InputError("", quoted(raw), self.expected, self.written_example)
+        for number, item in enumerate(raw, start=1):
+            try:
+                fine = not isinstance(item, bool) and isfinite(abs(complex(item)))
+                fine = fine and (self.roots or not isinstance(item, str))
+            except (TypeError, ValueError):
+                fine = False
+            if not fine:
+                raise InputError(str(number), quoted(item), self.expected, self.written_example)
+        return Values(item if isinstance(item, str) else float(item) for item in raw)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:
+    """Return the keys of an array's elements in a stage, such as "friction.element_stiffness.2".
+
+    They are in order; there are none if the stage lacks the array.
+    """
+    return [*takewhile(flat.__contains__, (f"{key}.{number}" for number in count(1)))]
+
+
+def row_keys(flat: Mapping[str, Any], key: str) -> list[str]:
+    """Return the names of an array's tables in a stage, such as "controller.filters.2".
+
+    They are in order; there are none if the stage lacks the array.
+    """
+    places = (f"{key}.{number}" for number in count(1))
+    return [*takewhile(lambda place: any(name.startswith(f"{place}.") for name in flat), places)]
+
+
+OWN = "friso"
+SCRIPT = "__main__"
+
+
+@dataclass(frozen=True)
+class PlugIn:
+    """A module from outside friso: its name, and the file it was loaded from ("" for none)."""
+
+    module: str
+    file: str
+
+    @property
+    def digest(self) -> str:
+        """Return a digest of the module's source."""
+        return hashlib.sha256(Path(self.file).read_bytes() if self.file else b"").hexdigest()
+
+    def load(self) -> None:
+        """Import the module, unless it has been imported; a script is always run again.
+
+        The module is imported by its name if that leads to its file, else from the file. Raises ImportError if there is
+        no file.
+        """
+        if self.module in sys.modules and self.module != SCRIPT:
+            return
+        if (
+            self.module != SCRIPT
+            and (spec := importlib.util.find_spec(self.module))
+            and Path(spec.origin or "").resolve() == Path(self.file)
+        ):
+            importlib.import_module(self.module)
+            return
+        name = "friso_script" if self.module == SCRIPT else self.module
+        spec = importlib.util.spec_from_file_location(name, self.file) if self.file else None
+        if spec is None or spec.loader is None:
+            raise ImportError(f"{self.module}, which registers a section, has no file that it could be loaded from")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        spec.loader.exec_module(module)
+
+
+def plug_in_of(cls: type) -> PlugIn | None:
+    """Return the plug-in that a class comes from; None for friso's own."""
+    if cls.__module__.split(".")[0] == OWN:
+        return None
+    file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+    return PlugIn(cls.__module__, str(Path(file).resolve()) if file else "")
+
+
+def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
+    """Return the plug-ins that classes come from, each once."""
+    return tuple(dict.fromkeys(plug_in for cls in classes if (plug_in := plug_in_of(cls))))
+
+
+FRISO = {
+    "friso.controllers": ("friso.equations.controllers", "friso.identification.state_space_controller"),
+    "friso.friction": ("friso.equations.friction",),
+    "friso.motions": ("friso.equations.motions", "friso.identification.recorded_motion"),
+    "friso.derivations": ("friso.leaf_springs.closed_forms", "friso.equations.conditions"),
+}
+"""Modules that register friso's own sections of the stage file, by group.
+
+They belong to higher layers, and are imported when a stage is first read.
+"""
+
+
+def load_own(group: str) -> None:
+    """Import friso's own modules of a group, such as "friso.controllers"."""
+    for module in FRISO.get(group, ()):
+        if module not in sys.modules:
+            importlib.import_module(module)
+
+
+@cache
+def load_installed(group: str) -> None:
+    """Import the modules of installed packages in a group of entry points.
+
+    The modules register their sections. A package that cannot be imported, or registers a name that is taken, is
+    reported and skipped.
+    """
+    for name, module in installed_modules(group).items():
+        try:
+            load_module(group, name, module)
+        except InputError as error:
+            leave_out(error)
 
 
 @dataclass(frozen=True)
@@ -39,7 +288,7 @@ class Rule:
     expected: str
     example: str
 
-    def at(self, place: str) -> "Rule":
+    def at(self, place: str) -> Rule:
         """Return the rule with its keys moved to a table at `place` in the stage file."""
         keys = tuple(f"{place}.{key}" for key in self.keys)
         return Rule(keys, lambda flat: self.holds(keys_below(flat, place)), self.expected, self.example)
@@ -72,7 +321,7 @@ class Section(BaseModel):
     rules: ClassVar[tuple[Rule, ...]] = ()
     refusal: ClassVar[type[InputError]] = InputError
     """The error raised by this section and the sections within it."""
-    among: ClassVar["Variants | None"] = None
+    among: ClassVar[Variants | None] = None
     """The sections told apart from this one by its tag, if there are others."""
 
     @classmethod
@@ -197,7 +446,7 @@ class Table:
     """
 
     example: str
-    variants: "Variants | None" = None
+    variants: Variants | None = None
 
     def picked_by(self, annotation: Any) -> PickClass:
         """Return the function that chooses the class by a table's keys, for a key with this annotation."""

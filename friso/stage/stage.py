@@ -29,15 +29,14 @@ from friso.stage.controllers import (
     controller_of,
 )
 from friso.stage.flexure import Flexure, derived, with_material
-from friso.stage.lists import element_keys
-from friso.stage.motion import MOTION, Motion, motion_of
-from friso.stage.rig import Cable, Drive, Floor, Rail
+from friso.stage.rig import MOTION, Cable, Drive, Floor, Motion, Rail, motion_of
 from friso.stage.section import (
     UNKNOWN,
     Rule,
     Section,
     Table,
     UncertainSection,
+    element_keys,
     list_fields,
     numeric_fields,
     table_arrays,

@@ -23,7 +23,7 @@ from friso.platform.installed import EXTRAS, install
 from friso.platform.leftovers import temporary_folder
 from friso.platform.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.stage import Stage
-from friso.stage.files import loads
+from friso.stage.arguments import loads
 from friso.studies.settings import settings
 from friso.version import VERSION
 

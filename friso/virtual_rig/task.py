@@ -23,8 +23,7 @@ from friso.equations.rail import friction_factors
 from friso.equations.reference import value
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.stage.motion import QUADRATIC, ReferenceForm
-from friso.stage.rig import Floor
+from friso.stage.rig import QUADRATIC, Floor, ReferenceForm
 from friso.virtual_rig.settings import settings
 
 SAMPLE_TIME = 50e-6

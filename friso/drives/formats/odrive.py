@@ -33,9 +33,8 @@ from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.drives.settings import drive_settings
 from friso.errors import InputError
 from friso.quantities import quoted
-from friso.stage.controllers import FILTERS_KEY
-from friso.stage.filters import FEEDBACK
-from friso.stage.lists import element_keys, row_keys
+from friso.stage.controllers import FEEDBACK, FILTERS_KEY
+from friso.stage.section import element_keys, row_keys
 
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
 LIMITS_OF_MOVES = f"{MOVE}.vel_limit", f"{MOVE}.accel_limit"

@@ -11,9 +11,17 @@ from pydantic import model_validator
 from friso.equations.controllers.rational import RationalController, TransferRoots, polynomial_roots
 from friso.errors import InputError, StageError
 from friso.stage import Rule, register_controller
-from friso.stage.filters import FILTER_ARRAY
-from friso.stage.lists import Coefficients, Rows, Values, element_keys, row_keys
-from friso.stage.section import OneTable, TableArray, UncertainSection
+from friso.stage.controllers import FILTER_ARRAY
+from friso.stage.section import (
+    Coefficients,
+    OneTable,
+    Rows,
+    TableArray,
+    UncertainSection,
+    Values,
+    element_keys,
+    row_keys,
+)
 
 WAYS = ("denominator", "poles", "sections")
 """Keys of which each selects one way to give a transfer function."""

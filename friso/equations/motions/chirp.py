@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from friso.quantities import Quantity, Value, non_negative, positive
-from friso.stage.motion import DURATION, Motion, ReferenceForm, Tone, register_motion
+from friso.stage.rig import DURATION, Motion, ReferenceForm, Tone, register_motion
 
 AMPLITUDE, START, END = (f"motion.{name}" for name in ("amplitude", "start_frequency", "end_frequency"))
 

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from friso.stage.motion import Motion, register_motion
+from friso.stage.rig import Motion, register_motion
 
 
 @register_motion

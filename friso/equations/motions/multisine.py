@@ -9,9 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from friso.equations.motions.settings import MotionSettings
 from friso.quantities import Quantity, any_sign, positive
-from friso.stage.lists import Several, Values, element_keys
-from friso.stage.motion import DURATION, Motion, ReferenceForm, Tone, register_motion
-from friso.stage.section import Rule
+from friso.stage.rig import DURATION, Motion, ReferenceForm, Tone, register_motion
+from friso.stage.section import Rule, Several, Values, element_keys
 from friso.stage.tables import TIME_ROUNDING
 
 AMPLITUDE, FREQUENCY, PHASE = (f"motion.{name}" for name in ("amplitude", "frequency", "phase"))

@@ -16,17 +16,8 @@ import numpy as np
 
 from friso.equations.motions.settings import MotionSettings
 from friso.quantities import Bound, Quantity, Value, non_negative, positive
-from friso.stage.lists import Several, Values, element_keys
-from friso.stage.motion import (
-    DURATION,
-    Lowered,
-    Motion,
-    Piece,
-    ReferenceForm,
-    Stand,
-    register_motion,
-)
-from friso.stage.section import Rule
+from friso.stage.rig import DURATION, Lowered, Motion, Piece, ReferenceForm, Stand, register_motion
+from friso.stage.section import Rule, Several, Values, element_keys
 from friso.stage.tables import TIME_ROUNDING
 
 LIMITS = {"velocity": "m/s", "acceleration": "m/s^2", "jerk": "m/s^3", "snap": "m/s^4"}

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from friso.quantities import Quantity, Value, any_sign
-from friso.stage.motion import DURATION, Motion, Piece, register_motion
+from friso.stage.rig import DURATION, Motion, Piece, register_motion
 
 VELOCITY = "motion.velocity"
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from friso.quantities import Quantity, Value, any_sign
-from friso.stage.motion import Motion, register_motion
+from friso.stage.rig import Motion, register_motion
 
 DISPLACEMENT = "motion.displacement"
 

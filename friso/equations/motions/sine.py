@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from friso.quantities import Quantity, Value, positive
-from friso.stage.motion import Motion, ReferenceForm, Tone, register_motion
+from friso.stage.rig import Motion, ReferenceForm, Tone, register_motion
 
 AMPLITUDE, FREQUENCY = "motion.amplitude", "motion.frequency"
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from friso.quantities import Number, Quantity, Value, non_negative, positive
-from friso.stage.motion import DURATION, Motion, Piece, Stand, register_motion
+from friso.stage.rig import DURATION, Motion, Piece, Stand, register_motion
 from friso.stage.section import Rule
 from friso.stage.tables import TIME_ROUNDING
 

@@ -37,7 +37,7 @@ from friso.shown.loop_words import unstable_where
 from friso.shown.motion_words import dwell_sentences, following_sentence, stick_slip_sentences
 from friso.shown.unknown import if_so
 from friso.stage.controllers import FORCE_LIMIT, ControllerSection, dead_band, integral_leak
-from friso.stage.motion import motion_of
+from friso.stage.rig import motion_of
 from friso.stage.section import numeric_fields
 
 _AFTERWARDS = {
