@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from friso.axis import LINEAR
-from friso.equations.controllers.pid_gains import PidGains
+from friso.equations.controllers.pid import PidGains
 from friso.equations.controllers.van_dijk import VanDijk
 from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare, ReturnMap, Target
 from friso.questions.check.question import CheckAnswer

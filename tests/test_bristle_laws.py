@@ -23,7 +23,7 @@ from variants import (
 import friso
 from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import KernelRequest, kernel, kernels
-from friso.equations.driven import Driven
+from friso.equations.imposed import Driven
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.loops import plant

@@ -20,7 +20,7 @@ from friso.engine.kernel import Kernel, KernelRequest, empty_results, kernel, ke
 from friso.equations.as_built import NEUTRAL, AsBuilt, _command
 from friso.equations.blocks import Loop
 from friso.equations.component import Held, key, state
-from friso.equations.controllers.pid_gains import Terms
+from friso.equations.controllers.pid import Terms
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import ControllerForm
 from friso.stage import Stage

@@ -37,7 +37,7 @@ from friso.design_method.verification import (
     rigid,
     verification,
 )
-from friso.equations.breakaway import least_breakaway
+from friso.equations.bandwidth import least_breakaway
 from friso.frequency.bode import limits, settled_margin
 from friso.hunting import find_margin
 from friso.hunting.measures import measured_run

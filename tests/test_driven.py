@@ -6,7 +6,7 @@ from plain_axis import DRAG, KI, KP, MASS, TIME, plain_axis
 
 from friso.engine.batch import Inputs, run_driven, simulate
 from friso.engine.kernel import kernel
-from friso.equations.driven import Driven
+from friso.equations.imposed import Driven
 from friso.equations.structure import structure
 from friso.stage import Stage
 

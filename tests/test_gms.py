@@ -10,7 +10,7 @@ from variants import MICRO_DAMPING, VARIANTS, gains, gms, release, stage, van_di
 
 import friso
 from friso.engine.kernel import KernelRequest, kernels
-from friso.equations.friction.gms import GeneralisedMaxwellSlip, polygon
+from friso.equations.friction.laws import GeneralisedMaxwellSlip, polygon
 from friso.equations.imposed import imposed_form
 from friso.equations.structure import structure
 from friso.frequency.loops import plant

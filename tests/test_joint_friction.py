@@ -14,7 +14,7 @@ from variants import HOLD, dwell, elasto_plastic, gains, load_dependent, lugre, 
 import friso
 from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import kernel
-from friso.equations.dragged import Dragged
+from friso.equations.imposed import Dragged
 from friso.hunting import Ensemble, HuntingDoubt, find_cycles
 from friso.hunting import hunting as hunting_of
 from friso.stage import Stage

@@ -13,7 +13,7 @@ from variants import stage as stage_with
 import friso
 from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction
-from friso.equations.friction.gms import STIFFNESS
+from friso.equations.friction.laws import STIFFNESS
 from friso.errors import InputError
 from friso.frequency.system import steady_force
 from friso.identification.readings.common import stribeck_curve

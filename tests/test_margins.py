@@ -9,12 +9,7 @@ import pytest
 from made_up import FakeCase, fake_stage, hunts, settles
 from variants import VARIANTS
 
-from friso.equations.scaled_friction import (
-    least_static_factor,
-    static_frictions,
-    with_friction,
-    with_static_friction,
-)
+from friso.equations.bandwidth import least_static_factor, static_frictions, with_friction, with_static_friction
 from friso.hunting import (
     AttractionEnd,
     BandwidthAdvice,

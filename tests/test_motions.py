@@ -17,8 +17,8 @@ import friso
 from benchmarks.truth.by_hand import by_hand
 from friso.engine.batch import simulate
 from friso.equations import motion
-from friso.equations.motions.profile import LIMITS, plan
-from friso.equations.reference import value
+from friso.equations.motion import value
+from friso.equations.motions import LIMITS, plan
 from friso.hunting import dwells, tracking
 from friso.stage import Stage
 from friso.stage.rig import motion_of

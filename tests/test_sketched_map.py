@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import friso
-from friso.equations.bandwidth import faster
-from friso.equations.scaled_friction import with_friction, with_static_friction
+from friso.equations.bandwidth import faster, with_friction, with_static_friction
 from friso.hunting import check, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, SWINGS
 from friso.questions.map.figures import map_figure

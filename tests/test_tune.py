@@ -23,8 +23,7 @@ from friso.app import questions
 from friso.design_method.prepare import isolated
 from friso.engine.allowance import allowance
 from friso.engine.batch import simulate
-from friso.equations.bandwidth import sped_up
-from friso.equations.breakaway import breakaway, least_breakaway, sliding
+from friso.equations.bandwidth import breakaway, least_breakaway, sliding, sped_up
 from friso.equations.motion import size
 from friso.equations.settings import SETTINGS
 from friso.frequency.bode import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth, settled_margin

@@ -20,9 +20,8 @@ from variants import VARIANTS
 import friso
 from friso.engine.arrays import STATISTICS
 from friso.equations.component import TIME, Kink
-from friso.equations.model import REFERENCE, Model, assemble
+from friso.equations.model import PREFIX, REFERENCE, Model, assemble, variational
 from friso.equations.structure import structure
-from friso.equations.variational import PREFIX, variational
 from friso.hunting import Ensemble
 from friso.stage import Stage
 

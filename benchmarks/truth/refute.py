@@ -17,8 +17,7 @@ from benchmarks.truth.by_hand import NotWritten, by_hand
 from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, least_swing
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
 from benchmarks.truth.trials import CLOSER, FINE, LINGERING, ROUGH, ROUNDS, Bench, Outcome, Trial
-from friso.equations.bandwidth import bandwidth, faster
-from friso.equations.scaled_friction import with_static_friction
+from friso.equations.bandwidth import bandwidth, faster, with_static_friction
 from friso.hunting import Kick, ParameterMargin, Swinging, find_swings
 
 ALL = (80, 40, 60, 20)

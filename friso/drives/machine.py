@@ -29,8 +29,7 @@ from friso.drives.program import (
 from friso.drives.settings import settings
 from friso.engine.printing import Constants
 from friso.equations.as_built import COMMANDED, PLACES, RATED, TIMES, AsBuilt, as_built
-from friso.equations.cases import Piecewise
-from friso.equations.component import STEADY, Switch, state
+from friso.equations.component import STEADY, Piecewise, Switch, state
 from friso.errors import InputError
 
 GAMMA = 1 - 1 / sqrt(2)

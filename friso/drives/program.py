@@ -21,8 +21,7 @@ from friso.engine.printing import Constants
 from friso.engine.simd_math import quarter_sine
 from friso.equations.as_built import NEUTRAL, AsBuilt, controller_as_built
 from friso.equations.blocks import Loop
-from friso.equations.cases import Piecewise
-from friso.equations.component import STEADY, Held, clipped, key, sine, state
+from friso.equations.component import STEADY, Held, Piecewise, clipped, key, sine, state
 from friso.equations.sampled import Sampled
 from friso.errors import InputError
 

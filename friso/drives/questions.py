@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from friso.axis import LINEAR, AxisKind
-from friso.equations.motions.there_and_back import ThereAndBack
+from friso.equations.motions import ThereAndBack
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, quoted
 from friso.stage.section import Section, nearest_name, numeric_fields

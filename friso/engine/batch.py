@@ -26,7 +26,7 @@ from friso.engine.machine_code import LANES
 from friso.engine.settings import room_settings, step_settings
 from friso.engine.side_by_side import cores_to_use, current_flag, go_on, results_of
 from friso.equations import motion
-from friso.equations.reference import moved_on
+from friso.equations.motion import moved_on
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.stage import Stage

@@ -31,12 +31,9 @@ from friso.engine.step_source import StepWriter
 from friso.engine.tableaus import TABLEAUS, Tableau
 from friso.equations.as_built import AsBuilt, as_built
 from friso.equations.component import STEADY, TIME
-from friso.equations.dragged import Dragged, dragged
-from friso.equations.driven import Driven, driven
-from friso.equations.imposed import Imposed, imposed
+from friso.equations.imposed import Dragged, Driven, Imposed, dragged, driven, imposed
 from friso.equations.masses import Body
-from friso.equations.model import Model, assemble
-from friso.equations.variational import variational
+from friso.equations.model import Model, assemble, variational
 from friso.stage.rig import QUADRATIC
 from friso.stage.section import PlugIn
 

@@ -14,7 +14,7 @@ from friso.engine.arrays import STATISTICS, Status
 from friso.engine.machine_code import AXES, ROW
 from friso.engine.scalar_code import call_at, take_next
 from friso.engine.simd_math import sine
-from friso.equations.reference import TONE
+from friso.equations.motion import TONE
 
 NOT_RUN, DONE, BUDGET = int(Status.NOT_RUN), int(Status.DONE), int(Status.BUDGET)
 UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)

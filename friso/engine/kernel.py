@@ -27,9 +27,7 @@ from friso.engine.machine_code import (
     load_object,
 )
 from friso.equations.as_built import AsBuilt
-from friso.equations.dragged import Dragged
-from friso.equations.driven import Driven
-from friso.equations.imposed import Imposed
+from friso.equations.imposed import Dragged, Driven, Imposed
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, carrying_force
 from friso.stage import Section
@@ -317,7 +315,7 @@ def kernel(
     """Return the compiled code that integrates stages of a structure by a step method.
 
     The code integrates `lanes` runs at once. With `variational`, it also integrates how a small deviation of each state
-    grows (`friso.equations.variational`).
+    grows (`friso.equations.model`).
     """
     return kernels([KernelRequest(structure, variational, method, lanes)])[0]
 

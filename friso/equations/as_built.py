@@ -206,8 +206,7 @@ def controller_as_built(form: AsBuilt, measured: Loop, injected: Any = 0) -> tup
     """
     import sympy as sp
 
-    from friso.equations.cases import Piecewise
-    from friso.equations.component import STEADY, Held, key, state
+    from friso.equations.component import STEADY, Held, Piecewise, key, state
     from friso.equations.sampled import Rest, sampled_controller
 
     assert form.structure.controller is not None

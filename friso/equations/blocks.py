@@ -16,8 +16,7 @@ from typing import Any
 
 import sympy as sp
 
-from friso.equations.cases import Piecewise
-from friso.equations.component import STEADY, TIME, Component, Held, key
+from friso.equations.component import STEADY, TIME, Component, Held, Piecewise, key
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import (
     ANTI_WINDUP_TIME,

@@ -22,8 +22,7 @@ from friso.equations.blocks import (
     unwinding_time,
     wound_up,
 )
-from friso.equations.cases import Piecewise
-from friso.equations.component import STEADY, TIME, Component, Kink, Output, Role, State, Switch, sine, state
+from friso.equations.component import STEADY, TIME, Component, Kink, Output, Piecewise, Role, State, Switch, sine, state
 from friso.equations.structure import ControllerForm, controller_form
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule

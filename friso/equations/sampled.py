@@ -27,8 +27,7 @@ from friso.equations.blocks import (
     unwinding_time,
     wound_up,
 )
-from friso.equations.cases import Piecewise
-from friso.equations.component import STEADY, Held, Role, clipped, key, sine, state
+from friso.equations.component import STEADY, Held, Piecewise, Role, clipped, key, sine, state
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup, FilterRule, Polynomial
 from friso.stage.rig import IntegralRule

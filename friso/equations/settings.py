@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.breakaway import breakaway, sliding
+from friso.equations.bandwidth import breakaway, sliding
 from friso.equations.continuous import slow_gains
 from friso.stage.controllers import INNER_WINDOWS, SCHEDULES, ControllerSection, controller_of, settings_of
 from friso.stage.section import element_keys

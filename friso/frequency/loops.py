@@ -31,13 +31,12 @@ import sympy as sp
 from friso.equations.blocks import Controller, Loop
 from friso.equations.component import Component, Held, Kink
 from friso.equations.continuous import continuous_controller
-from friso.equations.joint import touching
+from friso.equations.masses import flanks, touching
 from friso.equations.model import REFERENCE as REFERENCE_COURSE
 from friso.equations.model import assemble
 from friso.equations.roles import Role
 from friso.equations.sampled import counter, sampled_controller
 from friso.equations.structure import ControllerForm, Structure, shared_structure
-from friso.equations.transmission import flanks
 from friso.errors import InputError
 from friso.frequency.settings import settings
 from friso.frequency.system import (

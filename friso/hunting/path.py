@@ -8,8 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from friso.equations.bandwidth import faster
-from friso.equations.scaled_friction import least_static_factor, with_static_friction
+from friso.equations.bandwidth import faster, least_static_factor, with_static_friction
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import edge_settings

@@ -12,7 +12,7 @@ import numpy as np
 from friso.engine.allowance import Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motions.ramp import VELOCITY
+from friso.equations.motions import VELOCITY
 from friso.equations.structure import shared_structure, structure
 from friso.hunting.attractors.rounds import SURVEY_RTOL
 from friso.hunting.cycle.ensemble import Ensemble, done

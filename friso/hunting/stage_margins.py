@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
-from friso.equations.bandwidth import faster
-from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
+from friso.equations.bandwidth import faster, least_static_factor, static_frictions, with_static_friction
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.path import AttractionEnd, ParameterPath, key_path, static_friction_path

@@ -19,10 +19,17 @@ from typing import Any, Literal
 import numpy as np
 
 from friso.design_method.prepare import isolated
-from friso.equations.bandwidth import bandwidth, faster, sped_up
-from friso.equations.breakaway import breakaway, least_breakaway
+from friso.equations.bandwidth import (
+    bandwidth,
+    breakaway,
+    faster,
+    least_breakaway,
+    least_static_factor,
+    sped_up,
+    static_frictions,
+    with_static_friction,
+)
 from friso.equations.motion import pieces
-from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
 from friso.frequency.bode import COMFORTABLE_MARGIN, bandwidths_at, limits, loop_bandwidth, settled_margin

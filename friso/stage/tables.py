@@ -165,7 +165,7 @@ class FrictionSection(UncertainSection):
     def shown(flat: Mapping[str, Any]) -> Any:
         """Return what measurements would show of a law with these keys, in SI.
 
-        See `friso.equations.friction.measured.MeasuredFriction`.
+        See `friso.equations.friction.common.MeasuredFriction`.
         """
 
     @staticmethod

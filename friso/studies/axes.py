@@ -19,8 +19,7 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from friso.axis import AxisKind
-from friso.equations.bandwidth import faster
-from friso.equations.scaled_friction import with_friction
+from friso.equations.bandwidth import faster, with_friction
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted, si_value
 from friso.stage import Stage, parse_set

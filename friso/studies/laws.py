@@ -19,8 +19,8 @@ import numpy as np
 from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.equations.bandwidth import bandwidth
-from friso.equations.dragged import Dragged
-from friso.equations.friction.measured import MeasuredFriction
+from friso.equations.friction.common import MeasuredFriction
+from friso.equations.imposed import Dragged
 from friso.errors import InputError
 from friso.frequency.system import steady_force
 from friso.hunting import LONG_RUN_RTOL, Case, CheckPart, check, needed_kernels

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.motions.ramp import VELOCITY
+from friso.equations.motions import VELOCITY
 from friso.hunting import lasting_swings
 from friso.hunting.criteria import (
     CREEPS,

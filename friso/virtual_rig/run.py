@@ -23,7 +23,7 @@ from friso.engine.batch import RunOptions, checked_interval, options_of, prepare
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
 from friso.equations.conditions import LEVELS, anywhere
-from friso.equations.reference import value
+from friso.equations.motion import value
 from friso.equations.roles import Role
 from friso.errors import InputError
 from friso.hunting.measures import BANDS, Measures, SampledSolver, bands_of, measure_traces

@@ -19,8 +19,8 @@ from scipy.special import exprel
 
 from friso.engine.arrays import Tables
 from friso.equations import motion
+from friso.equations.motion import value
 from friso.equations.rail import friction_factors
-from friso.equations.reference import value
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.rig import QUADRATIC, Floor, ReferenceForm
@@ -35,7 +35,7 @@ class MoveTask:
     """The task of runs with the real drive: a reference, and an injected force.
 
     The reference consists of `pieces`, shape (pieces, 1 + inputs): the start of each, then the numbers of its
-    polynomial or other `form` (`friso.equations.reference`). For runs with different moves the shape is (runs, pieces,
+    polynomial or other `form` (`friso.equations.motion`). For runs with different moves the shape is (runs, pieces,
     1 + inputs). `duration` is in seconds. `injected` has the injected force [N] every `injected_each` [s], shape (n,),
     empty for none, or (runs, n) for runs with different forces; the drive logs it unless it is `unknown` to it. The
     stage starts at rest where the reference does, or displaced from it by `displacement` [m].

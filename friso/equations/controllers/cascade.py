@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
-from friso.equations.controllers.feedforward import SYMBOLS, fed_forward, feedforward_of_moves
+from friso.equations.controllers.pid import SYMBOLS, fed_forward, feedforward_of_moves
 from friso.quantities import Number, Quantity, Value, any_sign, non_negative, positive
 from friso.stage import ControllerSection, Rule, register_controller
 from friso.stage.controllers import Gain

@@ -12,8 +12,8 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from friso.engine.arrays import Status
 from friso.engine.batch import DrivenRuns, Inputs, run_driven
 from friso.engine.kernel import Kernel, kernel
-from friso.equations.controllers.pid_gains import KD, KP, proportional_derivative
-from friso.equations.driven import HELD_FORCE, Driven
+from friso.equations.controllers.pid import KD, KP, proportional_derivative
+from friso.equations.imposed import HELD_FORCE, Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.errors import InputError

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from friso.equations.breakaway import breakaway
-from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
+from friso.equations.bandwidth import breakaway, least_static_factor, static_frictions, with_static_friction
 from friso.equations.structure import carrying_force
 from friso.hunting import SEARCH_LIMITS, AttractionEnd, Case, ParameterMargin
 from friso.quantities import percent, plain_factor

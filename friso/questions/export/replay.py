@@ -24,7 +24,7 @@ from friso.drives.target import Vector
 from friso.engine.simd_math import gaussian, quantised, sine
 from friso.equations.as_built import VELOCITY_SEED_OFFSET
 from friso.equations.component import TIME
-from friso.equations.reference import declared
+from friso.equations.motion import declared
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.virtual_rig.run import failures, run_flat

@@ -13,7 +13,7 @@ import numpy as np
 
 from friso.axis import axis_shown
 from friso.design_method.spec import Geometry
-from friso.equations.breakaway import breakaway, least_breakaway
+from friso.equations.bandwidth import breakaway, least_breakaway
 from friso.leaf_springs.closed_forms import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.installed import install

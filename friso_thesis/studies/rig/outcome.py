@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.equations.bandwidth import bandwidth, proportional_stiffness, sped_up
-from friso.equations.breakaway import breakaway
+from friso.equations.bandwidth import bandwidth, breakaway, proportional_stiffness, sped_up
 from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import record

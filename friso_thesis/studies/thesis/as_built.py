@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.equations.motions.there_and_back import CRUISE
+from friso.equations.motions import CRUISE
 from friso.progress import silent
 from friso.stage import Stage
 from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from friso.equations.bandwidth import proportional_stiffness
-from friso.equations.breakaway import breakaway
+from friso.equations.bandwidth import breakaway, proportional_stiffness
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, StageLike, read_stage
 from friso.progress import Progress, silent

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER
-from friso.equations.motions.there_and_back import CRUISE
+from friso.equations.motions import CRUISE
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges
 from friso_thesis.studies.thesis.maps import (

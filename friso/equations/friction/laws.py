@@ -1,4 +1,16 @@
-"""Generalised Maxwell-slip friction: Al-Bender et al. 2005, doi:10.1109/TAC.2005.858676.
+"""Friction laws of their own form: none, Stribeck, Dahl, generalized Maxwell slip.
+
+No friction at all.
+
+Static Stribeck friction with a viscous term, regularised.
+
+Armstrong-Helouvry, Dupont, Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7.
+
+Dahl friction: LuGre without Stribeck effect and bristle damping.
+
+Dahl 1968 (Aerospace Corp. TOR-0158(3107-18)-1).
+
+Generalised Maxwell-slip friction: Al-Bender et al. 2005, doi:10.1109/TAC.2005.858676.
 
 The source's conditions are read as follows. An element sticks until its force *along the motion* reaches its share of
 the level, sgn(v) F_i = alpha_i s(v), and then slips until the velocity passes zero. After a reversal, an element that
@@ -13,30 +25,148 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from friso.equations.conditions import friction_level
+from friso.equations.conditions import friction_level, has_conditions
 from friso.equations.friction.common import (
     COULOMB_BELOW_STATIC,
+    LEVEL_WORDS,
     STEADY_LOAD,
     TINY_SQUARE,
     Friction,
+    Levels,
+    MeasuredFriction,
     StribeckCurve,
     StribeckSection,
     direction,
-    stribeck_level,
-    stribeck_level_from_speed,
-    viscous_force,
-)
-from friso.equations.friction.measured import (
-    MeasuredFriction,
     levels_of,
     levels_under_conditions,
+    stribeck_level,
+    stribeck_level_from_speed,
     virgin_displacements,
+    viscous_force,
 )
 from friso.quantities import Number, Quantity, Value, non_negative, positive
-from friso.stage import Rule, Several, Values, element_keys, register_friction
+from friso.stage import FrictionSection, Rule, Several, Values, element_keys, register_friction
 
 if TYPE_CHECKING:
     import sympy as sp
+
+
+@register_friction
+class NoFriction(FrictionSection):
+    """A bearing without friction, such as an air bearing."""
+
+    model: Literal["none"]
+
+
+@register_friction
+class Stribeck(StribeckSection):
+    """A curve of force against velocity: F = g(v) tanh(v/v_r) + sigma_2 v.
+
+    At rest it creeps instead of sticking.
+    """
+
+    model: Literal["stribeck"]
+    fitted: ClassVar[bool] = True
+    regularisation_velocity: Annotated[Value, Quantity("m/s", positive, "10 um/s")]
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
+        from sympy import tanh
+
+        from friso.equations.component import Component, key
+
+        forward = direction(velocity, key("friction.stribeck_velocity"))
+        level = stribeck_level(velocity, forward.sign, variant)
+        force = level * tanh(velocity / key("friction.regularisation_velocity"))
+        even = variant.exponent is None or variant.exponent % 2 == 0
+        smooth = even and not (variant.asymmetric or variant.viscous_asymmetric)  # smooth at rest
+        static = friction_level("static", variant.conditions)
+        component = Component(kinks=() if smooth else (forward,))
+        return Friction(force + viscous_force(velocity, forward.sign, variant), static, component)
+
+    @staticmethod
+    def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
+        """Return what measurements would show: friction over speed, and none before sliding."""
+        return MeasuredFriction(levels_of(flat), 0.0, 0.0, np.zeros(1), np.zeros(1))
+
+    @staticmethod
+    def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
+        """Return the law's keys for measured friction over speed.
+
+        The curve is kept down to a hundredth of the Stribeck velocity.
+        """
+        return {
+            **measured.levels.keys,
+            "friction.regularisation_velocity": RISE_SHARE * measured.levels.stribeck_velocity,
+        }
+
+
+RISE_SHARE = 0.01
+"""Velocity over which the curve rises from 0, as a fraction of the Stribeck velocity."""
+
+
+@register_friction
+class Dahl(FrictionSection):
+    """A spring that slips: z' = v - sigma_0 abs(v)/F_c z, F = sigma_0 z + sigma_2 v."""
+
+    model: Literal["dahl"]
+    fitted: ClassVar[bool] = True
+    words: ClassVar[Mapping[str, str]] = LEVEL_WORDS
+    coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
+    bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
+    viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
+
+    under_conditions: ClassVar[bool] = True
+
+    @staticmethod
+    def variant(flat: Mapping[str, Any]) -> Any:
+        """Tell whether [conditions] multiply the law's level of sliding friction."""
+        return has_conditions(flat)
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: bool) -> Friction:
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
+        from friso.equations.component import Component, Output, Role, State, key, state
+
+        forward = direction(velocity)
+        deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
+        coulomb = friction_level("coulomb", variant)
+        rate = velocity - stiffness * forward.sign * velocity / coulomb * deflection
+        bristles = State(deflection, rate, "m", coulomb / stiffness, Role.BRISTLE)
+        outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
+        force = stiffness * deflection + key("friction.viscous") * velocity
+        return Friction(force, coulomb, Component((bristles,), (forward,), outputs))
+
+    @staticmethod
+    def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
+        """Return what measurements would show of Dahl's law: one level of friction at all speeds.
+
+        Friction does not fall with speed, and at rest there is no damping but the viscous one.
+        """
+        coulomb, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
+        levels = Levels(coulomb, coulomb, NO_SPEED, 2.0, flat["friction.viscous"])
+        displacement = virgin_displacements(coulomb, stiffness)
+        return MeasuredFriction(
+            levels, stiffness, 0.0, displacement, -coulomb * np.expm1(-displacement * stiffness / coulomb)
+        )
+
+    @staticmethod
+    def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
+        """Return keys with the measured stiffness and sliding friction; the break-away peak is lost.
+
+        `elements` has no effect on a law with one spring.
+        """
+        return {
+            "friction.coulomb": measured.levels.coulomb,
+            "friction.viscous": measured.levels.viscous,
+            "friction.bristle_stiffness": measured.stiffness,
+        }
+
+
+NO_SPEED = 1e-3
+"""Stribeck velocity [m/s] for a law whose friction does not depend on speed. Its value does not matter."""
+
 
 STIFFNESS, SHARE, DAMPING = (f"friction.element_{name}" for name in ("stiffness", "share", "damping"))
 
@@ -119,8 +249,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
         """Return the equations of friction on a body moving at `velocity` [m/s]."""
         from sympy import And, Integer, sqrt
 
-        from friso.equations.cases import Piecewise
-        from friso.equations.component import Component, Output, Role, State, Switch, key, state
+        from friso.equations.component import Component, Output, Piecewise, Role, State, Switch, key, state
 
         curve = variant.curve
         forward = direction(velocity, key("friction.stribeck_velocity"))
