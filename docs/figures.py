@@ -16,9 +16,8 @@ from pathlib import Path
 
 import friso
 from friso.interface.answer import Answer
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.drawing.figure import BLUE, GREEN, VERMILLION, Axis, Figure, Panel, Series
 from friso.shown.drawing.matplotlib_renderer import image
-from friso.shown.drawing.palette import BLUE, GREEN, VERMILLION
 from friso.stage import Stage
 
 DOCS = Path(__file__).parent

@@ -119,9 +119,9 @@ def unhurried() -> Iterator[None]:
 @pytest.fixture
 def printed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages hold their prints all the same."""
-    from friso.shown import files
+    from friso.shown import blocks
 
-    monkeypatch.setattr("friso.shown.pages.image", files.image)
+    monkeypatch.setattr("friso.shown.pages.image", blocks.image)
 
 
 @pytest.fixture

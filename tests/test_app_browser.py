@@ -22,8 +22,7 @@ import friso
 from friso.app.frames import frame
 from friso.escapes import escaped
 from friso.shown.blocks import AnswerBlock
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import INK
+from friso.shown.drawing.figure import INK, Axis, Figure, Panel, Series
 from friso.shown.pages import Report
 
 pytestmark = [needs_browser, pytest.mark.usefixtures("own_bandwidth")]

@@ -21,8 +21,7 @@ from friso.questions.bode.numbers import rows
 from friso.questions.bode.states import shown_states
 from friso.questions.bode.words import details, sentences
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
-from friso.shown.drawing.figure import Figure
-from friso.shown.drawing.phases import phases
+from friso.shown.drawing.figure import Figure, phases
 from friso.stage import Stage
 
 command = command_of("bode")

@@ -51,12 +51,12 @@ from friso.hunting.criteria import Verdict
 from friso.questions.check.cases import case_document, rows, rows_behind
 from friso.questions.check.figures import check_figures
 from friso.questions.check.words import answer, conclusion, details_sentences, edge_text, verdict_sentence
-from friso.shown import files, pages
+from friso.shown import blocks, pages
 from friso.shown.blocks import AnswerBlock
-from friso.shown.cases import ShownCase, shown_cases
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.figure import Figure
-from friso.shown.loop_words import UNSTABLE_AS_BUILT
+from friso.shown.motion_words import ShownCase, shown_cases
+from friso.shown.text import UNSTABLE_AS_BUILT
 from friso.stage import Stage
 
 # ---------------------------------------------------------------- figures of a check
@@ -185,7 +185,7 @@ def test_ringing_does_not_count_as_a_swing():
 @pytest.fixture(scope="module")
 def page() -> str:
     """Return a page with its print images."""
-    with patched({pages: {"image": files.image}}):
+    with patched({pages: {"image": blocks.image}}):
         return check_html(both_joints())
 
 

@@ -38,7 +38,7 @@ from friso.questions.design.steps import (
 )
 from friso.questions.design.window import lower, stiffest, upper
 from friso.questions.design.words import brings, edge, refusal
-from friso.shown import files
+from friso.shown import blocks
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
@@ -120,7 +120,7 @@ def written(spec: Path, finished: list[str], tmp_path_factory: pytest.TempPathFa
     """The folder of all files, written once with figures as SVG only, and the summary."""
     out = tmp_path_factory.mktemp("written") / "design"
     with redirect_stdout(StringIO()) as said, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(files, "IMAGE_FORMATS", ("svg",))
+        patch.setattr(blocks, "IMAGE_FORMATS", ("svg",))
         command(RIG, spec, out=out, details=True)
     return out, said.getvalue()
 

@@ -21,7 +21,7 @@ import matplotlib.image
 import pytest
 
 import friso
-from friso.shown.glossary import Glossary
+from friso.shown.pages import Glossary
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -24,12 +24,11 @@ from pages import packed_values
 
 from friso.quantities import percent
 from friso.questions.check.figures import check_figures
-from friso.shown import files, pages
+from friso.shown import blocks, pages
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import KEPT_PER_BUCKET, MOST_BUCKETS, drawable, thin
-from friso.shown.drawing.figure import Axis, Figure, Map, Panel, Series
-from friso.shown.drawing.palette import GREY
-from friso.shown.drawing.prefixes import choose, pretty, range_with_unit, swing_with_unit, with_unit
+from friso.shown.drawing.figure import GREY, Axis, Figure, Map, Panel, Series
+from friso.shown.text import choose, pretty, range_with_unit, swing_with_unit, with_unit
 
 # ---------------------------------------------------------------- plain data
 
@@ -39,7 +38,7 @@ from friso.shown.drawing.prefixes import choose, pretty, range_with_unit, swing_
     [
         (lambda: Series(np.zeros(3), np.zeros(2), "wave", "#000"), r"\(3,\), y \(2,\); expected one length"),
         (lambda: Map(np.zeros(2), np.zeros(3), np.zeros((2, 3)), "peaks", ""), r"\(2, 3\), expected .* = \(3, 2\)"),
-        (lambda: files.save(small_figure(), Path("figure.gif")), "got 'gif', expected one of png, svg, pdf"),
+        (lambda: blocks.save(small_figure(), Path("figure.gif")), "got 'gif', expected one of png, svg, pdf"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(asked, message):
@@ -217,12 +216,12 @@ def test_a_page_carries_what_plotly_draws_in_four_bytes_a_number():
 
 def test_a_print_is_the_figure_without_its_heading() -> None:
     """The rest stays as it is, to the dot."""
-    whole, bare = (read_image(files.image(small_figure(), "png", headed)) for headed in (True, False))
+    whole, bare = (read_image(blocks.image(small_figure(), "png", headed)) for headed in (True, False))
     cut = len(whole) - len(bare)
     assert cut == pytest.approx(matplotlib_renderer.HEADER_HEIGHT * matplotlib_renderer.DOTS_PER_INCH, abs=1)
     assert np.array_equal(whole[cut:], bare)
     untitled = replace(small_figure(), title="", subject="")
-    assert files.image(untitled, "png", headed=False) == files.image(untitled, "png")
+    assert blocks.image(untitled, "png", headed=False) == blocks.image(untitled, "png")
     address = str(pages.print_image(small_figure()))
     assert address.startswith("data:image/png;base64,")
 

@@ -10,7 +10,7 @@ import pytest
 
 import friso
 from friso.axis import KINDS, LINEAR, speaking_of
-from friso.shown.drawing.prefixes import length_at_rest, range_with_unit, swing_with_unit, with_unit
+from friso.shown.text import length_at_rest, range_with_unit, swing_with_unit, with_unit
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0}

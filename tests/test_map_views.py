@@ -22,9 +22,8 @@ from friso.questions.map.findings import headline, statement
 from friso.questions.map.question import SweepAnswer
 from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
-from friso.shown.drawing.colours import painted, ramp, scale
 from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, drawable, pick
-from friso.shown.drawing.figure import Category, Cloud, Figure, Map
+from friso.shown.drawing.figure import Category, Cloud, Figure, Map, painted, ramp, scale
 from friso.studies.study import Request
 
 CROSSOVER, STROKE, LOCKED = "controller.crossover", "joint.stroke", "joint.locked"

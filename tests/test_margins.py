@@ -25,7 +25,7 @@ from friso.questions.check.cases import joint_margins_document
 from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
 from friso.questions.check.question import CheckAnswer
 from friso.questions.check.words import details_sentences, verdict_sentence
-from friso.shown.cases import ShownCase
+from friso.shown.motion_words import ShownCase
 from friso.stage import Stage
 
 RIGID = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz"})

@@ -21,7 +21,7 @@ from friso.cli.app import command_line
 from friso.errors import InputError
 from friso.interface import output_folder
 from friso.interface.output_folder import DRAFTS, UNFINISHED, OutputFolder, check_store_folder, write, write_file
-from friso.shown.files import Content
+from friso.shown.blocks import Content
 from friso.stage import load
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

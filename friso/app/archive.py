@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from friso.axis import speaking_of
 from friso.interface.answer import Answer
 from friso.platform.leftovers import temporary_folder
-from friso.shown.files import pictures
+from friso.shown.blocks import pictures
 
 
 def archive(answer: Answer, more: Mapping[str, str]) -> bytes:

@@ -9,8 +9,8 @@ from friso.equations.bandwidth import bandwidth, sped_up
 from friso.hunting import Case
 from friso.hunting.criteria import ATTRACTED
 from friso.questions.check.words import freeing_helps
-from friso.shown.cases import shown_cases
-from friso.shown.drawing.prefixes import rounded_down, rounded_up, with_unit
+from friso.shown.motion_words import shown_cases
+from friso.shown.text import rounded_down, rounded_up, with_unit
 from friso.stage import Stage
 
 FREE = {"label": "Free the joint", "values": {"joint.locked": False}}

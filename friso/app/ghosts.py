@@ -15,8 +15,7 @@ import numpy as np
 from friso.app.settings import app_settings
 from friso.identification.logs.log import Log
 from friso.interface.answer import Answer
-from friso.shown.drawing.figure import Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, PINK
+from friso.shown.drawing.figure import BLUE, PINK, Figure, Panel, Series
 
 GHOST = "#a9a9a9"
 """Colour of lines of the pinned machine."""

@@ -32,12 +32,11 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
-from friso.questions.logs.question import options_of
+from friso.questions.logs.question import LogsAnswer, options_of
 from friso.questions.map.places import SHOWN, with_places
-from friso.shown.cases import COLOURS, case_labels, verdict_in_short
 from friso.shown.drawing.figure import Figure
-from friso.shown.loop_words import after_loop, lost_as_built
-from friso.shown.unknown import unknown_condition
+from friso.shown.motion_words import COLOURS, case_labels, verdict_in_short
+from friso.shown.text import after_loop, lost_as_built, unknown_condition
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 from friso.studies.metric import metrics
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     from friso.app.work import Work
     from friso.interface.answer import Answer
     from friso.questions.identify.question import IdentifyAnswer
-    from friso.questions.logs.question import LogsAnswer
     from friso.questions.map.question import SweepAnswer
 
 AnswerPart = dict[str, Any]

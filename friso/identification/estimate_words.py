@@ -9,8 +9,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.settings import identification_settings, presentation_settings
-from friso.shown.drawing.prefixes import NOTHING, choose, pretty
-from friso.shown.key_words import key_in_words
+from friso.shown.text import NOTHING, choose, key_in_words, pretty
 
 _NAMES = {
     "bias.cart": "Constant force on the cart",

@@ -17,8 +17,7 @@ from friso.identification.logs.log import Log, join_alike
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import Course
 from friso.progress import Progress, silent
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, INK, ORANGE
+from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.stage import Stage, parse_set
 from friso.stage.controllers import CONTROLLER
 

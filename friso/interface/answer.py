@@ -26,9 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from friso.shown.blocks import AnswerBlock
+    from friso.shown.blocks import AnswerBlock, Files
     from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
     from friso.shown.pages import Report
     from friso.stage import Stage
 
@@ -162,7 +161,7 @@ class Answer:
 
         An answer that does not rest on the values of its stage overrides this.
         """
-        from friso.shown.unknown import unknown_condition
+        from friso.shown.text import unknown_condition
 
         return unknown_condition(self._stage, self.varied)
 

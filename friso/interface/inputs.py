@@ -150,7 +150,7 @@ def read_stage(
 
 def mention_sampling(stage: Stage) -> None:
     """Log that runs are of the machine as built, and at which sample time [s]."""
-    from friso.shown.drawing.prefixes import with_unit
+    from friso.shown.text import with_unit
     from friso.virtual_rig.task import SAMPLE_TIME
 
     stated = stage.flat().get("drive.sample_time")
@@ -165,7 +165,7 @@ def mention_unstable_loop(stage: Stage) -> None:
     The logger "friso" reports this before work that may take minutes and whose answer depends on stability.
     """
     from friso.hunting import unstable
-    from friso.shown.loop_words import unstable_loop
+    from friso.shown.text import unstable_loop
 
     for sentence in unstable_loop(unstable(stage)):
         note(sentence.removesuffix("."), meanwhile=True)

@@ -21,7 +21,7 @@ from friso.platform.system import cause_of, check_free, delete_file, name_new_fi
 from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from friso.shown.files import Content, Files
+    from friso.shown.blocks import Content, Files
 
 OVERWRITE, REPLACES = "--overwrite", "which replaces files of the same name"
 """Option by which a command may write among other files, and its effect in words."""

@@ -19,7 +19,7 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     from friso.questions.design.blocks import refused_document
     from friso.questions.design.question import specification_of
     from friso.questions.design.words import refusal
-    from friso.shown.unknown import unknown_condition
+    from friso.shown.text import unknown_condition
 
     try:
         ask(question, about, options, shown)

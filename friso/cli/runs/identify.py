@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping as Keyed
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,12 +17,12 @@ from friso.interface.question import Question
 from friso.platform.system import shell_word
 
 if TYPE_CHECKING:
-    from friso.identification.logs.mapping import Mapping
+    from friso.identification.logs.mapping import Mapping as LogMapping
     from friso.interface.output_folder import OutputFolder
-    from friso.shown.files import Content
+    from friso.shown.blocks import Content
 
 
-def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], shown: Shown) -> None:
+def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
     """Identify a machine from logs, and keep what the user said of them for the next time.
 
     Raises InputError with the command to type if a question about a log is open.
@@ -55,7 +54,7 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
     show(answer, shown, lambda progress: [*target.write(answer.files(), progress), *kept])
 
 
-def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
+def _keep(mappings: dict[Path, LogMapping], target: OutputFolder) -> list[Path]:
     """Store what the user said of each log, and return the files written.
 
     A log whose stored mapping is unchanged is left out.

@@ -22,9 +22,8 @@ from friso.identification.readings.ramps import Ramps, force_ramps
 from friso.identification.readings.rate_effect import static_friction
 from friso.identification.readings.settings import settings as reading_settings
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Markers, Panel
-from friso.shown.drawing.palette import INK
-from friso.shown.drawing.prefixes import range_with_unit
+from friso.shown.drawing.figure import INK, Axis, Band, Figure, Limit, Markers, Panel
+from friso.shown.text import range_with_unit
 from friso.stage import Stage
 
 

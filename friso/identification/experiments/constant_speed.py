@@ -24,8 +24,20 @@ from friso.identification.readings.friction_velocity import Direction, FrictionV
 from friso.identification.readings.passes import passes
 from friso.identification.readings.settings import settings as reading_settings
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Array, Axis, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, ORANGE, PINK, SKY, VERMILLION
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Array,
+    Axis,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
 from friso.stage import Stage
 
 

@@ -31,10 +31,23 @@ from friso.identification.settings import experiment_settings
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREY, INK, ORANGE, VERMILLION
-from friso.shown.drawing.phases import phases
-from friso.shown.drawing.prefixes import range_with_unit
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILLION,
+    Array,
+    Axis,
+    Band,
+    Dash,
+    Figure,
+    Limit,
+    Panel,
+    Series,
+    phases,
+)
+from friso.shown.text import range_with_unit
 from friso.stage import Stage
 
 

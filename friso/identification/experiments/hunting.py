@@ -19,9 +19,8 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel
 from friso.identification.settings import experiment_settings
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Figure, Limit, Markers, Panel, Series
-from friso.shown.drawing.palette import INK, VERMILLION
-from friso.shown.drawing.prefixes import swing_with_unit, with_unit
+from friso.shown.drawing.figure import INK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
+from friso.shown.text import swing_with_unit, with_unit
 
 
 @dataclass(frozen=True)

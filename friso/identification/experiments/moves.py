@@ -30,9 +30,22 @@ from friso.identification.stage_file import made_up
 from friso.identification.witness import Replay
 from friso.quantities import percent
 from friso.shown.documents import entries, unit_suffix
-from friso.shown.drawing.figure import Array, Axis, Band, Figure, Limit, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREY, INK, ORANGE, VERMILLION
-from friso.shown.drawing.prefixes import range_with_unit
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILLION,
+    Array,
+    Axis,
+    Band,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.text import range_with_unit
 from friso.stage import Stage
 
 WITHOUT_CONTROLLER = (

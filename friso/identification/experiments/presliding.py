@@ -47,8 +47,7 @@ from friso.identification.settings import experiment_settings
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, INK, ORANGE
+from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.stage import Stage
 
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"

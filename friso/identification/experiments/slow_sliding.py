@@ -29,8 +29,7 @@ from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings, presentation_settings
 from friso.quantities import percent
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, INK, ORANGE
+from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.stage import Stage
 
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")

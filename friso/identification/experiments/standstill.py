@@ -16,9 +16,8 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel
 from friso.identification.readings.course import Course
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, INK, ORANGE, PINK, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import BLUE, GREEN, INK, ORANGE, PINK, VERMILLION, Axis, Figure, Panel, Series
+from friso.shown.text import with_unit
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,8 @@ from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.readings.course import Course
 from friso.identification.readings.stamped_friction import METHOD, StampedFriction, stamped_friction
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, INK
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import BLUE, INK, Axis, Figure, Markers, Panel, Series
+from friso.shown.text import with_unit
 from friso.stage import Stage
 
 _DENIED = {"friction.static": "N", **dict(zip(BRISTLES, ("N/m", "N*s/m"), strict=False))}

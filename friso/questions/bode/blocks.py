@@ -14,7 +14,7 @@ from friso.questions.bode.states import has_limiter, shown_states, side
 from friso.questions.bode.words import details, sentences
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
-from friso.shown.drawing.palette import GREEN, VERMILLION
+from friso.shown.drawing.figure import GREEN, VERMILLION
 
 
 def basis(bode: Bode) -> str:

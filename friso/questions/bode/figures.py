@@ -13,11 +13,22 @@ import numpy as np
 from friso.frequency.bode import COMFORTABLE_MARGIN, Bode, BodeCase, CascadeLoop
 from friso.questions.bode.numbers import decibels
 from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
-from friso.shown.drawing.colours import ramp
-from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Markers, Panel, Series
-from friso.shown.drawing.palette import INK, LIGHT
-from friso.shown.drawing.phases import phases
-from friso.shown.drawing.prefixes import pretty, with_unit
+from friso.shown.drawing.figure import (
+    INK,
+    LIGHT,
+    Array,
+    Axis,
+    Band,
+    Dash,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+    phases,
+    ramp,
+)
+from friso.shown.text import pretty, with_unit
 from friso.stage.tables import moving_mass
 
 QUARTER_TURN = 90.0

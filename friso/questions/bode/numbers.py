@@ -14,7 +14,7 @@ import numpy as np
 from friso.frequency.bode import CascadeLoop
 from friso.frequency.margins import Margins
 from friso.questions.bode.states import ShownState
-from friso.shown.drawing.prefixes import NOTHING, with_unit
+from friso.shown.text import NOTHING, with_unit
 
 OF_LOOPS = ("Stable", "0 dB crossings", "Phase margin", "Gain margin", "Modulus margin")
 """Names of the rows of each loop of a cascade."""

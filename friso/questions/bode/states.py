@@ -10,9 +10,8 @@ import numpy as np
 from friso.frequency.bode import Bode, CascadeLoop
 from friso.frequency.margins import Margins
 from friso.frequency.system import Members
-from friso.shown.drawing.figure import Dash
-from friso.shown.drawing.palette import BLUE, GREY, ORANGE, SKY, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash
+from friso.shown.text import with_unit
 from friso.stage.tables import leading_friction
 
 SERIES = "-series"

@@ -13,8 +13,17 @@ from friso.frequency.margins import Margins
 from friso.frequency.system import Members
 from friso.questions.bode.numbers import growth
 from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, with_gains
-from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
-from friso.shown.says import Alternatives, Words, always, say, say_all
+from friso.shown.text import (
+    Alternatives,
+    Words,
+    always,
+    listed,
+    range_with_unit,
+    say,
+    say_all,
+    window_with_unit,
+    with_unit,
+)
 
 
 def sentences(bode: Bode) -> list[str]:

@@ -12,6 +12,11 @@ from friso.questions.boundary.settings import boundary_figure_settings
 from friso.questions.boundary.words import BASIN, MEANINGS, ShownKey, end_sentence
 from friso.questions.map.words import QUIET, quantity
 from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    INK,
+    LIGHT,
+    VERMILLION,
     Axis,
     Category,
     Cloud,
@@ -24,7 +29,6 @@ from friso.shown.drawing.figure import (
     Series,
     Symbol,
 )
-from friso.shown.drawing.palette import BLUE, GREY, INK, LIGHT, VERMILLION
 from friso.studies import boundary
 from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line
 

@@ -21,7 +21,7 @@ from friso.stage.contacts import followed
 
 if TYPE_CHECKING:
     from friso.questions.boundary.words import ShownKey
-    from friso.shown.files import Files
+    from friso.shown.blocks import Files
 
 
 class BoundaryAnswer(Answer):
@@ -38,7 +38,7 @@ class BoundaryAnswer(Answer):
     @property
     def condition(self) -> str:
         """Say on which unknown values the answer rests, and that it leaves out a drive that makes the loop unstable."""
-        from friso.shown.loop_words import without_drive
+        from friso.shown.text import without_drive
 
         return super().condition + without_drive(self.stage)
 
@@ -62,7 +62,7 @@ class BoundaryAnswer(Answer):
     def files(self) -> Files:
         """Return the page, the figure, and the table of points, named after the stage's file."""
         from friso.questions.boundary.blocks import write_table
-        from friso.shown.files import image_files
+        from friso.shown.blocks import image_files
 
         stem, (figure,) = f"{self.name}_boundary", self.figures()
         images = image_files(figure, stem)

@@ -12,7 +12,7 @@ import numpy as np
 from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Plane, Space
 from friso.questions.map.words import friction_held
 from friso.shown.drawing.figure import Array
-from friso.shown.drawing.prefixes import listed, pretty, swing_with_unit, with_unit
+from friso.shown.text import listed, pretty, swing_with_unit, with_unit
 from friso.studies import boundary
 from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line, PlaneEdge, StabilityChange
 

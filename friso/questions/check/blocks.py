@@ -24,9 +24,8 @@ from friso.questions.check.levels import levels_document, levels_sentence
 from friso.questions.check.margin_words import joint_sentences
 from friso.questions.check.words import activity_sentences, answer, between_surveyed, details_of
 from friso.shown.blocks import AnswerBlock
-from friso.shown.cases import case_labels, shown_cases
 from friso.shown.documents import plain_json
-from friso.shown.motion_words import motion_sentences
+from friso.shown.motion_words import case_labels, motion_sentences, shown_cases
 from friso.stage.rig import left_out
 from friso.stage.tables import passive_where
 

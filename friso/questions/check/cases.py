@@ -17,9 +17,9 @@ from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
 from friso.questions.check.words import at_the_end, edge_text, moves_tried
 from friso.shown.blocks import filled
-from friso.shown.cases import ShownCase, band_text, verdict_in_short
 from friso.shown.documents import dwells_document, entries, plain_json, tracking_document, unit_suffix
-from friso.shown.drawing.prefixes import (
+from friso.shown.motion_words import ShownCase, band_text, verdict_in_short
+from friso.shown.text import (
     NOTHING,
     listed,
     percent_range,

@@ -13,18 +13,9 @@ from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERD
 from friso.identification.ways import ways_to_show
 from friso.quantities import plain_factor
 from friso.questions.check.words import speed_text
-from friso.shown.cases import case_labels
-from friso.shown.drawing.figure import Axis, Band, Figure, Panel
-from friso.shown.drawing.palette import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION
-from friso.shown.drawing.prefixes import (
-    NOTHING,
-    length_at_rest,
-    percentage,
-    range_with_unit,
-    share_with_interval,
-    with_unit,
-)
-from friso.shown.unknown import if_so
+from friso.shown.drawing.figure import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
+from friso.shown.motion_words import case_labels
+from friso.shown.text import NOTHING, if_so, length_at_rest, percentage, range_with_unit, share_with_interval, with_unit
 from friso.studies.draws import DrawnBandwidths, Draws, Fates
 from friso.studies.settings import settings
 

@@ -13,9 +13,25 @@ from friso.equations.motion import last_corner
 from friso.hunting import Case, Cycle
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE
 from friso.hunting.measures import BANDS
-from friso.shown.cases import ShownCase, band_text, shown_cases
-from friso.shown.drawing.figure import Array, Axis, Band, Dash, Figure, Limit, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREY, INK, LIGHT, ORANGE, PINK, SKY
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    INK,
+    LIGHT,
+    ORANGE,
+    PINK,
+    SKY,
+    Array,
+    Axis,
+    Band,
+    Dash,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.motion_words import ShownCase, band_text, shown_cases
 
 
 def trace_of(item: ShownCase) -> xr.Dataset:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.text import with_unit
 
 if TYPE_CHECKING:
     from friso.remedies.catalogue import Suggestion

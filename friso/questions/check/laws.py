@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from friso.axis import axis_shown
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import percent
-from friso.shown.cases import case_labels, verdict_in_short
-from friso.shown.drawing.prefixes import NOTHING, digits_that_differ, listed, range_with_unit, with_unit
+from friso.shown.motion_words import case_labels, verdict_in_short
+from friso.shown.text import NOTHING, digits_that_differ, listed, range_with_unit, with_unit
 from friso.stage.stage import declared_keys
 
 if TYPE_CHECKING:

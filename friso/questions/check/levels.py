@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from friso.shown.drawing.prefixes import range_with_unit, with_unit
+from friso.shown.text import range_with_unit, with_unit
 from friso.studies.draws import FrictionLevels
 from friso.studies.settings import settings
 

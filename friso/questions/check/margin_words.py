@@ -9,13 +9,7 @@ from friso.equations.bandwidth import breakaway, least_static_factor, static_fri
 from friso.equations.structure import carrying_force
 from friso.hunting import SEARCH_LIMITS, AttractionEnd, Case, ParameterMargin
 from friso.quantities import percent, plain_factor
-from friso.shown.drawing.prefixes import (
-    listed,
-    range_with_unit,
-    rounded_down,
-    rounded_up,
-    with_unit,
-)
+from friso.shown.text import listed, range_with_unit, rounded_down, rounded_up, with_unit
 from friso.stage.controllers import FORCE_LIMIT
 
 

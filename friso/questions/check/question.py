@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from friso.hunting.criteria import Verdict
     from friso.remedies.catalogue import Suggestion
-    from friso.shown.files import Files
+    from friso.shown.blocks import Files
     from friso.studies.laws import VerdictsByLaw
 
 
@@ -240,7 +240,7 @@ def _as_built(case: Case) -> Case:
 
     If samples and delays of the drive make this loop unstable, the verdict becomes uncertain.
     """
-    from friso.shown.loop_words import UNSTABLE_AS_BUILT, lost_as_built
+    from friso.shown.text import UNSTABLE_AS_BUILT, lost_as_built
 
     where = lost_as_built(case.stage)
     if not where:
@@ -265,7 +265,7 @@ def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
     `name` is the case: "given", "locked" or "free". The message goes to the logger "friso", at the level INFO.
     """
     from friso.questions.check.words import IN_SHORT
-    from friso.shown.cases import case_labels
+    from friso.shown.motion_words import case_labels
 
     if name in (labels := case_labels(stage)):
         LOGGER.info(f"{labels[name]}: {IN_SHORT[verdict]}", extra={"meanwhile": True})

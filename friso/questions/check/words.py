@@ -22,20 +22,28 @@ from friso.hunting import (
 from friso.hunting.criteria import ATTRACTED, Verdict
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
-from friso.shown.cases import ShownCase, band_text, in_doubt, shown_cases, swings_by_its_loop
-from friso.shown.drawing.prefixes import (
+from friso.shown.motion_words import (
+    ShownCase,
+    band_text,
+    dwell_sentences,
+    following_sentence,
+    in_doubt,
+    shown_cases,
+    stick_slip_sentences,
+    swings_by_its_loop,
+)
+from friso.shown.text import (
     digits_that_differ,
+    if_so,
     length_at_rest,
     listed,
     range_with_unit,
     rounded_down,
     rounded_up,
     swing_with_unit,
+    unstable_where,
     with_unit,
 )
-from friso.shown.loop_words import unstable_where
-from friso.shown.motion_words import dwell_sentences, following_sentence, stick_slip_sentences
-from friso.shown.unknown import if_so
 from friso.stage.controllers import FORCE_LIMIT, ControllerSection, dead_band, integral_leak
 from friso.stage.rig import motion_of
 from friso.stage.section import numeric_fields

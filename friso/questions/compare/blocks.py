@@ -17,8 +17,7 @@ from friso.questions.tune.words import changes
 from friso.remedies.comparison import AS_IT_IS, FASTER, ISOLATOR, LOCKED, Compared, Comparison, Quantile
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
-from friso.shown.drawing.prefixes import length_at_rest, listed, share_with_interval, with_unit
-from friso.shown.machine_words import spread_sentences
+from friso.shown.text import length_at_rest, listed, share_with_interval, spread_sentences, with_unit
 
 MEANINGS = (
     "Fractions and times have 95 % intervals (Clopper, Pearson; order statistics). Settling times count from the last "

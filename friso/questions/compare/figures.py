@@ -9,9 +9,22 @@ import numpy as np
 from friso.equations.motion import last_corner
 from friso.remedies.comparison import Comparison
 from friso.shares import Share
-from friso.shown.drawing.figure import Axis, Dash, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, INK, ORANGE, PINK, SKY, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    INK,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Axis,
+    Dash,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.text import with_unit
 
 COLOURS = (INK, BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
 DASHES: tuple[Dash, ...] = ("solid", "dashed", "dotted")

@@ -18,10 +18,9 @@ from friso.questions.design.figures import design_figures
 from friso.questions.design.steps import requirement_rows, steps
 from friso.questions.design.window import lower, upper
 from friso.questions.design.words import need_words, refusal, so_far, verdicts
-from friso.shown.blocks import AnswerBlock
+from friso.shown.blocks import AnswerBlock, Content
 from friso.shown.documents import entries, plain_json, unit_suffix
-from friso.shown.files import Content
-from friso.shown.unknown import unknown_condition
+from friso.shown.text import unknown_condition
 from friso.stage import Stage
 
 LEAVES_STEP = 2

@@ -19,9 +19,26 @@ from friso.questions.flexure.figures import modes_figure
 from friso.questions.flexure.numbers import newtons_per
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.drawable import cell_edges
-from friso.shown.drawing.figure import Array, Axis, Band, Category, Dash, Figure, Limit, Map, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION
-from friso.shown.drawing.prefixes import listed
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILLION,
+    Array,
+    Axis,
+    Band,
+    Category,
+    Dash,
+    Figure,
+    Limit,
+    Map,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.text import listed
 
 CHOSEN = "#e3001b"
 """Colour of the chosen design's marker, equal to the evaluation point's colour in maps."""

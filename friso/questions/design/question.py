@@ -20,7 +20,7 @@ from friso.quantities import Quantity, positive
 from friso.stage import Stage, numeric_keys
 
 if TYPE_CHECKING:
-    from friso.shown.files import Files
+    from friso.shown.blocks import Files
 
 
 class DesignAnswer(Answer):
@@ -131,7 +131,7 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
     `outlined` is true if there is no specification and one was made from the stage.
     """
     from friso.equations.bandwidth import bandwidth
-    from friso.shown.drawing.prefixes import with_unit
+    from friso.shown.text import with_unit
 
     if outlined:
         made = "friso init --spec STAGE.toml writes it for you to edit"

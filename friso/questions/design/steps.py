@@ -18,7 +18,7 @@ from friso.questions.design.window import CrossoverBound, comfortable, lower, up
 from friso.questions.design.words import DesignStep, hertz, seconds, size, trimmed
 from friso.questions.flexure.numbers import megapascals, newtons_per
 from friso.questions.flexure.words import assumptions
-from friso.shown.drawing.prefixes import listed
+from friso.shown.text import listed
 
 
 def steps(design: Design) -> tuple[DesignStep, ...]:

@@ -19,8 +19,8 @@ from friso.platform.system import shell_word
 from friso.quantities import outwards, percent
 from friso.questions.design import window
 from friso.questions.map.words import in_sentence
-from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
-from friso.shown.drawing.prefixes import choose, pretty, with_unit
+from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
+from friso.shown.text import choose, pretty, with_unit
 from friso.stage.stage import numeric_keys
 
 MOST_RELAXATIONS = 5

@@ -10,8 +10,7 @@ from friso.hunting.criteria import ATTRACTED, UNDECIDED
 from friso.questions.check.words import IN_SHORT
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import plain_json
-from friso.shown.drawing.prefixes import with_unit
-from friso.shown.unknown import unknown_condition
+from friso.shown.text import unknown_condition, with_unit
 from friso.version import VERSION
 
 if TYPE_CHECKING:

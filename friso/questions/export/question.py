@@ -20,8 +20,7 @@ from friso.quantities import quoted
 
 if TYPE_CHECKING:
     from friso.questions.check.question import CheckAnswer
-    from friso.shown.blocks import AnswerBlock
-    from friso.shown.files import Files
+    from friso.shown.blocks import AnswerBlock, Files
     from friso.stage import Stage
 
 

@@ -12,8 +12,7 @@ from friso.questions.flexure.numbers import rows
 from friso.questions.flexure.words import sentences, warnings
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
-from friso.shown.drawing.figure import Category
-from friso.shown.drawing.palette import GREEN, VERMILLION
+from friso.shown.drawing.figure import GREEN, VERMILLION, Category
 
 
 def basis(flexure: BothModels) -> str:

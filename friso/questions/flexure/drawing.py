@@ -8,8 +8,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.leaf_springs.mechanism import Mechanism
-from friso.shown.drawing.figure import Area, Axis, Figure, Lettering, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREY, INK, LIGHT, VERMILLION
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    INK,
+    LIGHT,
+    VERMILLION,
+    Area,
+    Axis,
+    Figure,
+    Lettering,
+    Markers,
+    Panel,
+    Series,
+)
 
 CLAMP_SHARE, MARGIN_SHARE = 0.05, 0.12
 """Length of a clamp, and margin around the drawing, in lengths of a leaf."""

@@ -11,9 +11,21 @@ from friso.leaf_springs.beams import BEAMS, CLOSED, BothModels
 from friso.leaf_springs.mechanism import Evaluation, Mechanism, Mode
 from friso.materials import materials
 from friso.questions.flexure.drawing import block_size, drawing_figure
-from friso.shown.drawing.figure import Array, Axis, Dash, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREY, LIGHT, ORANGE, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    LIGHT,
+    ORANGE,
+    VERMILLION,
+    Array,
+    Axis,
+    Dash,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.text import with_unit
 
 COLOURS = {BEAMS: BLUE, CLOSED: ORANGE}
 DASHES: dict[str, Dash] = {CLOSED: "dashed"}

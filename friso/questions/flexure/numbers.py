@@ -8,7 +8,7 @@ from collections.abc import Callable
 from friso.leaf_springs.beams import BothModels
 from friso.leaf_springs.mechanism import Evaluation, Mode
 from friso.quantities import percent
-from friso.shown.drawing.prefixes import NOTHING, with_unit
+from friso.shown.text import NOTHING, with_unit
 
 INTERFERES = "interferes"
 """Label of a mode that disturbs control: both actuator and sensor couple to it."""

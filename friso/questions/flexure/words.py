@@ -9,7 +9,7 @@ from friso.leaf_springs.beams import BothModels
 from friso.leaf_springs.mechanism import AXES, STANDARD_GRAVITY, Evaluation
 from friso.quantities import percent
 from friso.questions.flexure.numbers import megapascals, newtons_per
-from friso.shown.drawing.prefixes import listed, with_unit
+from friso.shown.text import listed, with_unit
 from friso.stage import Stage
 
 CROSSOVER_RULE = 0.1

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from friso.quantities import plain_factor
-from friso.shown.drawing.prefixes import listed, swing_with_unit, with_unit
+from friso.shown.text import listed, swing_with_unit, with_unit
 from friso.stage import Stage
 from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange, Standing
 from friso.studies.settings import settings

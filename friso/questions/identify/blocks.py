@@ -18,10 +18,9 @@ from friso.questions.identify import words
 from friso.questions.identify.against_words import against_document, against_sentences
 from friso.questions.identify.figures import identify_figures
 from friso.questions.identify.words import headline
-from friso.shown.blocks import AnswerBlock
+from friso.shown.blocks import AnswerBlock, Content
 from friso.shown.documents import entries, plain_json
-from friso.shown.drawing.palette import ORANGE
-from friso.shown.files import Content
+from friso.shown.drawing.figure import ORANGE
 from friso.stage.correlations import correlations_file, correlations_text
 
 if TYPE_CHECKING:

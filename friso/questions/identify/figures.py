@@ -10,8 +10,7 @@ import numpy as np
 from friso.identification.kinds import KINDS
 from friso.identification.method import Identification, Prediction
 from friso.questions.identify.words import labels, ordered
-from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series, Symbol
-from friso.shown.drawing.palette import BLUE, ORANGE
+from friso.shown.drawing.figure import BLUE, ORANGE, Axis, Figure, Markers, Panel, Series, Symbol
 
 SHORT = {
     "masses.cart": "cart",

@@ -14,14 +14,13 @@ from friso.axis import axis_shown, unit_shown
 from friso.identification.estimate_words import interval_text, name_of, value_text, with_interval, within
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
-from friso.identification.method import nothing_learnt
+from friso.identification.method import Experiment, Identification, Prediction, nothing_learnt
 from friso.identification.ways import ways_to_show
-from friso.shown.drawing.palette import GREEN, ORANGE, VERMILLION
+from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
 
 if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
     from friso.identification.kind import Facts, Source
-    from friso.identification.method import Experiment, Identification, Prediction
     from friso.identification.sources import LogFile
 
 COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or reason")

@@ -9,8 +9,7 @@ import numpy as np
 from friso.identification.contents import ChannelContent, LogContent
 from friso.identification.logs.settings import settings
 from friso.questions.logs.words import title
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE
+from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
 
 MOST_CHANNELS = 12
 """Largest number of channels of a file that are drawn."""

@@ -16,7 +16,7 @@ from friso.interface.inputs import Changes, ChannelUnits, KindName, Roles, RoleS
 from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from friso.shown.files import Files
+    from friso.shown.blocks import Files
     from friso.shown.pages import Report
 
 LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]

@@ -12,8 +12,8 @@ import numpy as np
 from friso.identification.contents import ChannelContent, LogContent
 from friso.platform.system import shell_word
 from friso.shown.documents import entries, plain_json
-from friso.shown.drawing.palette import GREEN, ORANGE
-from friso.shown.drawing.prefixes import NOTHING, range_with_unit, with_unit
+from friso.shown.drawing.figure import GREEN, ORANGE
+from friso.shown.text import NOTHING, range_with_unit, with_unit
 
 COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")
 """Columns of the table of channels."""

@@ -14,9 +14,8 @@ import xarray as xr
 
 from friso.questions.map import words as map_words
 from friso.questions.map.words import quantity, variable
-from friso.shown.drawing.colours import ramp
-from friso.shown.drawing.figure import Array, Axis, Category
-from friso.shown.drawing.prefixes import choose
+from friso.shown.drawing.figure import Array, Axis, Category, ramp
+from friso.shown.text import choose
 from friso.studies.metric import metrics, worded
 
 SAMPLE = "sample"  # dimension of sampled maps, which have no grid

@@ -19,8 +19,7 @@ from friso.questions.map.places import SHOWN, machine_of, with_places
 from friso.questions.map.verdicts import is_of_verdicts, verdict_panel
 from friso.questions.map.words import variable
 from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, pick
-from friso.shown.drawing.figure import Axis, Cloud, Figure, Map, Markers, Panel, Series, Told
-from friso.shown.drawing.palette import BLUE
+from friso.shown.drawing.figure import BLUE, Axis, Cloud, Figure, Map, Markers, Panel, Series, Told
 from friso.studies.edges import MapEdges
 from friso.studies.metric import metrics
 

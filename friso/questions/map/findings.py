@@ -17,8 +17,7 @@ from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.questions.map.places import machine_of
 from friso.questions.map.words import failures, grouped
 from friso.shown.drawing.figure import SecondScale
-from friso.shown.drawing.prefixes import listed, range_with_unit
-from friso.shown.loop_words import unstable_loop
+from friso.shown.text import listed, range_with_unit, unstable_loop
 from friso.stage import Stage
 from friso.stage.contacts import followed
 from friso.studies.axes import SCALINGS

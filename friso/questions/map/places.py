@@ -10,8 +10,7 @@ import numpy as np
 import xarray as xr
 
 from friso.errors import InputError
-from friso.shown.drawing.figure import Axis, Figure, Markers, Panel
-from friso.shown.drawing.palette import GREY, INK
+from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel
 from friso.stage import Stage, loads
 from friso.studies.axes import SCALINGS
 

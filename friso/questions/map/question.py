@@ -46,9 +46,8 @@ from friso.studies.sweep import Crew, fill, local_crew, run_in_memory
 if TYPE_CHECKING:
     import xarray as xr
 
-    from friso.shown.blocks import AnswerBlock
+    from friso.shown.blocks import AnswerBlock, Content, Files
     from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Content, Files
     from friso.shown.pages import Report
     from friso.studies.edges import MapEdges
 
@@ -76,7 +75,7 @@ class SweepAnswer(Answer):
     @property
     def condition(self) -> str:
         """Say on which unknown values the map rests, and that it leaves out a drive that makes the loop unstable."""
-        from friso.shown.loop_words import without_drive
+        from friso.shown.text import without_drive
 
         return super().condition + ("" if of_runs_alone([self.metric]) else without_drive(self.study.stage))
 
@@ -143,7 +142,7 @@ class SweepAnswer(Answer):
 
     def files(self) -> Files:
         """Return the figure in all formats and the page, by name; nothing for too many cells."""
-        from friso.shown.files import image_files
+        from friso.shown.blocks import image_files
 
         if not self.drawable:
             return {}

@@ -11,8 +11,20 @@ import numpy as np
 from friso.hunting.criteria import ATTRACTED
 from friso.questions.map.cells import CellAxis, Look
 from friso.questions.map.settings import map_settings
-from friso.shown.drawing.figure import Area, Array, Arrow, Lettering, Map, Markers, Panel, Series
-from friso.shown.drawing.palette import BLACK, INK, VERMILLION, WHITE
+from friso.shown.drawing.figure import (
+    BLACK,
+    INK,
+    VERMILLION,
+    WHITE,
+    Area,
+    Array,
+    Arrow,
+    Lettering,
+    Map,
+    Markers,
+    Panel,
+    Series,
+)
 from friso.studies.edges import HUNTS_LEVEL, SETTLES_LEVEL, SLOW_LEVEL, MapEdges, OwnLine, coarse_edges, verdict_levels
 
 HUNTS, KICKED, SLOW, SETTLES = "hunts", "bistable", "transient", "settles"

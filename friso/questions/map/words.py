@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.shown.drawing.figure import Category
-from friso.shown.drawing.palette import GREY, INK, MAUVE, ORANGE, PINK, QUIET, VERMILLION
-from friso.shown.key_words import key_in_words
+from friso.shown.drawing.figure import GREY, INK, MAUVE, ORANGE, PINK, QUIET, VERMILLION, Category
+from friso.shown.text import key_in_words
 from friso.studies.axes import SCALINGS
 from friso.studies.metric import metrics, worded
 

@@ -11,8 +11,7 @@ import xarray as xr
 from friso.equations.motion import ends_evenly, rests
 from friso.questions.check.figures import response_figure
 from friso.questions.simulate.words import built_sentence, conclusion, simulate_document
-from friso.shown.blocks import AnswerBlock
-from friso.shown.files import Content, image_files
+from friso.shown.blocks import AnswerBlock, Content, image_files
 from friso.shown.motion_words import dwell_sentences, motion_sentences
 
 if TYPE_CHECKING:

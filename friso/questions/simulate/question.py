@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from friso.hunting import Dwell
-    from friso.shown.files import Files
+    from friso.shown.blocks import Files
     from friso.studies.study import Study
 
 

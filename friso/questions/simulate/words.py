@@ -10,8 +10,8 @@ from friso.engine.arrays import Status
 from friso.hunting.criteria import CREEPS, OUTCOME_CRITERION, RESTS, SWINGS
 from friso.hunting.measures import LAST_QUARTER, Measures
 from friso.shown.documents import dwells_document, plain_json
-from friso.shown.drawing.prefixes import listed, swing_with_unit, with_unit
 from friso.shown.motion_words import off_its_reference
+from friso.shown.text import listed, swing_with_unit, with_unit
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
 

@@ -23,9 +23,8 @@ from friso.questions.tune.words import (
 )
 from friso.remedies.method import Advice
 from friso.remedies.verified import Performance, RemedyOutcome
-from friso.shown.blocks import AnswerBlock
+from friso.shown.blocks import AnswerBlock, Content
 from friso.shown.documents import entries, plain_json
-from friso.shown.files import Content
 from friso.stage import Stage
 from friso.stage.correlations import correlations_file, correlations_text
 

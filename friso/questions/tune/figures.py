@@ -14,9 +14,22 @@ from friso.frequency.system import DriveTiming, limit_cases
 from friso.remedies.catalogue import linear_flat
 from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome
-from friso.shown.drawing.figure import Axis, Dash, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Axis,
+    Dash,
+    Figure,
+    Panel,
+    Series,
+)
+from friso.shown.text import with_unit
 from friso.stage import Stage
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)

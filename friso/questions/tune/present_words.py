@@ -10,7 +10,7 @@ from friso.frequency.bode import loop_bandwidth
 from friso.quantities import percent
 from friso.remedies.machines import MoveRange
 from friso.remedies.method import Advice
-from friso.shown.drawing.prefixes import listed, range_with_unit, with_unit
+from friso.shown.text import listed, range_with_unit, with_unit
 
 DOUBTS = {
     "verdict": "its own motion does not settle, or something attracts it",

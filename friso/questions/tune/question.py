@@ -151,8 +151,7 @@ def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
     """Log the first remedy that works, and how long others are still tried."""
     from friso.questions.tune.words import changes, slowest_time
     from friso.remedies.settings import settings
-    from friso.shown.drawing.prefixes import listed, with_unit
-    from friso.shown.unknown import unknown_condition
+    from friso.shown.text import listed, unknown_condition, with_unit
 
     if outcome.stage is None or outcome.measured is None:
         return

@@ -26,18 +26,22 @@ from friso.remedies.method import Advice
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import settings
 from friso.remedies.verified import Performance, RemedyOutcome
-from friso.shown.drawing.prefixes import (
+from friso.shown.text import (
     NOTHING,
+    Alternatives,
+    Words,
+    always,
     digits_that_differ,
     listed,
     pretty,
     range_with_unit,
+    say,
+    say_all,
     share_with_interval,
+    spread_sentences,
+    unstable_where,
     with_unit,
 )
-from friso.shown.loop_words import unstable_where
-from friso.shown.machine_words import spread_sentences
-from friso.shown.says import Alternatives, Words, always, say, say_all
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.tables import leading_friction

@@ -27,7 +27,7 @@ from friso.shown.drawing.figure import (
     Panel,
     Series,
 )
-from friso.shown.drawing.prefixes import choose, pretty
+from friso.shown.text import choose, pretty
 
 Field = TypeVar("Field", bound=Coloured)
 

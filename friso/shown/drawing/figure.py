@@ -1,12 +1,21 @@
-"""Describe a figure as plain data, before it is drawn.
+"""Figures as data, with their colours and phases.
+
+Name the colours of lines, points and areas in figures.
+
+Describe a figure as plain data, before it is drawn.
 
 An analysis answers with a `Figure`, and a renderer draws it. All data are in the unit of their axis, which is an SI
 unit when the figure is made. `friso.shown.drawing.drawable` chooses the prefix and thins the lines, once for both
 renderers.
+
+Lay out the phases of complex responses for drawing.
+
+Map numbers to colours, with one scale for both renderers.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -14,7 +23,28 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from friso.shown.drawing.palette import GREY
+# Okabe & Ito, "Color universal design" (2008): distinguishable with any colour vision.
+BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
+SKY, ORANGE, PINK, MAUVE = "#56B4E9", "#E69F00", "#CC79A7", "#8c6d8f"
+INK, GREY, LIGHT = "#222222", "#767676", "#c9c9c9"
+WHITE, BLACK = "#ffffff", "#111111"
+"""Words on coloured ground, which are the same on a dark page."""
+
+QUIET = "#d3e6f3"
+"""Ground of what rests: a pale blue, far from the colours of swings and from white and grey."""
+
+DARK = {
+    INK: "#e6e7e9",
+    GREY: "#9aa0a6",
+    LIGHT: "#5a5f66",
+    BLUE: "#3d9be0",
+    SKY: "#a6d8f7",
+    QUIET: "#1f3645",
+    "#e3e3e3": "#2f3338",
+    "#a9a9a9": "#777d84",
+}
+"""Colours on a dark page, by those on a light one. Others are the same on both."""
+
 
 Array = npt.NDArray[np.float64]
 Dash = Literal["solid", "dashed", "dotted"]
@@ -322,3 +352,114 @@ def _same_length(label: str, x: Sequence[float] | Array, y: Sequence[float] | Ar
     """Check that x and y have one length. Raises ValueError if they have not."""
     if np.ndim(x) != 1 or np.shape(x) != np.shape(y):
         raise ValueError(f"{label}: x has the shape {np.shape(x)}, y {np.shape(y)}; expected one length")
+
+
+FIRST_TURN_FROM = -315.0
+"""Lower end [deg] of the turn in which the first phase is plotted.
+
+The end lies between the phases of whole numbers of integrations.
+"""
+
+
+def phases(responses: Sequence[np.ndarray]) -> list[Array]:
+    """Return phases [deg] of complex responses (k,) without jumps of 360 degrees.
+
+    The first phase begins between -315 and 45 degrees. The others are shifted by whole turns until they agree with the
+    first at high frequencies, where all loops behave alike.
+    """
+    angles = [np.angle(response) for response in responses]
+    lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag
+    first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
+    first = first - 360 * np.floor((first[0] - FIRST_TURN_FROM) / 360)
+    high = slice(len(first) // 2, None)
+    return [first, *(phase + 360 * np.round(np.median(first[high] - phase[high]) / 360) for phase in others)]
+
+
+# viridis (van der Walt & Smith, 2015), every 28th or so of its colours: even in lightness, for any colour vision.
+VIRIDIS = (
+    "#440154",
+    "#482878",
+    "#3e4989",
+    "#31688e",
+    "#26828e",
+    "#1f9e89",
+    "#35b779",
+    "#6ece58",
+    "#b5de2b",
+    "#fde725",
+)
+
+MORE = VIRIDIS[::-1]
+"""Colours from little to much. Little is as light as the cells that rest, which lie beside it."""
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """Colours of the drawn numbers from `low` to `high`.
+
+    With `steps`, each colour fills an equal part of the range; otherwise the colours blend into each other. `ticks`
+    (drawn numbers) and `texts` are written at the colour bar; without them the renderer chooses.
+    """
+
+    low: float
+    high: float
+    colours: tuple[str, ...]
+    steps: bool = False
+    ticks: tuple[float, ...] = ()
+    texts: tuple[str, ...] = ()
+
+    @property
+    def stops(self) -> list[tuple[float, str]]:
+        """Return the colours with their places between 0 and 1; a step has two places."""
+        count = len(self.colours)
+        if self.steps:
+            return [((i + end) / count, colour) for i, colour in enumerate(self.colours) for end in (0, 1)]
+        return [(i / (count - 1), colour) for i, colour in enumerate(self.colours)]
+
+
+def painted(field: Coloured) -> Array:
+    """Return the numbers of a map or cloud to which the colours belong.
+
+    These are z, or on a logarithmic scale log10(z), with z raised to the lower limit.
+    """
+    if not field.log:
+        return field.z
+    low, _ = _limits(field)
+    return np.log10(np.maximum(field.z, low))
+
+
+def scale(field: Coloured) -> ColourScale:
+    """Return the colour scale of a map or cloud."""
+    if field.colours:
+        count = len(field.colours)
+        ticks = tuple(range(0, count, -(-count // 12)))
+        return ColourScale(-0.5, count - 0.5, field.colours, True, ticks, tuple(map(str, ticks)))
+    low, high = _limits(field)
+    if not field.log:
+        return ColourScale(low, high, field.ramp or MORE)
+    low, high = math.log10(low), math.log10(high)
+    step = max(1, math.ceil((high - low) / 6))
+    decades = range(math.ceil(low + 0.3), math.floor(high + 1e-9) + 1, step)
+    # `painted` raises lower numbers to the limit
+    texts = (f"≤ {10.0**low:.2g}", *(f"{10.0**decade:g}" for decade in decades))
+    return ColourScale(low, high, field.ramp or MORE, False, (low, *decades), texts)
+
+
+def ramp(count: int) -> tuple[str, ...]:
+    """Return `count` colours evenly along viridis, without its darkest and lightest parts."""
+    table = np.array([[int(colour[i : i + 2], 16) for i in (1, 3, 5)] for colour in VIRIDIS])
+    places = np.linspace(0.5, len(VIRIDIS) - 1.2, count)
+    mixed = [np.interp(places, np.arange(len(VIRIDIS)), table[:, i]).round().astype(int) for i in range(3)]
+    return tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in zip(*mixed, strict=True))
+
+
+def _limits(field: Coloured) -> tuple[float, float]:
+    """Return the range of the colours [unit], which is never empty."""
+    if field.limits is not None:
+        low, high = field.limits
+    else:
+        finite = field.z[np.isfinite(field.z)]
+        low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    if high > low:
+        return low, high
+    return (low / 2, high * 2) if field.log else (low - (abs(low) / 2 or 0.5), high + (abs(high) / 2 or 0.5))

@@ -1,4 +1,10 @@
-"""Draw figures on a page: interactive HTML through plotly, readable without a network.
+"""Draw figures, and maps, with plotly.
+
+Compress the contents of a page, which a browser unpacks.
+
+Draw maps and clouds on a page, colour bars, and legend and note beneath every figure.
+
+Draw figures on a page: interactive HTML through plotly, readable without a network.
 
 A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`). Their elements are
 named after the figure, so that equal figures give equal bytes. Both are compressed; `page.js` unpacks and draws them in
@@ -8,7 +14,9 @@ the browser.
 from __future__ import annotations
 
 import base64
+import gzip
 import html
+import json
 import math
 import textwrap
 from collections.abc import Sequence
@@ -20,11 +28,206 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-from friso.shown.drawing import plotly_maps
-from friso.shown.drawing.drawable import SIDES, drawable, log_ticks, second_ticks, with_fewer_cells, word_ticks
-from friso.shown.drawing.figure import Area, Arrow, Axis, Band, Figure, Lettering, Markers, Panel, Series, Told
-from friso.shown.drawing.packing import packed, packed_json
-from friso.shown.drawing.palette import DARK, GREY, INK
+from friso.shown.drawing.drawable import (
+    SIDES,
+    LegendEntry,
+    cell_edges,
+    drawable,
+    legend_entries,
+    log_ticks,
+    second_ticks,
+    with_fewer_cells,
+    word_ticks,
+)
+from friso.shown.drawing.figure import (
+    DARK,
+    GREY,
+    INK,
+    Area,
+    Array,
+    Arrow,
+    Axis,
+    Band,
+    Coloured,
+    ColourScale,
+    Figure,
+    Lettering,
+    Map,
+    Markers,
+    Panel,
+    Series,
+    Told,
+    painted,
+    scale,
+)
+
+GZIP_LEVEL = 6
+"""Level of gzip. The highest level takes half as long again and saves two thousandths of the size."""
+
+
+def packed(text: str) -> str:
+    """Return a text compressed by gzip, in base64; equal texts give equal bytes."""
+    return base64.b64encode(gzip.compress(text.encode(), GZIP_LEVEL, mtime=0)).decode("ascii")
+
+
+def packed_json(value: object) -> str:
+    """Return a value as packed JSON. Raises ValueError for a number that is not finite."""
+    return packed(json.dumps(value, separators=(",", ":"), allow_nan=False))
+
+
+BAR_WIDTH_SHARE = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
+LINE_HEIGHT = 17  # [px] one line of the note
+KEY_ROW, KEY_SPACE = 19, 11  # [px] a row of a legend, and what lies about the one beneath a figure
+KEY_LETTER, KEY_MARK = 6.6, 45  # [px] one letter of a legend, and the sign of an entry
+LETTER_WIDTH = 6.1  # [px] of the note
+TOLD_LETTERS = 30  # letters in a line of what is told under the mouse, for which a telephone has room
+
+DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
+SYMBOLS: dict[str, dict[str, Any]] = {
+    "circle": {"symbol": "circle", "size": 9},
+    "triangle": {"symbol": "triangle-down", "size": 9},
+    "cross": {"symbol": "x-thin-open", "size": 9},
+    "target": {"symbol": "circle", "size": 12, "line": {"color": "white", "width": 2}},
+    "patch": {"symbol": "square", "size": 9, "line": {"color": GREY, "width": 1}},
+}
+
+
+def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
+    """Return the indices of the panels with a colour bar, and whether one bar serves all panels."""
+    bars = {
+        number: (scale(field), field.label)
+        for number, panel in enumerate(panels)
+        for field in panel.coloured
+        if field.has_numbers
+    }
+    shared = len(set(bars.values())) == 1 and all(panel.coloured for panel in panels)
+    return ({min(bars)} if shared else set(bars)), shared
+
+
+def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | None) -> list[Any]:
+    """Return the traces of a panel's maps and clouds.
+
+    Numbers with their colour bar come first, then categories.
+    """
+    traces: list[Any] = []
+    for field in panel.coloured:
+        colouring = _colouring(scale(field), bar if field.has_numbers else None, field.label)
+        traces.append(_layer(panel, field, painted(field), colouring, place))
+        if field.codes is not None and field.categories:
+            categories = ColourScale(
+                -0.5, len(field.categories) - 0.5, tuple(category.colour for category in field.categories), steps=True
+            )
+            traces.append(_layer(panel, field, field.codes, _colouring(categories, None, ""), place))
+    return traces
+
+
+def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, Any], place: dict[str, Any]) -> Any:
+    """Return the trace of a map's or cloud's numbers or categories; cells without one are empty."""
+    where = f"{_hover('x', panel.x)}, {_hover('y', panel.y)}"
+    if values is not field.codes:
+        where += f": %{{customdata:.4~g}} {html.escape(field.unit)}"
+    text = {"hovertemplate": f"{where}{told_text(field.told)}<extra></extra>", "showlegend": False}
+    if isinstance(field, Map):
+        x, y = _cells(field.x, panel.x), _cells(field.y, panel.y)
+        numbers_shown = None if values is field.codes else field.z
+        cells = {"type": "heatmap", "x": x, "y": y, "z": values, "customdata": numbers_shown}
+        cells["hoverongaps"] = False  # numbers and categories have cells of their own
+        return {**cells, **colouring, **text, **told_each(field.told), **place}
+    numbers_shown = np.isfinite(values)
+    names = {"zmin": "cmin", "zmax": "cmax"}
+    marker = {names.get(name, name): value for name, value in colouring.items()}
+    marker |= {"color": values[numbers_shown], "size": 6, "line": {"color": GREY, "width": 0.4}}
+    numbers = {"x": field.x[numbers_shown], "y": field.y[numbers_shown], "customdata": field.z[numbers_shown]}
+    numbers |= told_each(field.told and field.told.of(numbers_shown))
+    return {"type": "scatter", "mode": "markers", "marker": marker, **numbers, **text, **place}
+
+
+def told_text(told: Told | None) -> str:
+    """Return what is told of a point under the mouse, on lines of its own; "" if nothing is."""
+    if told is None:
+        return ""
+    lines = textwrap.wrap(told.text, TOLD_LETTERS, break_long_words=False, break_on_hyphens=False)
+    return "%{text}".join("".join(f"<br>{html.escape(line)}" for line in lines).rsplit("{}", 1))
+
+
+def told_each(told: Told | None) -> dict[str, Any]:
+    """Return the texts of points as plotly takes them."""
+    return {} if told is None else {"text": told.each, "hoverlabel": {"align": "left"}}
+
+
+def _cells(centres: Array, axis: Axis) -> Array:
+    """Return the centres of cells along an axis, or the edges of a single cell, for plotly.
+
+    Plotly itself finds the edges between centres, but not those of a single cell.
+    """
+    return cell_edges(centres, log=axis.log) if len(centres) == 1 else centres
+
+
+def _hover(name: str, axis: Axis) -> str:
+    """Return the text of a coordinate while the mouse is over a cell."""
+    return f"%{{{name}}}" if axis.words else f"%{{{name}:.5~g}} {html.escape(axis.unit)}"
+
+
+def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str) -> dict[str, Any]:
+    """Return the colours of a trace as plotly takes them, with its colour bar if it has one."""
+    colouring = {
+        "colorscale": colour_scale.stops,
+        "zmin": colour_scale.low,
+        "zmax": colour_scale.high,
+        "showscale": bar is not None,
+    }
+    if bar is None:
+        return colouring
+    ticks = (
+        {"tickmode": "array", "tickvals": colour_scale.ticks, "ticktext": colour_scale.texts}
+        if colour_scale.ticks
+        else {}
+    )
+    title = {"text": html.escape(label), "side": "right"}
+    return colouring | {"colorbar": {"title": title, "thickness": 14, "outlinewidth": 0, **ticks, **bar}}
+
+
+def key_traces(figure: Figure) -> list[dict[str, Any]]:
+    """Return traces without points, which fill the legend of a figure."""
+
+    def style(item: LegendEntry) -> dict[str, Any]:
+        """Return a line, a point or a square."""
+        if isinstance(item, Series):
+            return {"mode": "lines", "line": {"color": item.colour, "width": item.width, "dash": DASHES[item.dash]}}
+        square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
+        sign = SYMBOLS[item.symbol] if isinstance(item, Markers) else square
+        return {"mode": "markers", "marker": sign | {"color": item.colour}}
+
+    unseen = {"type": "scatter", "x": [None], "y": [None]}
+    return [{**unseen, "name": html.escape(item.label), **style(item)} for item in legend_entries(figure)]
+
+
+def key_rows(labels: Sequence[str], width: int) -> int:
+    """Count the rows of a legend of some width [px]; columns are as wide as the longest label."""
+    entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
+    return math.ceil(len(labels) / max(1, int(width / entry)))
+
+
+def map_footer(figure: Figure, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
+    """Return the area below the panels: its height [px], its legend, and its note.
+
+    The note is broken at a width [px] and given as annotations.
+    """
+    lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(width / LETTER_WIDTH))]
+    note = LINE_HEIGHT * len(lines) + 6 if lines else 0
+    below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}
+    text = "<br>".join(html.escape(line) for line in lines)
+    font = {"size": 11, "color": INK}
+    annotations = [{"text": text, "align": "left", "showarrow": False, "font": font, **below}] if lines else []
+    labels = [item.label for item in legend_entries(figure)]
+    if not labels:
+        return note, {}, annotations
+    key = KEY_SPACE + KEY_ROW * key_rows(labels, width)
+    for annotation in annotations:
+        annotation["yshift"] = -key
+    style = {"orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "itemclick": False}
+    return note + key, {"legend": style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, annotations
+
 
 WIDE_PAGE_WIDTH, NARROW_PAGE_WIDTH = (
     540,
@@ -138,7 +341,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     headers = [TITLE_HEIGHT * max(map(len, row)) + ROW_SPACE for row in rows]
     footer = FOOTER_HEIGHT + max(_upright(panel.x, width // prepared.columns) for panel in prepared.panels)
     height = sum(headers) + (plot + footer) * len(rows)
-    below, legend, note = plotly_maps.footer(prepared, width)
+    below, legend, note = map_footer(prepared, width)
     top_margin = TOP_MARGIN + FOOTER_HEIGHT * any(panel.x.second is not None for panel in prepared.panels)
     right_margin = FOOTER_HEIGHT if any(panel.y.second is not None for panel in prepared.panels) else RIGHT_MARGIN
     layout: dict[str, Any] = {
@@ -152,7 +355,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     }
     traces: list[Any] = []
     links: dict[Axis, str] = {}
-    with_bar, shared_bar = plotly_maps.bar_panels(prepared.panels)
+    with_bar, shared_bar = bar_panels(prepared.panels)
     for number, panel in enumerate(prepared.panels):
         above = number // prepared.columns
         top = height - sum(headers[: above + 1]) - (plot + footer) * above
@@ -166,13 +369,13 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
                 "len": 1 - (footer + headers[0]) / height,
             }
         elif number in with_bar:
-            x_domain = (x_domain[0], x_domain[1] - plotly_maps.BAR_WIDTH_SHARE)
+            x_domain = (x_domain[0], x_domain[1] - BAR_WIDTH_SHARE)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, links)
         if heads[number]:
             layout["annotations"].append(_title(heads[number], x_domain[0], y_domain[1]))
         traces += _traces(panel, number, bar)
-    return {"data": traces + plotly_maps.key_traces(prepared), "layout": layout}
+    return {"data": traces + key_traces(prepared), "layout": layout}
 
 
 def _upright(axis: Axis, width: int) -> int:
@@ -338,7 +541,7 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     ]  # an axis without any trace is not drawn
     return [
         *seconds,
-        *plotly_maps.coloured_traces(panel, place, bar),
+        *coloured_traces(panel, place, bar),
         *(_filled(area, place) for area in panel.areas),
         *(_area(band, unnamed) for band in panel.bands),
         *(_line(line, panel, unnamed) for line in panel.series),
@@ -372,23 +575,23 @@ def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
     """Return the trace of a line, on the axes in `place`."""
-    style = {"color": line.colour, "width": line.width, "dash": plotly_maps.DASHES[line.dash], "simplify": False}
+    style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
     drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
     return {**drawn, **_text(line.label, panel), **place}
 
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
     """Return the trace of single points, on the axes in `place`."""
-    style = {"color": marker.colour, **plotly_maps.SYMBOLS[marker.symbol]}
+    style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
     drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
-    return {**drawn, **_text(marker.label, panel, marker.told), **plotly_maps.told_each(marker.told), **place}
+    return {**drawn, **_text(marker.label, panel, marker.told), **told_each(marker.told), **place}
 
 
 def _text(label: str, panel: Panel, told: Told | None = None) -> dict[str, Any]:
     """Return name and hover text of a line; plotly reads both as HTML."""
     x_unit, y_unit = html.escape(panel.x.unit), html.escape(panel.y.unit)
     hover = f"%{{x:.5~g}} {x_unit}, %{{y:.5~g}} {y_unit}"
-    return {"name": html.escape(label), "hovertemplate": hover + plotly_maps.told_text(told)}
+    return {"name": html.escape(label), "hovertemplate": hover + told_text(told)}
 
 
 def _suffix(number: int) -> str:

@@ -10,8 +10,23 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from friso.shown.drawing.figure import Array, Axis, Category, Cloud, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, VERMILLION
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    LIGHT,
+    ORANGE,
+    VERMILLION,
+    Array,
+    Axis,
+    Category,
+    Cloud,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
 from friso_thesis.studies.guideline.compute import Fit, Guideline
 from friso_thesis.studies.guideline.edges import FLIP, FOLD, JUMP, LOST
 from friso_thesis.studies.guideline.sweeps import Sweep

@@ -12,7 +12,7 @@ import numpy as np
 from friso.evidence import findings_on_file, value
 from friso.frequency.bode import COMFORTABLE_MARGIN
 from friso.quantities import percent
-from friso.shown.files import Content, pictures
+from friso.shown.blocks import Content, pictures
 from friso.shown.pages import environment
 from friso.version import VERSION
 from friso_thesis.questions.guideline.figures import guideline_figures

@@ -12,8 +12,7 @@ from friso.progress import Progress, silent
 from friso_thesis.studies.guideline.compute import FIT_SAMPLES
 
 if TYPE_CHECKING:
-    from friso.shown.blocks import AnswerBlock
-    from friso.shown.files import Files
+    from friso.shown.blocks import AnswerBlock, Files
 
 
 class GuidelineAnswer(Answer):

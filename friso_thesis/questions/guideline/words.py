@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from friso.quantities import percent
-from friso.shown.drawing.prefixes import listed
+from friso.shown.text import listed
 from friso_thesis.studies.guideline.compute import Guideline
 from friso_thesis.studies.guideline.groups import GROUPS
 from friso_thesis.studies.guideline.laws import REFERENCE, FittedLaw

@@ -6,21 +6,19 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from friso.shown.documents import plain_json
-from friso.shown.drawing.prefixes import listed
+from friso.shown.text import listed
 from friso.version import VERSION
 from friso_thesis.questions.reproduce.words import laws_document, numbers
-from friso_thesis.studies.thesis.claims import COUNT, CYCLE
+from friso_thesis.studies.thesis.claims import COUNT, CYCLE, ClaimJudgement, Part
 from friso_thesis.studies.thesis.reading import CONVENTIONS
-from friso_thesis.studies.thesis.space import DRAW_SEED, OPEN
+from friso_thesis.studies.thesis.space import DRAW_SEED, OPEN, OpenValue
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
     from friso.shares import Share
-    from friso_thesis.studies.thesis.claims import ClaimJudgement, Part
     from friso_thesis.studies.thesis.laws import ConclusionsByLaw
     from friso_thesis.studies.thesis.plausible import ClaimInSpace, Plausible
     from friso_thesis.studies.thesis.reproduce import Reproduction
-    from friso_thesis.studies.thesis.space import OpenValue
     from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
 

@@ -15,10 +15,7 @@ from friso.questions.boundary.figures import DASHES
 from friso.questions.check.figures import SHARES
 from friso.questions.map.figures import map_panel
 from friso.questions.map.findings import statement
-from friso.shown.drawing.colours import ramp
-from friso.shown.drawing.figure import Axis, Figure, Limit, Markers, Panel, Series
-from friso.shown.drawing.palette import GREY, INK, VERMILLION
-from friso.shown.drawing.phases import phases
+from friso.shown.drawing.figure import GREY, INK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series, phases, ramp
 from friso_thesis.questions.reproduce.rig_figures import rig_figures
 from friso_thesis.studies.thesis.experiments import BUILT
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE

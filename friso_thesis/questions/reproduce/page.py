@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from friso.shown.blocks import Content, pictures
 from friso.shown.drawing import plotly_renderer
-from friso.shown.drawing.figure import Figure
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, MAUVE, ORANGE, PINK, SKY, VERMILLION
-from friso.shown.files import Content, pictures
+from friso.shown.drawing.figure import BLUE, GREEN, GREY, MAUVE, ORANGE, PINK, SKY, VERMILLION, Figure
 from friso.shown.pages import Report, print_image
 from friso.version import VERSION
 from friso_thesis.questions.reproduce import words

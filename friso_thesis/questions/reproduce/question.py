@@ -15,8 +15,7 @@ from friso_thesis.studies.thesis.plausible import DRAW_COUNT
 from friso_thesis.studies.thesis.reproduce import MAP_POINTS
 
 if TYPE_CHECKING:
-    from friso.shown.blocks import AnswerBlock
-    from friso.shown.files import Files
+    from friso.shown.blocks import AnswerBlock, Files
     from friso_thesis.studies.thesis.laws import ConclusionsByLaw
 
 

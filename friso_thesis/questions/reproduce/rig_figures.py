@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.identification.settings import experiment_settings
 from friso.questions.map.words import QUIET
-from friso.shown.drawing.figure import Axis, Figure, Limit, Map, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, VERMILLION
-from friso.shown.drawing.phases import phases
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    VERMILLION,
+    Axis,
+    Figure,
+    Limit,
+    Map,
+    Panel,
+    Series,
+    phases,
+)
 from friso_thesis.studies.thesis.experiments import (
     BUILT,
     GRID,
@@ -24,10 +36,8 @@ from friso_thesis.studies.thesis.experiments import (
     STANDSTILL,
     STATIC_RANGE,
     STEPPED,
+    Experiments,
 )
-
-if TYPE_CHECKING:
-    from friso_thesis.studies.thesis.experiments import Experiments
 
 _TIME = Axis("Time", "s")
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)

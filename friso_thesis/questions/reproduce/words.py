@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 from friso.quantities import percent
 from friso.questions.check.laws import SHOWN
-from friso.shown.drawing.prefixes import listed
-from friso_thesis.studies.thesis.plausible import MAP_POINTS
+from friso.shown.text import listed
+from friso_thesis.studies.thesis.plausible import MAP_POINTS, Plausible
 from friso_thesis.studies.thesis.space import OPEN, draw_name
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
 if TYPE_CHECKING:
     from friso_thesis.studies.thesis.claims import Part
     from friso_thesis.studies.thesis.laws import ConclusionByLaw, ConclusionsByLaw
-    from friso_thesis.studies.thesis.plausible import Plausible
-    from friso_thesis.studies.thesis.verdicts import ClaimVerdict
 
 TITLE = "Conclusions of the thesis under each friction law"
 

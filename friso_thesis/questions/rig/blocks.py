@@ -10,8 +10,7 @@ import numpy as np
 
 from friso.axis import LINEAR, unit_shown
 from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
-from friso.shown.blocks import AnswerBlock
-from friso.shown.files import Content
+from friso.shown.blocks import AnswerBlock, Content
 from friso.stage import Stage
 from friso_thesis.questions.rig.words import rig_document, rig_figures, sentences
 from friso_thesis.studies.rig.outcome import Outcome, RigLog

@@ -25,8 +25,7 @@ from friso.identification.readings.course import Course
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, INK
+from friso.shown.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, Panel, Series
 from friso.stage import Stage
 
 SETTLED_SHARES = np.linspace(0.1, 0.7, 7)

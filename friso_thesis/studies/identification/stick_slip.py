@@ -37,9 +37,8 @@ from friso.identification.readings.slips import Slip, slips
 from friso.identification.settings import experiment_settings
 from friso.intervals import NORMAL_COVERAGE
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import GREY, INK
-from friso.shown.drawing.prefixes import range_with_unit
+from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
+from friso.shown.text import range_with_unit
 from friso.stage import Stage
 
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"

@@ -15,9 +15,8 @@ from scipy.signal import welch
 from friso.engine.arrays import ArrayColumns
 from friso.progress import Progress
 from friso.quantities import percent
-from friso.shown.drawing.figure import Axis, Figure, Limit, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, ORANGE, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import BLUE, GREEN, GREY, ORANGE, VERMILLION, Axis, Figure, Limit, Panel, Series
+from friso.shown.text import with_unit
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.virtual_rig.run import RecordedRuns, as_built_keys, run

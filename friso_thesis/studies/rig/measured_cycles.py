@@ -19,9 +19,8 @@ from friso.equations.rail import friction_factors
 from friso.progress import Progress
 from friso.quantities import percent
 from friso.shares import Share, share
-from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Map, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, INK, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
+from friso.shown.text import with_unit
 from friso.stage import Stage
 from friso.virtual_rig.task import MoveTask
 from friso_thesis.studies.rig.experiments import RigExperiment

@@ -10,10 +10,8 @@ import numpy as np
 from friso.hunting.criteria import FAILED, PEAK_CRITERION
 from friso.progress import Progress
 from friso.questions.map.words import QUIET
-from friso.shown.drawing.colours import ramp
-from friso.shown.drawing.figure import Axis, Figure, Map, Panel, Series
-from friso.shown.drawing.palette import INK
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import INK, Axis, Figure, Map, Panel, Series, ramp
+from friso.shown.text import with_unit
 from friso.stage import Stage
 from friso_thesis.studies.rig.experiments import RigExperiment
 from friso_thesis.studies.rig.experiments.hunting import CRITERIA, runs_document, share_document

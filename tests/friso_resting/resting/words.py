@@ -1,7 +1,7 @@
 """The answer in words and numbers, and what the template of its page names."""
 
 from friso.shown.blocks import AnswerBlock
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.text import with_unit
 from friso_resting.resting.question import RestingAnswer
 
 

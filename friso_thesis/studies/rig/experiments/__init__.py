@@ -25,7 +25,7 @@ class RigExperiment:
 
     def sentences(self, outcome: Outcome) -> list[str]:
         """Say what the outcome means: by default, name the logs with their durations."""
-        from friso.shown.drawing.prefixes import with_unit
+        from friso.shown.text import with_unit
 
         logs = [f"{log.name}, {with_unit(len(log.log.time) * log.interval, 's')}" for log in outcome.logs]
         return [f"Logs of {outcome.experiment}: {'; '.join(logs)}."]

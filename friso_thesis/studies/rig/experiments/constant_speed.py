@@ -18,9 +18,8 @@ from friso.identification.readings.friction_position import FrictionPosition, fr
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.progress import Progress
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, ORANGE, PINK, VERMILLION
-from friso.shown.drawing.prefixes import listed, with_unit
+from friso.shown.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.shown.text import listed, with_unit
 from friso.stage import Stage
 from friso.stage.tables import moving_mass
 from friso.virtual_rig.run import run

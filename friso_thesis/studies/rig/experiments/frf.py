@@ -16,10 +16,24 @@ from friso.identification.response.closed_loop import crossovers
 from friso.identification.response.mass_line import mass_lines
 from friso.identification.response.response import FrequencyResponse
 from friso.progress import Progress
-from friso.shown.drawing.figure import Array, Axis, Figure, Limit, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, INK, LIGHT, ORANGE, PINK, SKY, VERMILLION
-from friso.shown.drawing.phases import phases
-from friso.shown.drawing.prefixes import listed, pretty, with_unit
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    INK,
+    LIGHT,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Array,
+    Axis,
+    Figure,
+    Limit,
+    Panel,
+    Series,
+    phases,
+)
+from friso.shown.text import listed, pretty, with_unit
 from friso.stage import Stage
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import standing

@@ -21,9 +21,23 @@ from friso.progress import Progress, together
 from friso.quantities import percent
 from friso.shares import Share
 from friso.shown.documents import entries
-from friso.shown.drawing.figure import Axis, Band, Figure, Limit, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, GREY, INK, ORANGE, PINK, SKY, VERMILLION
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Axis,
+    Band,
+    Figure,
+    Limit,
+    Panel,
+    Series,
+)
+from friso.shown.text import with_unit
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
 from friso.virtual_rig.task import MoveTask

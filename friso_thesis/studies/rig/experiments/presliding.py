@@ -22,9 +22,8 @@ from friso.identification.experiments.presliding import (
 from friso.identification.readings.at_bearing import machine_between
 from friso.progress import Progress
 from friso.quantities import percent
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE
-from friso.shown.drawing.prefixes import with_unit
+from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
+from friso.shown.text import with_unit
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.tables import friction_law

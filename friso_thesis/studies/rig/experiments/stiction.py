@@ -15,9 +15,8 @@ from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.rail import friction_factors
 from friso.errors import InputError
 from friso.progress import Progress
-from friso.shown.drawing.figure import Array, Axis, Band, Figure, Markers, Panel, Series
-from friso.shown.drawing.palette import BLUE, GREEN, INK, VERMILLION
-from friso.shown.drawing.prefixes import range_with_unit, with_unit
+from friso.shown.drawing.figure import BLUE, GREEN, INK, VERMILLION, Array, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.text import range_with_unit, with_unit
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import legs

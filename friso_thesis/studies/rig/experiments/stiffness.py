@@ -12,9 +12,8 @@ import numpy as np
 
 from friso.equations.continuous import slow_gains
 from friso.progress import Progress
-from friso.shown.drawing.figure import Axis, Figure, Panel, Series
-from friso.shown.drawing.palette import BLUE, LIGHT, VERMILLION
-from friso.shown.drawing.prefixes import range_with_unit, with_unit
+from friso.shown.drawing.figure import BLUE, LIGHT, VERMILLION, Axis, Figure, Panel, Series
+from friso.shown.text import range_with_unit, with_unit
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.virtual_rig.run import run

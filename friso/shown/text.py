@@ -1,19 +1,41 @@
-"""Write numbers for readers: with the SI prefix that suits them, as ranges, in percent."""
+"""Numbers, keys, loops and machines in words.
+
+Write numbers for readers: with the SI prefix that suits them, as ranges, in percent.
+
+Write keys of a stage file in words.
+
+Say that a loop is unstable, which matters more than anything that friction does.
+
+Say by how much machines drawn at random differ from each other.
+
+Choose the sentences of an answer from a table of conditions and templates.
+
+A table has one row of alternatives for every sentence of an answer. An alternative is a condition with a template; the
+first one whose condition holds is said. Names in braces stand for numbers and words, which are computed when said.
+
+Say on which unknown values an answer rests.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
 from friso.axis import axis_shown, unit_shown
 from friso.quantities import NOTHING, percent
 from friso.shown.drawing.figure import Array
+from friso.stage import Stage
+from friso.stage.contacts import followed
+from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
+from friso.stage.tables import friction_laws
 
 if TYPE_CHECKING:
+    from friso.hunting import LoopState
     from friso.shares import Share
+
 
 # Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
 # times beyond seconds and slow frequencies are read best as they are.
@@ -186,3 +208,136 @@ def _significant(number: float, digits: int) -> str:
         return "0"
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)) + 1e-12))
     return f"{number:.{decimals}f}"
+
+
+_QUANTITIES = {
+    FORCE_LIMIT: "Force limit",
+    "joint.limiter_damping": "Limiter damping",
+    "joint.limiter_stiffness": "Limiter stiffness",
+    "joint.locked": "Joint",
+    "masses.cart": "Cart mass",
+    "masses.stage": "Stage mass",
+}
+
+
+def key_in_words(key: str) -> str:
+    """Return a key in words: "joint.stroke" is "Joint stroke"; a free name stays as it is."""
+    of_laws = {f"friction.{key}": word for law in friction_laws().values() for key, word in law.words.items()}
+    quantities = _QUANTITIES | of_laws | CONTROLLERS.words
+    if key in quantities:
+        return quantities[key]
+    for table in (f"{CONTROLLER}.", "friction.", "motion."):
+        key = key.removeprefix(table)
+    words = key.replace("_", " ").replace(".", " ")
+    return words[:1].upper() + words[1:]
+
+
+UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with which the loop is unstable"
+"""Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
+
+
+def lost_as_built(stage: Stage) -> tuple[LoopState, ...]:
+    """Return the states in which samples and delays of the drive make the loop of a stage unstable."""
+    if not any(key.startswith("drive.") for key in stage.flat()):
+        return ()
+    from friso.frequency.bode import unstable_as_built  # 0.3 s to import
+
+    states: tuple[LoopState, LoopState] = ("sticks", "slides")
+    return tuple(state for state, lost in zip(states, unstable_as_built(stage.flat()), strict=True) if lost)
+
+
+def without_drive(stage: Stage) -> str:
+    """Write as a condition that an answer leaves out the drive, which makes the loop unstable; "" if it does not."""
+    lost = lost_as_built(stage)
+    return "Without the samples and delays of its drive, with which the loop is unstable: " if lost else ""
+
+
+def unstable_loop(states: tuple[LoopState, ...]) -> list[str]:
+    """Say in which states the loop of the stage as given is unstable; [] for a stable loop."""
+    return [f"The loop of the stage as its file gives it is {unstable_where(states)}."] if states else []
+
+
+def unstable_where(states: tuple[LoopState, ...]) -> str:
+    """Say in which states a loop is unstable, and what to do about it."""
+    where = listed([f"while the stage {state}" for state in states], "and")
+    return f"unstable {where}, whatever the friction: retune the controller (friso bode)"
+
+
+def after_loop(does: str, unstable: tuple[LoopState, ...], as_built: tuple[LoopState, ...]) -> str:
+    """Say in the fewest words that a loop is unstable, itself or with its drive, and what the stage `does` then.
+
+    A state is named if the loop is stable in the other one.
+    """
+    states, drive, then = (unstable, "", "; ") if unstable else (as_built, " with its delay", "; without: ")
+    if not states:
+        return does
+    where = "" if len(states) > 1 else f" while it {next(iter(states))}"
+    return f"unstable{drive}{where}{then if does else ''}{does}"
+
+
+def spread_sentences(from_file: Sequence[str], spreads: Mapping[str, float]) -> list[str]:
+    """Say which keys vary as the stage file says, and the default spreads [%] of others."""
+    sentences = [f"Uncertain as in the stage file: {', '.join(from_file)}."] if from_file else []
+    if spreads:
+        listed = ", ".join(f"{key} ±{spread:g} %" for key, spread in spreads.items())
+        sentences.append(f"Default spreads (95 % of the machines), as the stage file gives none: {listed}.")
+    return sentences
+
+
+Subject = TypeVar("Subject")
+Alternatives = Sequence[tuple[Callable[[Subject], object], str]]
+Words = Mapping[str, Callable[[Subject], str]]
+
+
+def say(subject: Subject, table: Sequence[Alternatives[Subject]], words: Words[Subject]) -> list[str]:
+    """Return the sentences of a table that hold for a subject, at most one per row, each with a capital letter."""
+    written = _Written(subject, words)
+    chosen = (next((text for holds, text in row if holds(subject)), "") for row in table)
+    sentences = (text.format_map(written) for text in chosen if text)
+    return [f"{sentence[:1].upper()}{sentence[1:]}" for sentence in sentences]
+
+
+def say_all(subject: Subject, rows: Alternatives[Subject], words: Words[Subject]) -> list[str]:
+    """Return every sentence of a list whose condition holds for a subject."""
+    return say(subject, [[row] for row in rows], words)
+
+
+def always(subject: object) -> bool:
+    """Hold for every subject, as the last alternative of a row."""
+    return True
+
+
+class _Written(dict[str, str], Generic[Subject]):
+    """Words of a subject by name, each written when it is first read."""
+
+    def __init__(self, subject: Subject, words: Words[Subject]) -> None:
+        super().__init__()
+        self._subject, self._words = subject, words
+
+    def __missing__(self, name: str) -> str:
+        self[name] = self._words[name](self._subject)
+        return self[name]
+
+
+def unknown_condition(stage: Stage | None, varied: Collection[str] = ()) -> str:
+    """Write the condition under which an answer holds, with a colon and a blank behind it.
+
+    The values are those that the stage file lists as unknown, or the centres of their ranges, except for the keys that
+    are `varied`; what follows one of these is said to do so. Returns "" if there are none.
+    """
+    unknown = [] if stage is None else [key for key in stage.unknown_keys if key not in varied]
+    if stage is None or not unknown:
+        return ""
+    flat, keys = stage.flat(), stage.numeric_keys()
+    values = {key: with_unit(flat[key], keys[key].unit) for key in unknown if key in keys and key in flat}
+    leads = followed(stage, dict.fromkeys(varied, 1.0))
+    texts = [f"{key} is {values.get(key, 'as written')}" for key in unknown if key not in leads]
+    for lead in dict.fromkeys(lead for lead, _ in leads.values()):
+        keys_of = [key for key in unknown if key in leads and leads[key][0] == lead]
+        texts.append(f"{listed(keys_of, 'and')} follow{'s' * (len(keys_of) == 1)} {lead}")
+    return f"If {listed(texts, 'and')}, which the stage file lists as unknown: "
+
+
+def if_so(stage: Stage) -> str:
+    """Return ", if so" for a stage with unknown values, to stand behind the name of a case; "" for another."""
+    return ", if so" if stage.assumed_keys else ""
