@@ -11,7 +11,7 @@ from typing import Any
 
 from friso.app.uploads import plain_name
 from friso.errors import InputError
-from friso.interface.schema import stage_schema
+from friso.interface.starting import stage_schema
 from friso.quantities import Number, Quantity
 from friso.stage import Stage, loads, numeric_keys
 

@@ -15,8 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from friso.cli.asking import Shown, ask, option_of
-from friso.interface.question import OF_THE_CALLER, Question
-from friso.interface.shared_options import meaning
+from friso.interface.question import OF_THE_CALLER, Question, meaning
 from friso.stage.arguments import KINDS, ArgumentKind, alternatives
 
 
