@@ -15,8 +15,7 @@ import typer
 from typer.core import TyperGroup
 
 import friso
-from friso.cli.app import command_line
-from friso.cli.command import COMMANDS
+from friso.cli.app import COMMANDS, command_line
 from friso.identification.doubt import DOUBTS
 from friso.interface.question import TOPICS
 from friso.settings import settings_classes

@@ -110,9 +110,9 @@ def unprinted() -> Iterator[None]:
 @pytest.fixture(scope="session", autouse=True)
 def unhurried() -> Iterator[None]:
     """Suppress lines of progress, so that what commands say does not depend on how long they take."""
-    from friso.cli import progress
+    from friso.cli import terminal
 
-    with patched({progress: {"LINE_INTERVAL": TIMEOUT_MAX}}):
+    with patched({terminal: {"LINE_INTERVAL": TIMEOUT_MAX}}):
         yield
 
 

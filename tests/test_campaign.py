@@ -13,7 +13,7 @@ from benchmarks.trust.arguments import CALLS, LINES
 from benchmarks.trust.campaign import failure, run_part
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.readers import READERS
-from friso.cli.command import COMMANDS as REGISTERED
+from friso.cli.app import COMMANDS as REGISTERED
 
 CASES = {
     "app": 25,

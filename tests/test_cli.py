@@ -15,9 +15,8 @@ from inside import friso_inside
 from patience import wait_until
 
 import friso
-from friso.cli.app import _failed
-from friso.cli.command import COMMANDS
-from friso.cli.progress import ProgressBar
+from friso.cli.app import COMMANDS, _failed
+from friso.cli.terminal import ProgressBar
 from friso.platform.system import LIBRARIES
 from friso.progress import WORK_CLOCK
 
@@ -84,7 +83,7 @@ def test_a_wait_is_told_where_no_terminal_shows_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The line appears even while nothing is reported."""
-    monkeypatch.setattr("friso.cli.progress.LINE_INTERVAL", 0.01)
+    monkeypatch.setattr("friso.cli.terminal.LINE_INTERVAL", 0.01)
     with ProgressBar("first") as bar:
         _until_told(capsys, "friso: first")
         bar(0, 12, "cells")

@@ -124,7 +124,7 @@ def test_every_key_has_an_entry_in_the_reference(of: str) -> None:
 
 
 def test_every_command_is_on_its_page() -> None:
-    from friso.cli.command import COMMANDS
+    from friso.cli.app import COMMANDS
 
     page = module("generate").commands_page()
     assert [name for name in COMMANDS if f"### friso {name}\n" not in page] == []

@@ -11,7 +11,7 @@ from inside import friso_inside
 from pages import Page
 from snapshots import Snapshots, alike, masked
 
-from friso.cli.command import COMMANDS
+from friso.cli.app import COMMANDS
 
 TESTS = Path(__file__).parent
 EXAMPLES = TESTS.parent / "examples"

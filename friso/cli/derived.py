@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
 from inspect import Parameter, Signature, getdoc
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Annotated, Any
 
 import typer
@@ -55,7 +55,7 @@ def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
     about = [values[name] for name in question.takes]
     apart = {*question.takes, *Shown.__dataclass_fields__}
     options = {name: value for name, value in values.items() if value is not None and name not in apart}
-    run = import_module(question.runner).run if question.runner else ask
+    run = resolve_name(question.runner) if question.runner else ask
     run(question, about, options, shown)
 
 

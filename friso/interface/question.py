@@ -213,7 +213,7 @@ class Question:
     """Placeholder of a parameter's value in the help, if the usual placeholder says too little."""
 
     runner: str = ""
-    """Module whose function `run` replaces the usual command, which only shows the answer."""
+    """Place of a function, "module:name", that replaces the usual command, which only shows the answer."""
 
     def __post_init__(self) -> None:
         """Check the topic, and the place in the list of commands.

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Protocol
 
-from friso.cli.common import say
+from friso.cli.terminal import say
 from friso.platform.interrupts import hold_interrupts
 
 

@@ -22,7 +22,7 @@ from rig_evidence import cycles as rail_cycles
 from snapshots import Snapshots
 
 import friso
-from friso.cli.command import COMMANDS
+from friso.cli.app import COMMANDS
 from friso.equations.motion import size
 from friso.hunting import find_margin
 from friso.interface.output_folder import UNFINISHED

@@ -12,5 +12,5 @@ QUESTION = Question(
     details=True,
     files=("design.toml", "worst.toml", "design-not-verified.toml"),
     answers_interrupted=True,
-    runner="friso.cli.runs.design",
+    runner="friso.cli.runs:run_design",
 )

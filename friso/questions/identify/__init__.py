@@ -12,5 +12,5 @@ QUESTION = Question(
     folder="identified",
     details=True,
     choices=Choices.of_registry("Kinds of experiment (--as)", "friso.identification.kinds:KINDS"),
-    runner="friso.cli.runs.identify",
+    runner="friso.cli.runs:run_identify",
 )

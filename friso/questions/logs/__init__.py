@@ -19,5 +19,5 @@ QUESTION = Question(
     metavars={"logs": "LOG..."},
     during="reading",
     choices=Choices("Formats", listed_formats),
-    runner="friso.cli.runs.logs",
+    runner="friso.cli.runs:run_logs",
 )

@@ -12,5 +12,5 @@ QUESTION = Question(
     details=True,
     metavars={"stage": "STAGE.toml|STORE", "out": "STORE"},
     choices=Choices.of_registry("Metrics (--metric)", "friso.studies.metric:METRICS"),
-    runner="friso.cli.runs.map",
+    runner="friso.cli.runs:run_map",
 )

@@ -11,5 +11,5 @@ QUESTION = Question(
     folder="response",
     metavars={"stage": "STAGE.toml", "cell": "STORE"},
     details=True,
-    runner="friso.cli.runs.simulate",
+    runner="friso.cli.runs:run_simulate",
 )

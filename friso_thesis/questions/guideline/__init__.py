@@ -10,5 +10,5 @@ QUESTION = Question(
     takes=(),
     folder="guideline",
     answers_interrupted=True,
-    runner="friso_thesis.commands.guideline",
+    runner="friso_thesis.commands.guideline:run",
 )

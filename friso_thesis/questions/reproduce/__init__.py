@@ -10,5 +10,5 @@ QUESTION = Question(
     takes=("names",),
     metavars={"names": "[STUDY]..."},
     details=True,
-    runner="friso_thesis.commands.reproduce",
+    runner="friso_thesis.commands.reproduce:run",
 )

@@ -1,1 +1,0 @@
-"""Run commands that do more than show an answer: one module each, with the function `run`."""
