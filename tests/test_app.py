@@ -34,16 +34,13 @@ import uvicorn
 from patience import LIMIT, wait_until
 
 import friso
-from friso.app import connections, gate, questions, uploads
-from friso.app.connections import Connection
-from friso.app.gate import Access
-from friso.app.ghosts import ghosts_of
-from friso.app.kept import KEPT_ANSWERS, KeptAnswers
+from friso.app import machine, questions, serve, server
 from friso.app.machine import Machine, machine_on_page
+from friso.app.maps import ghosts_of
 from friso.app.questions import QUESTIONS
-from friso.app.serve import Server, listening
-from friso.app.server import application
-from friso.app.work import Work, Workshop
+from friso.app.serve import Connection, Server, listening
+from friso.app.server import Access, application
+from friso.app.work import KEPT_ANSWERS, KeptAnswers, Work, Workshop
 from friso.axis import LINEAR
 from friso.engine.settings import BuildSettings
 from friso.engine.side_by_side import Overtaken, ended_by, go_on, going_first, is_first
@@ -163,14 +160,14 @@ def is_closed(connection: socket.socket) -> bool:
 
 
 def test_half_sent_requests_keep_nobody_out_and_end_soon(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    held = half_sent(served.port, 3 * connections.MOST_CONNECTIONS)
+    held = half_sent(served.port, 3 * serve.MOST_CONNECTIONS)
     try:
         assert served.request("GET", "/begin")[0] == 200
-        assert all(map(is_closed, held[: 2 * connections.MOST_CONNECTIONS]))  # those that came first made way
+        assert all(map(is_closed, held[: 2 * serve.MOST_CONNECTIONS]))  # those that came first made way
     finally:
         for one in held:
             one.close()
-    monkeypatch.setattr(connections, "HEADERS_TIME", 0.05)
+    monkeypatch.setattr(serve, "HEADERS_TIME", 0.05)
     (one,) = half_sent(served.port, 1)
     with one:
         for _ in range(3):
@@ -189,8 +186,8 @@ def test_whoever_has_no_key_and_reads_slowly_is_cut_off_and_a_question_is_not(
         yield {"kind": "answer"}
 
     monkeypatch.setitem(QUESTIONS, "machine", long)  # type: ignore[arg-type]
-    monkeypatch.setattr(connections, "HEADERS_TIME", 1.0)
-    monkeypatch.setattr(connections, "SENDING_TIME", 1.0)
+    monkeypatch.setattr(serve, "HEADERS_TIME", 1.0)
+    monkeypatch.setattr(serve, "SENDING_TIME", 1.0)
     with ThreadPoolExecutor(1) as pool, contextlib.ExitStack() as opened:
         answer = pool.submit(served.ask, "machine", RIG)
         assert begun.wait(LIMIT)
@@ -251,12 +248,12 @@ def test_a_page_with_a_key_is_told_the_secret_again(served: Served) -> None:
 
 
 def test_that_there_is_no_room_for_connections_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
-    once, loop = connections.Once(), asyncio.new_event_loop()
+    once, loop = serve.Once(), asyncio.new_event_loop()
     logging.getLogger("friso.app").addFilter(once)
     try:
         for _ in range(100):
             context = {"message": "socket.accept()", "exception": OSError(errno.EMFILE, "Too many open files")}
-            connections.failed(loop, context)
+            serve.failed(loop, context)
     finally:
         logging.getLogger("friso.app").removeFilter(once)
         loop.close()
@@ -357,7 +354,7 @@ def test_a_token_for_once_is_taken_soon_or_never_and_the_browser_that_took_it_ma
     access = Access.at(8000)
     token = access.token_for_once()
     key = access.session_of(token)
-    monkeypatch.setattr(gate, "TOKEN_LIFE", 0.0)
+    monkeypatch.setattr(server, "TOKEN_LIFE", 0.0)
     assert (access.session_of(token, key), access.has(key)) == ("", True)  # out of its history
     assert access.session_of(access.token_for_once()) == ""
     assert (access.session_of(token), access.has(key)) == ("", False)  # however late another comes
@@ -455,13 +452,13 @@ def test_a_hostile_log_is_refused_and_the_server_goes_on(
 
 
 @pytest.fixture
-def kept() -> Iterator[uploads.Uploads]:
-    kept = uploads.Uploads()
+def kept() -> Iterator[machine.Uploads]:
+    kept = machine.Uploads()
     yield kept
     kept.remove()
 
 
-def test_logs_that_come_at_the_same_time_are_both_kept(kept: uploads.Uploads) -> None:
+def test_logs_that_come_at_the_same_time_are_both_kept(kept: machine.Uploads) -> None:
     async def half(text: bytes, other: asyncio.Event, own: asyncio.Event) -> AsyncIterator[bytes]:
         own.set()
         await other.wait()
@@ -479,9 +476,9 @@ async def one_byte() -> AsyncIterator[bytes]:
     yield b"1"
 
 
-def test_a_name_means_no_other_file_to_a_later_server(kept: uploads.Uploads) -> None:
+def test_a_name_means_no_other_file_to_a_later_server(kept: machine.Uploads) -> None:
     """A page that was left open would identify it in place of its own, or twice."""
-    first = uploads.Uploads()
+    first = machine.Uploads()
     names = [asyncio.run(server.keep("log.csv", one_byte())) for server in (first, kept)]
     first.remove()
     assert kept.path(names[1]).read_bytes() == b"1"
@@ -490,9 +487,9 @@ def test_a_name_means_no_other_file_to_a_later_server(kept: uploads.Uploads) -> 
 
 
 def test_a_log_that_is_let_go_gives_its_place_to_another(
-    kept: uploads.Uploads, monkeypatch: pytest.MonkeyPatch
+    kept: machine.Uploads, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(uploads, "MOST_FILES", 1)
+    monkeypatch.setattr(machine, "MOST_FILES", 1)
     name = asyncio.run(kept.keep("a.csv", one_byte()))
     with pytest.raises(InputError, match="Other files"):
         asyncio.run(kept.keep("b.csv", one_byte()))
@@ -511,12 +508,12 @@ def test_the_page_lets_logs_go_by_their_names_alone(served: Served) -> None:
 
 def test_what_a_killed_server_left_goes_with_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    left, alive = tmp_path / f"{uploads.PREFIX}left", uploads.Uploads()
+    left, alive = tmp_path / f"{machine.PREFIX}left", machine.Uploads()
     (left / "1").mkdir(parents=True)
     (left / "1" / "log.csv").write_bytes(b"1")
     for folder in (left, alive.folder):
         os.utime(folder, (0, 0))
-    second = uploads.Uploads()
+    second = machine.Uploads()
     assert {*tmp_path.iterdir()} == {alive.folder, second.folder}
     alive.remove()
     second.remove()
@@ -528,10 +525,10 @@ def test_a_log_that_is_too_large_or_finds_no_room_is_refused(served: Served, mon
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(uploads, "MOST_BYTES", 100)
+        patch.setattr(machine, "MOST_BYTES", 100)
         status, _, content = served.request("POST", "/logs/large.csv", 1000 * b"1")
         assert (status, "friso identify" in json.loads(content)["text"]) == (413, True)
-    monkeypatch.setattr(uploads.Uploads, "keep", full)
+    monkeypatch.setattr(machine.Uploads, "keep", full)
     status, _, content = served.request("POST", "/logs/x.csv", b"1")
     assert (status, "space" in json.loads(content)["text"]) == (507, True)
 

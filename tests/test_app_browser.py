@@ -19,7 +19,7 @@ from patience import LIMIT, wait_until
 from test_map_views import page_of, plain
 
 import friso
-from friso.app.frames import frame
+from friso.app.work import frame
 from friso.escapes import escaped
 from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing.figure import INK, Axis, Figure, Panel, Series

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import friso
+from friso.app.machine import Uploads
 from friso.app.questions import QUESTIONS as QUESTIONS_OF_PAGES
 from friso.app.questions import PageRequest, job_of
-from friso.app.uploads import Uploads
 from friso.app.work import Work
 from friso.cli.app import main
 from friso.identification.estimate import Estimate

@@ -132,7 +132,7 @@ import os
 from pathlib import Path
 from unittest.mock import patch
 
-from friso.app.uploads import plain_name
+from friso.app.machine import plain_name
 from friso.platform.files import content_of
 from friso.platform.files import read_private
 from friso.platform.system import cause_of, check_free, delete_file, name_new_file, name_refused, path_of, remove_folder

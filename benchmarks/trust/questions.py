@@ -13,10 +13,9 @@ from typing import Any
 from benchmarks.trust.arguments import TEXTS, Computed, assert_clear, nothing_computed
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.inputs import LEAVES, RIG, ready
-from friso.app.frames import frame
+from friso.app.machine import Uploads
 from friso.app.questions import COMMANDS, QUESTIONS, PageRequest, report
-from friso.app.uploads import Uploads
-from friso.app.work import Work
+from friso.app.work import Work, frame
 from friso.errors import InputError
 
 AXES = {"x": "controller.crossover=2 Hz..16 Hz", "y": "joint.stroke=0.1 mm..1 mm"}

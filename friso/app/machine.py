@@ -1,19 +1,122 @@
-"""Hold the machine that a page shows: a stage file, and the keys changed since."""
+"""The machine of the app: its stage file, uploads, lines of keys, and the archive of answers.
+
+Keep files that were dropped on the page in a folder of the server, while it runs.
+
+Hold the machine that a page shows: a stage file, and the keys changed since.
+
+Write the shell command and the line of Python that repeat what the page shows.
+
+Pack what a command would write into one archive, without writing any other file.
+"""
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Container, Mapping
+import re
+import secrets
+import zipfile
+from collections.abc import AsyncIterable, Container, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from friso.app.uploads import plain_name
+from friso.axis import speaking_of
 from friso.errors import InputError
+from friso.interface.answer import Answer
 from friso.interface.starting import stage_schema
-from friso.quantities import Number, Quantity
+from friso.platform.leftovers import temporary_folder
+from friso.platform.system import name_refused, remove_folder, shell_word
+from friso.quantities import Number, Quantity, as_toml
+from friso.shown.blocks import pictures
 from friso.stage import Stage, loads, numeric_keys
+
+MOST_BYTES = 64_000_000
+"""Largest size of a log in bytes."""
+
+MOST_FILES = 50
+"""Largest number of files kept."""
+
+
+PREFIX = "friso-uploads-"
+"""Prefix of the servers' folders."""
+
+
+class Uploads:
+    """Dropped files by the names under which the page knows them.
+
+    The page can name no file that was not dropped. Names are random, so a page left open cannot reach files of a later
+    server. Files that a killed server left behind are deleted by the next one.
+    """
+
+    def __init__(self) -> None:
+        self.held = ExitStack()
+        self.folder = self.held.enter_context(temporary_folder(PREFIX))
+        self.files: dict[str, Path] = {}
+
+    async def keep(self, name: str, chunks: AsyncIterable[bytes]) -> str:
+        """Store a file as it arrives, and return the name under which it is asked for.
+
+        Raises InputError for a file that is too large, or one file too many. Raises OSError if it cannot be written.
+        """
+        place = self.folder / secrets.token_hex(8)  # several may come at the same time
+        if sum(1 for entry in self.folder.iterdir() if entry.is_dir()) >= MOST_FILES:
+            most = f"at most {MOST_FILES}: Other files lets those go that are shown"
+            raise InputError("file", f"more than {MOST_FILES} files", most)
+        plain = plain_name(name, "log")
+        place.mkdir()
+        size = 0
+        try:
+            with open(place / plain, "wb") as file:
+                async for chunk in chunks:
+                    size += len(chunk)
+                    if size > MOST_BYTES:
+                        most = f"at most {MOST_BYTES / 1e6:g} MB; friso identify on the command line takes larger ones"
+                        raise InputError(plain, f"more than {MOST_BYTES / 1e6:g} MB", most)
+                    file.write(chunk)
+        except BaseException:
+            remove_folder(place)
+            raise
+        label = f"{place.name}/{plain}"
+        self.files[label] = place / plain
+        return label
+
+    def path(self, name: object) -> Path:
+        """Return where a dropped file is stored. Raises InputError for an unknown name."""
+        path = self.files.get(name) if isinstance(name, str) else None
+        if path is None:
+            raise InputError("file", str(name)[:60], "a file that was dropped on the page while this server ran")
+        return path
+
+    def let_go(self, name: str) -> None:
+        """Delete one dropped file. Raises InputError for an unknown name."""
+        place = self.path(name).parent
+        del self.files[name]
+        remove_folder(place)
+
+    def remove(self) -> None:
+        """Delete all dropped files and their folder."""
+        self.held.close()
+
+
+_OUTSIDE = re.compile(r"[^\w.+ -]")
+
+LONGEST_NAME = 150
+"""Longest file name in bytes. File systems take 255, and names of accompanying files are longer."""
+
+
+def plain_name(name: str, otherwise: str) -> str:
+    """Return the last part of a path as a safe file name, or `otherwise` if nothing is left.
+
+    The name cannot lead to another folder, hide the file, or read as an option of a command.
+    """
+    last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
+    plain = last.encode()[-LONGEST_NAME:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
+    return f"_{plain}" if name_refused(Path(plain)) else plain
+
 
 SLIDER_REACH = 10.0
 """Ratio by which a slider can enlarge and reduce a value."""
@@ -206,3 +309,57 @@ def _schema() -> dict[str, Any]:
 
 _reading = Lock()
 _read_schema = cache(stage_schema)
+
+
+def command_line(command: str, files: Sequence[str], options: Mapping[str, Any]) -> str:
+    """Return a friso command with its files and options, quoted for this system's shell.
+
+    `options` holds the options by their names in Python.
+    """
+    words = ["friso", command, *files]
+    for name, value in _each(options):
+        option = f"--{name.strip('_').replace('_', '-')}"
+        words += [option] if value is True else [option, str(value)]
+    return " ".join(map(shell_word, words))
+
+
+def python_line(function: str, files: Sequence[str], options: Mapping[str, Any]) -> str:
+    """Return the call of a friso function with its files and options as a line of Python."""
+    first = repr(files[0] if len(files) == 1 else [*files])
+    return f"friso.{function}({', '.join([first, *(f'{name}={value!r}' for name, value in options.items())])})"
+
+
+def _each(options: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield every option with its value; an option for several keys comes once per key."""
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            yield from ((name, f"{key}={_bare(item)}") for key, item in value.items())
+        else:
+            yield name, value
+
+
+def _bare(value: Any) -> str:
+    """Write a value behind KEY= as the command line reads it, texts without quotes."""
+    return value if isinstance(value, str) else as_toml(value)
+
+
+def archive(answer: Answer, more: Mapping[str, str]) -> bytes:
+    """Return a ZIP file with everything that an answer's command would write.
+
+    The archive holds the files, the figures in all formats, and the answer as JSON. `more` adds text files by name.
+    """
+    held = io.BytesIO()
+    packing = zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED)
+    with temporary_folder("friso-app-") as folder, packing as file:
+        out = folder / "out"
+        written = answer.report(out)
+        with speaking_of(answer.axis_kind):
+            for name, save in pictures(answer.figures()).items():  # some commands show figures in their page alone
+                if out / name not in written and callable(save):
+                    save(out / name)
+        for path in sorted(out.rglob("*")):
+            file.write(path, path.relative_to(out))
+        file.writestr(f"{answer.command}.json", json.dumps(answer.to_dict(), indent=1, allow_nan=False))
+        for name, text in more.items():
+            file.writestr(name, text)
+    return held.getvalue()

@@ -13,16 +13,21 @@ from typing import TYPE_CHECKING, Any
 
 import friso
 from friso.app import machine as machines
-from friso.app.archive import archive
-from friso.app.cures import cures_of
-from friso.app.frames import figure_on_page
-from friso.app.ghosts import ghosts_of, with_edge, with_log, with_other_joint
-from friso.app.kept import KeptAnswers
-from friso.app.lines import command_line, python_line
-from friso.app.machine import Machine
-from friso.app.maps import home_of, located, sketched, tracks_of, without_own
+from friso.app.machine import Machine, Uploads, archive, command_line, python_line
+from friso.app.maps import (
+    cures_of,
+    ghosts_of,
+    home_of,
+    located,
+    sketched,
+    tracks_of,
+    with_edge,
+    with_log,
+    with_other_joint,
+    without_own,
+)
 from friso.app.settings import app_settings
-from friso.app.uploads import Uploads
+from friso.app.work import KeptAnswers, Work, figure_on_page
 from friso.axis import speaking_of
 from friso.equations.motion import rests
 from friso.errors import InputError
@@ -42,7 +47,6 @@ from friso.stage.stage import numeric_keys
 from friso.studies.metric import metrics
 
 if TYPE_CHECKING:
-    from friso.app.work import Work
     from friso.interface.answer import Answer
     from friso.questions.identify.question import IdentifyAnswer
     from friso.questions.map.question import SweepAnswer

@@ -1,15 +1,31 @@
-"""Run each question in a thread until it is answered or superseded.
+"""Questions at work: jobs, their frames, and what is kept of them.
+
+Pack answers for the page: frames of a JSON text and of its numbers in binary.
+
+A frame begins with two whole numbers of four bytes, least significant byte first: the lengths of the text and of the
+numbers, which follow. In the text, an array is an object {"array": index of its first byte, "shape": [...]}. Arrays are
+float32.
+
+Run each question in a thread until it is answered or superseded.
 
 Progress and messages are sent to the page meanwhile.
+
+Keep answers for later, because the same machine is often asked about again.
+
+For example, a tab is opened again, a change is undone, a machine is pinned, or the files of an answer are downloaded.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
+import math
+import struct
 import time
 import traceback
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections import OrderedDict
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import copy_context
@@ -19,9 +35,65 @@ from typing import Any
 
 import numpy as np
 
-from friso.app.frames import frame
+from friso.app.machine import Machine
 from friso.engine.side_by_side import ASKER, Overtaken, ended_by, go_on, going_first
 from friso.errors import InputError
+from friso.interface.answer import Answer
+from friso.shown.documents import entries
+from friso.shown.drawing import plotly_renderer
+from friso.shown.drawing.figure import Figure
+
+
+def frame(value: Any) -> bytes:
+    """Return a value as a frame.
+
+    The value may hold dictionaries, lists, texts, numbers and NumPy arrays. Numbers that are not finite become null; in
+    arrays they become NaN.
+    """
+    arrays = _Arrays()
+    text = json.dumps(_plain(value, arrays), separators=(",", ":"), allow_nan=False).encode()
+    numbers = b"".join(arrays.parts)
+    return struct.pack("<II", len(text), len(numbers)) + text + numbers
+
+
+def figure_on_page(figure: Figure) -> dict[str, Any]:
+    """Return a figure as the page draws it: name, title, caption and plotly's data.
+
+    The data serve wide and narrow pages.
+    """
+    return {**entries(figure, "name", "title", "caption"), **plotly_renderer.parts_of_both(figure)}
+
+
+class _Arrays:
+    """The numbers of a frame's arrays in binary, one array behind the other."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self.size = 0
+
+    def add(self, numbers: bytes) -> int:
+        """Add an array, and return the index of its first byte among the numbers."""
+        place, self.size = self.size, self.size + len(numbers)
+        self.parts.append(numbers)
+        return place
+
+
+def _plain(value: Any, arrays: _Arrays) -> Any:
+    """Replace arrays by references and numbers by what JSON can hold.
+
+    Arrays are added to `arrays` as float32. Numbers that are not finite become None.
+    """
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
+        place = arrays.add(np.ascontiguousarray(value, "<f4").tobytes())
+        return {"array": place, "shape": [*value.shape]}
+    if isinstance(value, dict):
+        return {str(name): _plain(item, arrays) for name, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item, arrays) for item in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
 
 Job = Callable[["Work"], Iterator[dict[str, Any]]]
 """A function that answers a question and yields the parts of its answer."""
@@ -194,3 +266,58 @@ class Workshop:
         self.overtake()
         for pool in (self.pool, self.quick):
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+KEPT_ANSWERS = 4
+"""Number of latest answers that are kept of each function. An answer with a Bode plot takes 20 MB."""
+
+
+class KeptAnswers:
+    """Answers of friso's functions about machines, with the warnings that came with each.
+
+    Only the latest answers are kept. Several threads may use the object.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[Callable[..., Answer], OrderedDict[tuple[Machine, str], tuple[Answer, list[str]]]] = {}
+        self._turn = Lock()
+
+    def answer(
+        self,
+        function: Callable[..., Answer],
+        machine: Machine,
+        work: Work,
+        options: Mapping[str, Any] | None = None,
+        compute: Callable[[], Answer] | None = None,
+    ) -> Any:
+        """Return a function's answer about a machine, computed now or kept from before.
+
+        `options` are those of the function. `compute` computes the same answer from what is there already. The warnings
+        that came with a kept answer are added to the `work` again.
+        Raises whatever the function raises.
+        """
+        place = _place(machine, options)
+        with self._turn:
+            kept = self._kept.setdefault(function, OrderedDict())
+            if there := kept.get(place):
+                kept.move_to_end(place)
+                work.notes += there[1]
+                return there[0]
+        before = len(work.notes)
+        answer = compute() if compute else function(machine.stage, **(options or {}), progress=work.progress)
+        with self._turn:
+            kept[place] = answer, work.notes[before:]
+            while len(kept) > KEPT_ANSWERS:
+                kept.popitem(last=False)
+        return answer
+
+    def holds(
+        self, function: Callable[..., Answer], machine: Machine, options: Mapping[str, Any] | None = None
+    ) -> bool:
+        """Tell whether a function's answer about a machine, with these `options`, is kept."""
+        with self._turn:
+            return _place(machine, options) in self._kept.get(function, ())
+
+
+def _place(machine: Machine, options: Mapping[str, Any] | None) -> tuple[Machine, str]:
+    return machine, json.dumps(options or {}, sort_keys=True)
