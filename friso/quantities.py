@@ -17,8 +17,7 @@ from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
 from friso.axis import LINEAR, ROTARY, AxisKind
-from friso.errors import InputError
-from friso.escapes import toml_text
+from friso.errors import InputError, toml_text
 
 LARGEST_INTEGER = 10**60
 """Whole numbers of this size or more are not written out."""

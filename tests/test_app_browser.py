@@ -20,7 +20,7 @@ from test_map_views import page_of, plain
 
 import friso
 from friso.app.work import frame
-from friso.escapes import escaped
+from friso.errors import escaped
 from friso.shown.blocks import AnswerBlock
 from friso.shown.drawing.figure import INK, Axis, Figure, Panel, Series
 from friso.shown.pages import Report

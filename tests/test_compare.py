@@ -22,6 +22,7 @@ from friso.frequency.margins import margins
 from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import limit_cases, member
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
+from friso.intervals import quantile_interval, share
 from friso.questions.compare.blocks import compare_document, rows, sentences
 from friso.remedies import comparison as study
 from friso.remedies import machines as drawing
@@ -29,7 +30,6 @@ from friso.remedies import method
 from friso.remedies.catalogue import BANDWIDTH, linear_flat, linear_loops
 from friso.remedies.comparison import FASTER, ISOLATOR, LOCKED, Compared, Comparison, MachineMeasures, compare
 from friso.remedies.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_common, draw_fleet, draw_machines
-from friso.shares import quantile_interval, share
 from friso.stage import Stage, element_keys, load
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations

@@ -19,7 +19,7 @@ from pages import packed_values
 
 import friso
 from friso.cli.terminal import Escaping, console, spelled
-from friso.escapes import escaped, one_line
+from friso.errors import escaped, one_line
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series

@@ -24,8 +24,7 @@ import typer
 from friso.axis import speak_of
 from friso.cli.asking import Shown, ask, named_as_options, show
 from friso.cli.terminal import ProgressBar, print_document, say
-from friso.errors import InputError
-from friso.escapes import one_line
+from friso.errors import InputError, one_line
 from friso.interface.question import Question
 from friso.platform.system import shell_word
 from friso.progress import Progress

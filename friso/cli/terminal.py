@@ -2,7 +2,7 @@
 
 Write to the terminal safely.
 
-Texts from files cannot steer the terminal (`friso.escapes`); friso's own tables and bars can. Characters that the
+Texts from files cannot steer the terminal (`friso.errors`); friso's own tables and bars can. Characters that the
 terminal's encoding lacks are spelled out.
 
 Print sentences and tables, and declare the option that commands without a question share.
@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TextIO, cast
 
 import typer
 
-from friso.escapes import escaped, one_line
+from friso.errors import escaped, one_line
 from friso.platform.system import closed_pipes_told
 from friso.progress import WORK_CLOCK
 

@@ -53,10 +53,9 @@ from friso.frequency.system import DriveTiming, Members
 from friso.hunting import find_attractors
 from friso.hunting.criteria import CREEPS, FAILED, RESTS, SWINGS, outcomes, settling_of_runs
 from friso.hunting.measures import run_ends, turns_of
-from friso.intervals import Interval
+from friso.intervals import Interval, share_interval
 from friso.leaf_springs.mechanism import Evaluation
 from friso.progress import Progress, silent
-from friso.shares import share_interval
 from friso.stage import Stage
 
 

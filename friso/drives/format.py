@@ -12,8 +12,7 @@ from typing import Any
 
 from friso.axis import AxisKind
 from friso.drives.questions import OpenQuestion, UserAnswers
-from friso.errors import InputError
-from friso.escapes import one_line
+from friso.errors import InputError, one_line
 from friso.quantities import quoted
 from friso.registry import Registry
 

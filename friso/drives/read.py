@@ -15,8 +15,7 @@ from typing import Any
 from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, ParameterFormat
 from friso.drives.questions import UserAnswers, moving_mass, refuse_open
 from friso.drives.settings import drive_settings
-from friso.errors import InputError, shortened
-from friso.escapes import one_line
+from friso.errors import InputError, one_line, shortened
 from friso.platform.files import flaw_of
 from friso.quantities import quoted
 from friso.stage import Stage

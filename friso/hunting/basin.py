@@ -24,7 +24,7 @@ from friso.hunting.return_map.fates import motions_go_on
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import basin_settings
-from friso.shares import share_interval
+from friso.intervals import share_interval
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.rig import motion_of

@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, ParamSpec, TypeVar
 import numpy as np
 
 from friso.axis import LINEAR, AxisKind, speaking_of, unit_of_key
-from friso.errors import InputError
-from friso.escapes import escaped
+from friso.errors import InputError, escaped
 from friso.interface.question import described
 from friso.stage.arguments import check_arguments
 

@@ -19,11 +19,11 @@ from friso.equations.structure import shared_structure
 from friso.errors import InputError
 from friso.hunting.criteria import CREEPS, FAILED, RESTS, SWINGS
 from friso.hunting.measures import Measures, measure_runs, measuring_options
+from friso.intervals import Share, quantile_interval, share
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import BANDWIDTH
 from friso.remedies.machines import MEETING_SHARE, Fleet, Goal, draw_common
 from friso.remedies.method import tune
-from friso.shares import Share, quantile_interval, share
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations

@@ -30,6 +30,7 @@ from friso.hunting import (
     kernels_to_judge,
     unstable,
 )
+from friso.intervals import DOUBT_PROBABILITY, Share, quantile_interval, share
 from friso.remedies.catalogue import BANDWIDTH, Remedy, linear_flat
 from friso.remedies.machines import Fleet, Goal, MoveRange
 from friso.remedies.search import (
@@ -43,7 +44,6 @@ from friso.remedies.search import (
     timing,
 )
 from friso.remedies.settings import settings
-from friso.shares import DOUBT_PROBABILITY, Share, quantile_interval, share
 from friso.stage import Stage
 
 

@@ -20,7 +20,7 @@ from typing import Any
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from friso.escapes import escaped
+from friso.errors import escaped
 from friso.shown.blocks import AnswerBlock, Content, image, pictures
 from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import Figure

@@ -34,7 +34,7 @@ from friso.stage.tables import friction_laws
 
 if TYPE_CHECKING:
     from friso.hunting import LoopState
-    from friso.shares import Share
+    from friso.intervals import Share
 
 
 # Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,

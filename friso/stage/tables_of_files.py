@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from friso.errors import InputError, StageError
-from friso.escapes import one_line
+from friso.errors import InputError, StageError, one_line
 from friso.platform.files import LargeFileError, content_of
 from friso.platform.system import cause_of, shell_word
 from friso.quantities import quoted

@@ -31,8 +31,8 @@ from friso.hunting import (
     sketch_attractors,
 )
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
+from friso.intervals import Share, separation, share
 from friso.progress import Progress, Tally, silent
-from friso.shares import Share, separation, share
 from friso.stage import Stage
 from friso.stage.contacts import any_contact, written
 from friso.stage.correlations import Correlations, Sample, draw, laid_over

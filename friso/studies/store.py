@@ -24,8 +24,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from friso.engine.cache import machine
-from friso.errors import StoreError
-from friso.escapes import one_line
+from friso.errors import StoreError, one_line
 from friso.platform.system import cause_of, delete_file, once_free
 from friso.stage.arguments import check_arguments
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text

@@ -26,7 +26,7 @@ from friso.cli.app import COMMANDS
 from friso.equations.motion import size
 from friso.hunting import find_margin
 from friso.interface.output_folder import UNFINISHED
-from friso.shares import share
+from friso.intervals import share
 from friso.studies.study import _DECISIVE
 from friso_thesis.questions.reproduce.document import reproduce_document
 from friso_thesis.questions.reproduce.figures import reproduction_figures

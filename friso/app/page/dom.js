@@ -12,7 +12,7 @@ export function svg(name, attributes = {}, ...children) {
   return filled(document.createElementNS(SVG, name), attributes, children);
 }
 
-// As friso/escapes.py has them: control characters, marks and overrides of the direction of writing, what has no width.
+// As friso/errors.py has them: control characters, marks and overrides of the direction of writing, what has no width.
 const STEERING = /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff\u{e0000}-\u{e007f}]/gu;
 
 /** A text that may come from a file, with what steers a page or a terminal written out: "\u202e". */

@@ -13,7 +13,7 @@ from friso.drives.languages import PYTHON
 from friso.drives.program import OUTPUT, LinearController, identifier
 from friso.drives.settings import settings
 from friso.drives.target import CodeTarget, Parcel
-from friso.escapes import markdown
+from friso.errors import markdown
 
 _WORDS = """False None True and as assert async await break class continue def del elif else except finally for from
 global if import in is lambda nonlocal not or pass raise return try while with yield abs sqrt floor exp

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from friso.escapes import one_line
+from friso.errors import one_line
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import textwrap
 import numpy as np
 
 from friso.equations.motion import last_corner
+from friso.intervals import Share
 from friso.remedies.comparison import Comparison
-from friso.shares import Share
 from friso.shown.drawing.figure import (
     BLUE,
     GREEN,

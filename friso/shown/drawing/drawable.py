@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from friso.escapes import escaped
+from friso.errors import escaped
 from friso.shown.drawing.figure import (
     Array,
     Arrow,

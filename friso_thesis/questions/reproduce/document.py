@@ -15,7 +15,7 @@ from friso_thesis.studies.thesis.space import DRAW_SEED, OPEN, OpenValue
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
-    from friso.shares import Share
+    from friso.intervals import Share
     from friso_thesis.studies.thesis.laws import ConclusionsByLaw
     from friso_thesis.studies.thesis.plausible import ClaimInSpace, Plausible
     from friso_thesis.studies.thesis.reproduce import Reproduction

@@ -16,9 +16,9 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.equations.rail import friction_factors
+from friso.intervals import Share, share
 from friso.progress import Progress
 from friso.quantities import percent
-from friso.shares import Share, share
 from friso.shown.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
 from friso.shown.text import with_unit
 from friso.stage import Stage

@@ -14,8 +14,8 @@ from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
 from friso.hunting.criteria import COUNTED_ABOVE, FAILED, SWINGS, End, last_outside, lasts, outcomes, peaks_in_traces
 from friso.hunting.measures import LAST_HALF, LAST_QUARTER, scan_turning_points, zigzag
+from friso.intervals import Share, share
 from friso.progress import Progress, silent
-from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 from friso.virtual_rig.run import RecordedRuns, run

@@ -14,9 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
-from friso.escapes import one_line
+from friso.errors import one_line
+from friso.intervals import DOUBT_PROBABILITY, Share, separation, share
 from friso.progress import Tally, silent
-from friso.shares import DOUBT_PROBABILITY, Share, separation, share
 from friso_thesis.studies.thesis.claims import (
     ClaimJudgement,
     Evidence,

@@ -17,9 +17,9 @@ from friso.axis import axis_shown
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.criteria import COUNTED_ABOVE, DISTINCT_CRITERION, PEAK_CRITERION
 from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
+from friso.intervals import Share
 from friso.progress import Progress, together
 from friso.quantities import percent
-from friso.shares import Share
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import (
     BLUE,

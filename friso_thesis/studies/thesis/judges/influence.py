@@ -7,7 +7,7 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER
-from friso.shares import separation
+from friso.intervals import separation
 from friso.stage import loads
 from friso.studies.axes import Samples
 from friso.studies.sweep import sweep

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from friso.intervals import share_interval
 from friso.quantities import percent
-from friso.shares import share_interval
 from friso_thesis.studies.rig.in_position import FORCE_BITS, InPosition, NoisyStandstill
 from friso_thesis.studies.rig.measured_cycles import MOTORS
 from friso_thesis.studies.rig.moves_on_rails import RailRuns
