@@ -15,11 +15,9 @@ from snapshots import Snapshots
 
 import friso
 from friso.frequency.bode import Bode, Unstable, bode
-from friso.questions.bode.blocks import bode_document
 from friso.questions.bode.figures import bode_figures
-from friso.questions.bode.numbers import rows
-from friso.questions.bode.states import shown_states
-from friso.questions.bode.words import details, sentences
+from friso.questions.bode.numbers import rows, shown_states
+from friso.questions.bode.words import bode_document, details, sentences
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.figure import Figure, phases
 from friso.stage import Stage

@@ -30,8 +30,8 @@ from friso.hunting import (
     plane,
 )
 from friso.hunting.boundary.plane import LastEnd
-from friso.questions.boundary.blocks import boundary_document
 from friso.questions.boundary.figures import LOST, boundary_figure
+from friso.questions.boundary.question import boundary_document
 from friso.questions.boundary.words import (
     ShownKey,
     conclusion,

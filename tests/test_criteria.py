@@ -37,7 +37,7 @@ from friso.hunting.criteria import (
     verdicts,
 )
 from friso.hunting.measures import measure_runs, measuring_options
-from friso.questions.simulate.words import conclusion
+from friso.questions.simulate.question import conclusion
 from friso.stage import Stage
 from friso_thesis.studies.rig.moves_on_rails import turning_points
 

@@ -27,17 +27,16 @@ from friso.design_method.verification import Corners
 from friso.interface.output_folder import OutputFolder
 from friso.progress import Progress
 from friso.quantities import outwards
-from friso.questions.design.blocks import design_document
-from friso.questions.design.figures import design_figures
-from friso.questions.design.steps import (
+from friso.questions.design.blocks import (
     controller_step,
+    design_document,
     isolator_step,
     joint_step,
     leaves_step,
     moves_step,
 )
-from friso.questions.design.window import lower, stiffest, upper
-from friso.questions.design.words import brings, edge, refusal
+from friso.questions.design.figures import design_figures
+from friso.questions.design.words import brings, edge, lower, refusal, stiffest, upper
 from friso.shown import blocks
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.figure import Figure

@@ -43,9 +43,8 @@ from friso.identification.response.analysis import analyse
 from friso.identification.response.masses import two_masses
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import identified_stage, made_up
-from friso.questions.identify.blocks import identify_document
-from friso.questions.identify.figures import identify_figures
 from friso.questions.identify.question import IdentifyAnswer
+from friso.questions.identify.words import identify_document, identify_figures
 from friso.shown.drawing.figure import Figure, Panel, Series
 from friso.stage.correlations import Correlations
 from friso_thesis.studies.identification.steps import stiffness_from_steps

@@ -31,8 +31,7 @@ from friso.drives.program import Program
 from friso.drives.target import TARGETS, CodeTarget, Parcel
 from friso.errors import InputError
 from friso.frequency.loops import RATED, STAGE, controller_over_period, samples_controller
-from friso.questions.export.controller_words import verdict_line
-from friso.questions.export.parcel import packed
+from friso.questions.export.parcel import packed, verdict_line
 from friso.stage import Stage
 from friso.virtual_rig.run import as_built_keys
 

@@ -34,8 +34,7 @@ from friso.progress import Progress, silent
 from friso.questions.check.words import freeing_helps
 from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import own_values
-from friso.questions.map.question import SweepAnswer
-from friso.questions.map.study import Varied, study_for
+from friso.questions.map.question import SweepAnswer, Varied, study_for
 from friso.shown.drawing.figure import BLUE, PINK, Figure, Panel, Series
 from friso.shown.motion_words import shown_cases
 from friso.shown.text import rounded_down, rounded_up, with_unit

@@ -38,7 +38,7 @@ from friso.identification.logs.mapping import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
 from friso.questions.logs.question import LogsAnswer, options_of
-from friso.questions.map.places import SHOWN, with_places
+from friso.questions.map.cells import SHOWN, with_places
 from friso.shown.drawing.figure import Figure
 from friso.shown.motion_words import COLOURS, case_labels, verdict_in_short
 from friso.shown.text import after_loop, lost_as_built, unknown_condition

@@ -62,7 +62,7 @@ def run_identify(question: Question, about: Sequence[Any], options: Mapping[str,
     from friso.identification.logs.mapping import sidecar
     from friso.identification.sources import OpenQuestions
     from friso.interface.output_folder import OutputFolder
-    from friso.questions.identify.blocks import STAGE
+    from friso.questions.identify.words import STAGE
 
     assert shown.out is not None  # the option has a default
     read = [*about[0], *options.get("predict", ()), *([options["stage"]] if "stage" in options else [])]

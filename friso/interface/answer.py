@@ -259,12 +259,13 @@ class Answer:
         return False
 
     def _shown_by(self, function: str, otherwise: Any, *more: Any) -> Any:
-        """Show the answer by a `function` in the module `blocks` or `words` of the question's folder.
+        """Show the answer by a `function` in the module `blocks`, `words` or `question` of the question's folder.
 
         Returns what that function returns for the answer's subject and `more` arguments, or `otherwise` if there is no
         such function.
         """
-        for place in (f"{self.package}.blocks", f"{self.package}.words"):
+        for part in ("blocks", "words", "question"):
+            place = f"{self.package}.{part}"
             if self.package and find_spec(place) and hasattr(module := import_module(place), function):
                 return getattr(module, function)(self.subject, *more)
         return otherwise

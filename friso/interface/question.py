@@ -1,8 +1,9 @@
-"""Define what a folder of `friso/questions/` declares, and what is derived from it.
+"""Define what a question declares, and what is derived from it.
 
-A question is a function of friso with a command of the same name; its folder declares a `QUESTION`. The command, its
-options, its help, and its entry in `friso --help` are derived from the QUESTION, the function's signature and its
-docstring. Nothing heavy is imported here, because the list of commands is printed before arrays and units are loaded.
+A question is a function of friso with a command of the same name; the table of `friso/questions/`, or the folder of
+another package, declares a `Question`. The command, its options, its help, and its entry in `friso --help` are derived
+from it, the function's signature and its docstring. Nothing heavy is imported here, because the list of commands is
+printed before arrays and units are loaded.
 
 Declare once the parameters that several questions share.
 
@@ -286,7 +287,7 @@ OF_THE_CALLER = ("folder", "partly", "beside", "keep", "progress")
 """Parameters that the command supplies itself, such as the folder and the progress."""
 
 QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
-"""The questions: one for each folder of `friso/questions/`, and those of installed packages."""
+"""The questions: those in the table of `friso/questions/`, and those of installed packages."""
 
 
 def function_of(name: str) -> Callable[..., Any]:

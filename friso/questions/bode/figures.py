@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.frequency.bode import COMFORTABLE_MARGIN, Bode, BodeCase, CascadeLoop
-from friso.questions.bode.numbers import decibels
-from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
+from friso.questions.bode.numbers import SERIES, colour, dash, decibels, has_family, has_limiter, label
 from friso.shown.drawing.figure import (
     INK,
     LIGHT,

@@ -1,4 +1,8 @@
-"""Write the numbers of a linear analysis as texts for the table.
+"""The states of a Bode analysis, and their numbers.
+
+Name and colour the states of a linear analysis alike in every figure, sentence and table.
+
+Write the numbers of a linear analysis as texts for the table.
 
 Each row names a quantity and has its text for each state.
 """
@@ -6,15 +10,141 @@ Each row names a quantity and has its text for each state.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import get_args
 
 import numpy as np
 
-from friso.frequency.bode import CascadeLoop
+from friso.frequency.bode import Bode, CascadeLoop
 from friso.frequency.margins import Margins
-from friso.questions.bode.states import ShownState
+from friso.frequency.system import Members
+from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash
 from friso.shown.text import NOTHING, with_unit
+from friso.stage.tables import leading_friction
+
+SERIES = "-series"
+"""Suffix of the name of a case whose limiter follows the series formula in Table 1 of the thesis."""
+
+COLOURS = {"given": BLUE, "stuck": BLUE, "sliding": VERMILLION, "stuck-touched": SKY, "sliding-touched": ORANGE}
+_ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
+
+
+@dataclass(frozen=True)
+class ShownState:
+    """A state of the loop with its margins, label and colour.
+
+    `where` describes the state if the label does not. `loops` has the margins of each loop of a cascade; it is empty
+    unless the state is a limit case.
+    """
+
+    label: str
+    colour: str
+    where: str
+    margins: Margins
+    loops: Mapping[CascadeLoop, Margins] = field(default_factory=dict)
+
+
+def shown_states(bode: Bode) -> tuple[ShownState, ...]:
+    """Return the limit cases, the worst settled state, and the worst state of all.
+
+    Settled states are the limit cases, and all states stuck under a bias force. If the worst state of all is settled,
+    it comes once. Without friction, there are only limit cases.
+    """
+    cases = [
+        ShownState(label(name), colour(name), _speed(case.members), case.margins, _loops(bode, name))
+        for name, case in bode.cases.items()
+    ]
+    if not has_family(bode):
+        return tuple(cases)
+    for title, (member, margins, gains) in {"Worst settled": bode.settled, "Worst of the family": bode.worst}.items():
+        cases.append(ShownState(title, GREY, with_gains(place(member, bode), gains), margins))
+    if bode.worst[0] == bode.settled[0] and bode.worst[2] == bode.settled[2]:
+        cases.pop()
+    return tuple(cases)
+
+
+def _loops(bode: Bode, name: str) -> Mapping[CascadeLoop, Margins]:
+    """Return the margins of a cascade's loops in a limit case; empty for other controllers."""
+    return bode.cascades[name].margins if name in bode.cascades else {}
+
+
+def label(name: str) -> str:
+    """Return a limit case in words: "stuck-touched" is "Stuck, limiter touched"."""
+    move, _, rest = name.partition("-")
+    first = {"given": "As given"}.get(move, move.capitalize())
+    return ", ".join([first, *([_ENDINGS[rest]] if rest else [])])
+
+
+def colour(name: str) -> str:
+    """Return the colour of a limit case."""
+    return COLOURS[name.removesuffix(SERIES)]
+
+
+def dash(name: str) -> Dash:
+    """Return the line style of a limit case: dashed where the limiter acts in series."""
+    return "dashed" if name.endswith(SERIES) else "solid"
+
+
+def place(member: Members, bode: Bode) -> str:
+    """Return a state in words that tell it from others: "sliding at 1.78 mm/s, limiter free"."""
+    return in_words(cart(member, bode), bool(member.touched[0]), has_limiter(bode))
+
+
+def in_words(cart: str, touched: bool, limited: bool) -> str:
+    """Describe a state: what the cart does, and whether the limiter is `touched` or free.
+
+    The limiter is left out unless it can be both (`limited`).
+    """
+    return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
+
+
+def with_gains(state: str, gains: str) -> str:
+    """Add to a state in words the gains that act in it, unless they are those far from the reference at rest."""
+    return f"{state}, with {gains}" if gains else state
+
+
+def cart(member: Members, bode: Bode) -> str:
+    """Say what the cart does: it sticks, or slides at a speed; empty without friction.
+
+    The highest speed analysed is called fast sliding: friction no longer falls there, and no motion need be so fast.
+    """
+    if not has_friction(bode):
+        return ""
+    if not member.stuck[0]:
+        if member.speed[0] == bode.scan.members.speed.max():
+            return f"sliding fast{'' if member.forward[0] else ' backwards'}"
+        return f"sliding{'' if member.forward[0] else ' backwards'} at {with_unit(member.speed[0], 'm/s')}"
+    return f"stuck under a bias force of {with_unit(member.bias[0], 'N')}" if member.bias[0] else "stuck"
+
+
+def side(touched: bool) -> str:
+    """Return the limiter's state in a word: "touched" or "free"."""
+    return "touched" if touched else "free"
+
+
+def has_limiter(bode: Bode) -> bool:
+    """Tell whether the limiter can be both free and touched.
+
+    If the joint is locked or has no stroke, only one of these states is possible.
+    """
+    return bool(np.ptp(bode.scan.members.touched.astype(int)))
+
+
+def has_family(bode: Bode) -> bool:
+    """Tell whether there are more states than the limit cases; only friction creates some."""
+    return len(bode.scan.members) * len(bode.scans) > len(bode.cases)
+
+
+def has_friction(bode: Bode) -> bool:
+    """Tell whether the stage has a friction law, of the guide or of the motor."""
+    return leading_friction(bode.stage.flat())["friction.model"] != "none"
+
+
+def _speed(member: Members) -> str:
+    """Return the sliding speed in words; empty for a stuck state."""
+    return "" if member.stuck[0] else f"at {with_unit(member.speed[0], 'm/s')}"
+
 
 OF_LOOPS = ("Stable", "0 dB crossings", "Phase margin", "Gain margin", "Modulus margin")
 """Names of the rows of each loop of a cascade."""

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from friso.hunting import Diagram, KeyRange, Plane
-from friso.questions.boundary.settings import boundary_figure_settings
 from friso.questions.boundary.words import BASIN, MEANINGS, ShownKey, end_sentence
 from friso.questions.map.words import QUIET, quantity
+from friso.questions.settings import boundary_figure_settings
 from friso.shown.drawing.figure import (
     BLUE,
     GREY,

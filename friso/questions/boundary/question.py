@@ -1,4 +1,7 @@
-"""Answer where hunting ends, over one key or in the plane of two."""
+"""Answer where hunting ends, over one key or in the plane of two.
+
+Give the blocks of `friso boundary`, and the table of points that it writes.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,30 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from itertools import repeat
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from friso.axis import AxisKind
 from friso.equations.bandwidth import range_example
-from friso.hunting import CYCLE_RTOL, KeyRange
+from friso.hunting import CYCLE_RTOL, Diagram, KeyRange, Plane
 from friso.interface import inputs
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import AxisRange, Changes, StageLike, Tolerance
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, any_sign
+from friso.questions.boundary.words import ShownKey, answer, conclusion, details
+from friso.shown.blocks import AnswerBlock, Files
+from friso.shown.documents import entries, plain_json
 from friso.stage import Stage
 from friso.stage.contacts import followed
+from friso.studies import boundary as study
+from friso.studies.boundary import Line, lines
 
 if TYPE_CHECKING:
-    from friso.questions.boundary.words import ShownKey
-    from friso.shown.blocks import Files
+    from friso.shown.drawing.figure import Figure
 
 
 class BoundaryAnswer(Answer):
@@ -61,7 +72,7 @@ class BoundaryAnswer(Answer):
 
     def files(self) -> Files:
         """Return the page, the figure, and the table of points, named after the stage's file."""
-        from friso.questions.boundary.blocks import write_table
+
         from friso.shown.blocks import image_files
 
         stem, (figure,) = f"{self.name}_boundary", self.figures()
@@ -135,3 +146,135 @@ def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:
     unit = match[1].strip() if match else ""
     field = Quantity(swept.unit, any_sign, "").on(axis)
     return ShownKey(swept.key, unit, field.factor(unit)) if unit else ShownKey(swept.key)
+
+
+def blocks(boundaries: BoundaryAnswer) -> list[AnswerBlock]:
+    """Return the blocks: where hunting ends, and every point, branch or curve."""
+    traced, keys = boundaries.result, boundaries.keys
+    return [
+        AnswerBlock(
+            title=boundaries.stage.name,
+            sentences=answer(traced, keys),
+            draw=lambda: [_figure(boundaries)],
+            numbers=lambda: boundary_document(traced, keys),
+        ),
+        AnswerBlock(title="Points and curves", details=details(traced, keys)),
+    ]
+
+
+def _figure(boundaries: BoundaryAnswer) -> Figure:
+    """Draw the branches of cycles, or the curves on which hunting ends with the place of the stage between them."""
+    from friso.questions.boundary.figures import boundary_figure  # 0.9 s to import
+    from friso.questions.map.cells import SHOWN, with_places
+
+    figure = boundary_figure(boundaries.result, boundaries.keys, boundaries.stage.name, boundaries.condition)
+    if isinstance(boundaries.result, Plane):
+        return with_places(figure, [(SHOWN, boundaries.stage)], [key.key for key in boundaries.keys])
+    return figure
+
+
+def write_table(traced: Diagram | Plane, path: Path) -> None:
+    """Write a CSV table with one row per point of a branch or curve.
+
+    Flips, folds and other special points also have a kind and an error.
+    """
+    import pandas as pd
+
+    keys = [f"{swept.key} [{swept.unit}]" if swept.unit else swept.key for swept in traced.space.ranges]
+    header = ["line", "cycle", "kind", *keys, *(f"error of {key}" for key in keys)]
+    rows = [
+        row
+        for number, line in enumerate(lines(traced))
+        for row in zip(
+            repeat(number),
+            repeat(line.shape),
+            line.kinds,
+            *line.at.T,
+            *line.error.T,
+            line.amplitude,
+            line.period,
+            line.multiplier,
+        )
+    ]
+    table = pd.DataFrame(rows, columns=[*header, "amplitude [m]", "period [s]", "multiplier"])
+    table.to_csv(path, index=False)
+
+
+def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    """Return the JSON document of a boundary, in the units in which the ranges were given."""
+    document = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
+    return plain_json({"conclusion": conclusion(traced, keys), **document})
+
+
+def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
+    """Return flips, folds and other special points, branches, and the verdicts at both ends."""
+    branches = study.lines(traced)
+    points = [_point(line, k, key) for line in branches for k in line.special]
+    return {
+        **entries(key, "key", "unit"),
+        "points": sorted(points, key=lambda point: point["value"]),
+        "ends": dict(zip(("low", "high"), study.end_verdicts(traced), strict=True)),
+        "branches": [_branch(line, key) for line in branches],
+    }
+
+
+def _point(line: Line, k: int, key: ShownKey) -> dict[str, Any]:
+    """Return a special point of a branch, such as a fold: its value, kind, error, and cycle."""
+    return {
+        "value": key.number(line.at[k, 0]),
+        "kind": line.kinds[k],
+        "error": key.number(line.error[k, 0]),
+        "cycle": line.shape,
+        "amplitude_m": float(line.amplitude[k]),
+        "period_s": float(line.period[k]),
+    }
+
+
+def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
+    """Return a branch of cycles with amplitude, period and multiplier along the key."""
+    multiplier = line.multiplier[line.ordinary]
+    return {
+        "cycle": line.shape,
+        "values": [key.number(value) for value in line.at[line.ordinary, 0].tolist()],
+        "amplitude_m": line.amplitude[line.ordinary].tolist(),
+        "period_s": line.period[line.ordinary].tolist(),
+        "multiplier": multiplier.tolist(),
+        "attracts": (abs(multiplier) < 1).tolist(),
+        "ends": line.ends,
+    }
+
+
+def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    """Return the curves in the plane of two keys, how they end, and the corner verdicts."""
+    x, y = keys
+    verdicts = [verdict for _, _, verdict in study.corner_verdicts(traced)]
+    return {
+        "x": entries(x, "key", "unit"),
+        "y": entries(y, "key", "unit"),
+        "curves": [_curve(line, keys) for line in study.lines(traced)],
+        "ends": [
+            {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind}
+            for end in study.curve_ends(traced)
+        ],
+        "lost": _numbers(study.lost_places(traced), keys),
+        "beyond_curves": [
+            dict(zip(("hunts_at", "settles_at"), _numbers(end, keys), strict=True)) for end in study.last_ends(traced)
+        ],
+        "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
+    }
+
+
+def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    """Return a curve in the plane of two keys, with the cycle along it."""
+    return {
+        "kind": line.kinds[0],
+        "cycle": line.shape,
+        "points": _numbers(line.at, keys),
+        "error": _numbers(line.error, keys),
+        **entries(line, "amplitude_m", "period_s", "ends"),
+    }
+
+
+def _numbers(values: np.ndarray, keys: tuple[ShownKey, ...]) -> list[list[float]]:
+    """Return values of both keys [SI], shape (n, 2), in the units shown."""
+    return [[key.number(value) for key, value in zip(keys, row, strict=True)] for row in values.tolist()]

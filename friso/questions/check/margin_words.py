@@ -1,9 +1,14 @@
-"""Say how far static friction, stroke or stiffness may change before the verdict does."""
+"""Margins, and an isolator, in words.
+
+Say how far static friction, stroke or stiffness may change before the verdict does.
+
+Say what an isolator would do for a rigid stage.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from friso.equations.bandwidth import breakaway, least_static_factor, static_frictions, with_static_friction
 from friso.equations.structure import carrying_force
@@ -11,6 +16,9 @@ from friso.hunting import SEARCH_LIMITS, AttractionEnd, Case, ParameterMargin
 from friso.quantities import percent, plain_factor
 from friso.shown.text import listed, range_with_unit, rounded_down, rounded_up, with_unit
 from friso.stage.controllers import FORCE_LIMIT
+
+if TYPE_CHECKING:
+    from friso.remedies.catalogue import Suggestion
 
 
 def friction_sentences(case: Case) -> list[str]:
@@ -164,3 +172,32 @@ def _factors(end: AttractionEnd) -> tuple[float, float]:
     """Return the multiples of a parameter between which hunting begins or ends, rounded as they are told."""
     low, high = sorted((end.inside, end.outside))
     return rounded_down(low), rounded_up(high)
+
+
+LITTLE_MARGIN = 0.5
+"""Modulus margin below which the controller has to be tuned as well."""
+
+
+def isolator_sentence(suggestion: Suggestion) -> str:
+    """Say whether the stage would stop hunting on the suggested isolator."""
+    flat = suggestion.stage.flat()
+    joint = (
+        f"an isolator of stiffness {with_unit(flat['joint.stiffness'], 'N/m')}, stroke "
+        f"{with_unit(flat['joint.stroke'], 'm')} and damping {with_unit(flat['joint.damping'], 'N*s/m')}"
+    )
+    if not suggestion.settles:
+        return f"It would not surely stop hunting on {joint}, or on any shorter stroke tried."
+    low = "" if suggestion.margin >= LITTLE_MARGIN else ", too little: the controller has to be tuned as well"
+    return f"On {joint} it would not hunt; its modulus margin would be {suggestion.margin:.2f}{low} (friso tune)."
+
+
+def isolator_document(isolator: Suggestion) -> dict[str, Any]:
+    """Return the suggested isolator, and whether the stage settles on it."""
+    flat = isolator.stage.flat()
+    return {
+        "settles": isolator.settles,
+        "stiffness_n_per_m": flat["joint.stiffness"],
+        "stroke_m": flat["joint.stroke"],
+        "damping_ns_per_m": flat["joint.damping"],
+        "modulus_margin": isolator.margin,
+    }

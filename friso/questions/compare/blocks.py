@@ -1,8 +1,14 @@
-"""Say which stage brings the machines to rest, and how soon; and give the table, the picture and the machines."""
+"""The comparison in blocks, and its figures.
+
+Draw how soon machines settle with each stage, and how many do not come to rest.
+
+Say which stage brings the machines to rest, and how soon; and give the table, the picture and the machines.
+"""
 
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -10,14 +16,90 @@ from typing import Any
 import numpy as np
 
 from friso.axis import axis_shown
+from friso.equations.motion import last_corner
 from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.hunting.criteria import RESTS, SWINGS
-from friso.questions.compare.figures import compare_figures
+from friso.intervals import Share
 from friso.questions.tune.words import changes
 from friso.remedies.comparison import AS_IT_IS, FASTER, ISOLATOR, LOCKED, Compared, Comparison, Quantile
 from friso.shown.blocks import AnswerBlock
 from friso.shown.documents import entries, plain_json
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    INK,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Axis,
+    Dash,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
 from friso.shown.text import length_at_rest, listed, share_with_interval, spread_sentences, with_unit
+
+COLOURS = (INK, BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
+DASHES: tuple[Dash, ...] = ("solid", "dashed", "dotted")
+"""Colours and dashes of the stages' curves, in their order; the dash changes where colours begin again."""
+
+MARKER_DISTANCE = 0.16
+"""Distance between the markers of one stage, relative to the distance between stages."""
+
+
+def compare_figures(comparison: Comparison, title: str) -> list[Figure]:
+    """Draw how soon the machines settle with each stage, and how many keep moving; the `title` is the answer."""
+    caption = (
+        f"{comparison.machines.count} machines drawn with seed {comparison.seed}, the same for all stages. The curve "
+        "of a stage ends at the share of machines that settle at all. Bars are 95 % intervals."
+    )
+    panels = (_settling(comparison), _moving(comparison))
+    return [Figure("compare", title, caption, panels, subject=comparison.stage.name)]
+
+
+def _settling(comparison: Comparison) -> Panel:
+    """Return the panel of the fraction of machines that have settled over the time since the move."""
+    times = [np.sort(result.measures.settling) for result in comparison.results]
+    flats = [result.stage.flat() for result in comparison.results]
+    end = max(flat["motion.duration"] - float(last_corner(flat)) for flat in flats)
+    first = min((float(ordered[0]) for ordered in times if np.isfinite(ordered[0])), default=end)
+    start = max(first, 1e-3 * end) / 1.3
+    series = []
+    for number, (result, ordered) in enumerate(zip(comparison.results, times, strict=True)):
+        settled = ordered[np.isfinite(ordered)]
+        x = np.concatenate([[start], np.repeat(np.maximum(settled, start), 2), [end]])
+        y = np.repeat(100 * np.arange(len(settled) + 1) / len(ordered), 2)
+        dash = DASHES[number // len(COLOURS) % len(DASHES)]
+        series.append(Series(x, y, result.name, COLOURS[number % len(COLOURS)], dash))
+    axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
+    within = with_unit(comparison.within, "m")
+    return Panel(f"In position to stay, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
+
+
+def _moving(comparison: Comparison) -> Panel:
+    """Return the panel of the machines that swing at the end, or are not in position."""
+    kinds = (
+        ("swings at the end", VERMILLION, [result.swinging for result in comparison.results]),
+        ("not in position at the end", BLUE, [_other(result.resting) for result in comparison.results]),
+    )
+    series, markers = [], []
+    for number, (name, colour, shares) in enumerate(kinds):
+        x = np.arange(len(shares), dtype=np.float64) + (number - 0.5) * MARKER_DISTANCE
+        bars = np.array([100 * end for share in shares for end in (share.low, share.high, np.nan)])
+        series.append(Series(np.repeat(x, 3), bars, "", colour))
+        markers.append(Markers(x, np.array([100 * share.probability for share in shares]), name, colour))
+    names = tuple("\n".join(textwrap.wrap(result.name, 14)) for result in comparison.results)
+    axis = Axis("", "", (-0.5, len(names) - 0.5), words=names)
+    y = Axis("Share of machines", "%", (-3.0, 103.0))
+    return Panel("Machines that do not come to rest", axis, y, tuple(series), tuple(markers))
+
+
+def _other(share: Share) -> Share:
+    """Return the probability that something does not happen, with its interval."""
+    return Share(1 - share.probability, 1 - share.high, 1 - share.low)
+
 
 MEANINGS = (
     "Fractions and times have 95 % intervals (Clopper, Pearson; order statistics). Settling times count from the last "

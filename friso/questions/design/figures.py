@@ -12,11 +12,9 @@ from friso.design_method.requirements import Candidate, Confirmed
 from friso.design_method.verification import Corners, MachineOutcomes
 from friso.frequency.bode import COMFORTABLE_MARGIN, Range
 from friso.materials import materials
-from friso.questions.design.window import limit_name, stiffest, view
-from friso.questions.design.words import hertz, size
-from friso.questions.flexure.drawing import drawing_figure
-from friso.questions.flexure.figures import modes_figure
-from friso.questions.flexure.numbers import newtons_per
+from friso.questions.design.words import hertz, limit_name, size, stiffest, view
+from friso.questions.flexure.figures import drawing_figure, modes_figure
+from friso.questions.flexure.words import newtons_per
 from friso.questions.map.words import QUIET
 from friso.shown.drawing.drawable import cell_edges
 from friso.shown.drawing.figure import (

@@ -1,9 +1,16 @@
-"""Check whether friso works on this machine."""
+"""Check whether friso works on this machine.
+
+Say what `friso doctor` found.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from friso.interface.answer import Answer, question
 from friso.progress import Progress, silent
+from friso.shown.blocks import AnswerBlock
+from friso.studies.doctor import DoctorCheck
 
 
 class DoctorAnswer(Answer):
@@ -37,3 +44,16 @@ def doctor(*, progress: Progress = silent) -> DoctorAnswer:
     from friso.studies.doctor import checks
 
     return DoctorAnswer([*checks()])
+
+
+def blocks(checks: Sequence[DoctorCheck]) -> list[AnswerBlock]:
+    """Say whether friso works, with the table of checks, and remedies if something does not work."""
+    broken = [check.subject for check in checks if not check.works]
+    remedies = ["Remedy"] if broken else []
+    says = f"friso does not work on this machine: see {', '.join(broken)}." if broken else _WORKS
+    rows = [(check.subject, [check.text, *("" if check.works else check.remedy for _ in remedies)]) for check in checks]
+    numbers = {"conclusion": says, "works": not broken, "findings": [vars(check) for check in checks]}
+    return [AnswerBlock(sentences=[says], columns=["Result", *remedies], rows=rows, numbers=lambda: numbers)]
+
+
+_WORKS = "friso works on this machine."

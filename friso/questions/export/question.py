@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from friso.axis import speak_of
 from friso.drives.format import FORMATS
@@ -19,9 +19,8 @@ from friso.progress import Progress, silent
 from friso.quantities import quoted
 
 if TYPE_CHECKING:
-    from friso.questions.check.question import CheckAnswer
+    from friso.questions.export.parcel import ControllerAnswer
     from friso.shown.blocks import AnswerBlock, Files
-    from friso.stage import Stage
 
 
 class ExportAnswer(Answer):
@@ -48,34 +47,6 @@ class ExportAnswer(Answer):
         """Return the page, and the parameter file if a kind of drive was named."""
         kind = self.result.kind
         return {"gains.html": self.page().html(), **({f"parameters{kind.suffix}": self.result.text} if kind else {})}
-
-
-class ControllerAnswer(Answer):
-    """A controller as code or equations; `result` is a `Parcel`, and `check` the answer of friso check."""
-
-    stage: Stage
-    check: CheckAnswer
-    to: str
-
-    @property
-    def target_files(self) -> Mapping[str, Any]:
-        """Return the files of the target by name: texts, and archives as bytes."""
-        return TARGETS[self.to].files(self.result)
-
-    @property
-    def system(self) -> Any:
-        """Return the controller for small motions as a system of python-control, with its sample time dt [s]."""
-        return self.result.linear.as_system()
-
-    def blocks(self) -> list[AnswerBlock]:
-        """Return the parts of the answer: what is written, with which verdict, and the files."""
-        from friso.questions.export.controller_words import controller_blocks
-
-        return controller_blocks(self)
-
-    def files(self) -> Files:
-        """Return the files of the target; a page is not among them."""
-        return {**self.target_files}
 
 
 @question
@@ -136,7 +107,7 @@ def export(
     if machine and not TARGETS[to].holds_machine:
         able = ", ".join(target for target in TARGETS if TARGETS[target].holds_machine)
         raise InputError("to", quoted(to), f"a language that can hold a machine ({able})", "to=c")
-    from friso.questions.export.parcel import parcel_of
+    from friso.questions.export.parcel import ControllerAnswer, parcel_of
 
     chosen = inputs.read_stage(stage, overrides, leaves_out=())
     speak_of(chosen.axis_kind)

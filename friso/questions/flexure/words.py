@@ -1,16 +1,107 @@
-"""Describe leaf springs: their properties, the crossover and stroke they allow, and dangers."""
+"""Leaf springs in numbers, in words and in blocks.
+
+Write the table of leaf springs: the name of each quantity, and its text for each model.
+
+Describe leaf springs: their properties, the crossover and stroke they allow, and dangers.
+
+Give the one block of `friso flexure`, with the drawing of the leaf springs.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
 
 from friso.leaf_springs.beams import BothModels
-from friso.leaf_springs.mechanism import AXES, STANDARD_GRAVITY, Evaluation
+from friso.leaf_springs.mechanism import AXES, STANDARD_GRAVITY, Evaluation, Mode
 from friso.quantities import percent
-from friso.questions.flexure.numbers import megapascals, newtons_per
-from friso.shown.text import listed, with_unit
+from friso.questions.flexure.figures import COLOURS, flexure_figures
+from friso.shown.blocks import AnswerBlock
+from friso.shown.documents import entries, plain_json
+from friso.shown.drawing.figure import GREEN, VERMILLION, Category
+from friso.shown.text import NOTHING, listed, with_unit
 from friso.stage import Stage
+
+INTERFERES = "interferes"
+"""Label of a mode that disturbs control: both actuator and sensor couple to it."""
+
+UNKNOWN = "unknown"
+"""Text in place of an unknown property of the material."""
+
+
+def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
+    """Return the rows: stiffnesses, eigenfrequencies, and the loads that the leaves can bear."""
+    models = list(flexure.models.values())
+    above, below = (
+        [(name, [text(evaluation) for evaluation in models]) for name, text in part.items()]
+        for part in (_STIFF, _BORNE)
+    )
+    return [*above, *_modes(flexure), *below]
+
+
+def newtons_per(value: float, length: str) -> str:
+    """Write a stiffness [N/m] per `length`: "mm" for drives or "µm" for supports, as is usual."""
+    return f"{_plain(value / {'mm': 1e3, 'µm': 1e6}[length])} N/{length}"
+
+
+def megapascals(value: float) -> str:
+    """Write a stress [Pa] in MPa."""
+    return f"{_plain(value / 1e6)} MPa" if math.isfinite(value) else UNKNOWN
+
+
+def margin_factor(value: float) -> str:
+    """Write a margin as a factor: "2.5 times"; unknown if it is not finite."""
+    return f"{_plain(value)} times" if math.isfinite(value) else UNKNOWN
+
+
+def _plain(value: float) -> str:
+    """Write a number to three digits without a unit."""
+    return with_unit(value, "").strip()
+
+
+def _modes(flexure: BothModels) -> list[tuple[str, list[str]]]:
+    """Return a row for each mode that a model knows, in the order of frequency.
+
+    The drive mode comes first: the stage moves along the direction in which it is driven.
+    """
+    named = [(evaluation, evaluation.named_modes) for evaluation in flexure.models.values()]
+    frequencies: dict[str, float] = {}
+    for _, modes in named:
+        frequencies = {name: mode.frequency for name, mode in modes.items()} | frequencies
+    drive = next(iter(named[0][1]))
+    names = [drive, *sorted(frequencies.keys() - {drive}, key=frequencies.__getitem__)]
+    return [(f"Mode: {name}", [_mode(evaluation, modes.get(name)) for evaluation, modes in named]) for name in names]
+
+
+def _mode(evaluation: Evaluation, mode: Mode | None) -> str:
+    """Write the frequency of a mode, and whether it interferes with control."""
+    if mode is None:
+        return NOTHING
+    return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if evaluation.interferes(mode) else "")
+
+
+_STIFF: dict[str, Callable[[Evaluation], str]] = {
+    "Drive stiffness": lambda evaluation: newtons_per(evaluation.drive[0], "mm"),
+    "Drive stiffness under the load": lambda evaluation: newtons_per(evaluation.loaded_drive, "mm"),
+    "Deviation from linear over the stroke": lambda evaluation: percent(evaluation.nonlinearity),
+    "Support stiffness x, straight": lambda evaluation: newtons_per(evaluation.support_x[0], "µm"),
+    "Support stiffness x, at full stroke": lambda evaluation: newtons_per(evaluation.support_x[-1], "µm"),
+    "Support stiffness y, straight": lambda evaluation: newtons_per(evaluation.support_y[0], "µm"),
+    "Support stiffness y, at full stroke": lambda evaluation: newtons_per(evaluation.support_y[-1], "µm"),
+}
+_BORNE: dict[str, Callable[[Evaluation], str]] = {
+    "Largest stress at full stroke": lambda evaluation: megapascals(evaluation.stress),
+    "Concentration factor at the clamp": lambda evaluation: f"{evaluation.mechanism.stress_concentration:g}",
+    "Stress at the clamp": lambda evaluation: megapascals(evaluation.clamp_stress),
+    "Margin to yield": lambda evaluation: margin_factor(evaluation.yield_margin),
+    "Margin to fatigue": lambda evaluation: margin_factor(evaluation.fatigue_margin),
+    "Shortening at full stroke": lambda evaluation: with_unit(evaluation.shortening, "m"),
+    "Buckling load": lambda evaluation: with_unit(evaluation.buckling, "N"),
+    "Buckling load over the load": lambda evaluation: margin_factor(evaluation.buckling_margin),
+}
+
 
 CROSSOVER_RULE = 0.1
 """Highest crossover, relative to the first interfering frequency (thesis, Section 5)."""
@@ -215,3 +306,61 @@ def _stroke(evaluation: Evaluation) -> str:
 def _size(length: float) -> str:
     """Write a length [m] in mm as it stands on a drawing."""
     return f"{1e3 * length:.4g}"
+
+
+def basis(flexure: BothModels) -> str:
+    """Say by which models the leaf springs were evaluated."""
+    return (
+        ": geometrically exact beams, corrected for what clamps do to a wide leaf, and closed forms (Soemers, Design "
+        "Principles for Precision Mechanisms; Awtar, Slocum and Sevincer, doi:10.1115/1.2717231). Modes with the cart "
+        "held and the leaves straight; a mode interferes with control where actuator and sensor both see it. The "
+        "drawing is no substitute for one with tolerances"
+    )
+
+
+def blocks(flexure: BothModels) -> list[AnswerBlock]:
+    """Return the block of the answer; what the joint can do is green, and warnings are red."""
+    block = AnswerBlock(
+        title=flexure.stage.name,
+        sentences=sentences(flexure),
+        colours=[GREEN, *(VERMILLION for _ in warnings(flexure))],
+        columns=[Category(name, COLOURS[name]) for name in flexure.models],
+        rows=rows(flexure),
+        draw=partial(flexure_figures, flexure),
+        numbers=partial(flexure_document, flexure),
+    )
+    return [block]
+
+
+def flexure_document(flexure: BothModels) -> dict[str, Any]:
+    """Return the results of the best model, and of the closed forms for comparison."""
+    head = {"conclusion": sentences(flexure)[0], "stage": flexure.stage.name, "failure": flexure.failure or None}
+    return {**head, **_evaluation(flexure.best), "closed_forms": _evaluation(flexure.closed)}
+
+
+def _evaluation(evaluation: Evaluation) -> dict[str, Any]:
+    """Return stiffness, modes, stresses and margins by one model."""
+    first = evaluation.interfering
+    plain = {
+        **entries(evaluation, "model", "stroke_m", "nonlinearity"),
+        "drive_stiffness_n_per_m": evaluation.drive[0],
+        "drive_stiffness_under_load_n_per_m": evaluation.loaded_drive,
+        "drive_stiffness_at_stroke_n_per_m": evaluation.drive[-1],
+        "support_stiffness_n_per_m": {
+            axis: {"zero": support[0], "full": support[-1]}
+            for axis, support in (("x", evaluation.support_x), ("y", evaluation.support_y))
+        },
+        "eigenfrequencies_hz": [mode.frequency for mode in evaluation.modes],
+        "names": [mode.name for mode in evaluation.modes],
+        "interferes": [evaluation.interferes(mode) for mode in evaluation.modes],
+        "first_interfering_hz": None if first is None else first.frequency,
+        "max_stress_pa": evaluation.stress,
+        "stress_concentration": evaluation.mechanism.stress_concentration,
+        **entries(evaluation, "yield_margin", "fatigue_margin", "shortening_m", "buckling_margin"),
+        "buckling_load_n": evaluation.buckling,
+        "buckling_load_per_leaf_n": evaluation.buckling / evaluation.mechanism.leaves,
+        "stiffness_zero": evaluation.stiffness[0],
+        "stiffness_full": evaluation.stiffness[1],
+        **entries(evaluation, "clamp_stress_pa", "deflections_m", "forces_n"),
+    }
+    return {key: plain_json(value) for key, value in plain.items()}

@@ -1,27 +1,49 @@
-"""Write an identification in words for the terminal and the page."""
+"""What was identified in words, figures and blocks, and a stage against its logs.
+
+Write an identification in words for the terminal and the page.
+
+Say whether a log contradicts the verdict on a stage, and which single change would explain it.
+
+Draw an identification: all intervals, each experiment, and the logs predicted.
+
+Give the blocks of `friso identify`, and the files beside its page: the stage and its correlations.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friso.axis import KINDS as AXES
 from friso.axis import axis_shown, unit_shown
+from friso.identification.estimate_documents import key_document
 from friso.identification.estimate_words import interval_text, name_of, value_text, with_interval, within
+from friso.identification.kind import Facts, Source
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import Experiment, Identification, Prediction, nothing_learnt
+from friso.identification.sources import LogFile
+from friso.identification.stage_file import with_origins
 from friso.identification.ways import ways_to_show
-from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
+from friso.quantities import plain_factor
+from friso.shown.blocks import AnswerBlock, Content
+from friso.shown.documents import entries, plain_json
+from friso.shown.drawing.figure import BLUE, GREEN, ORANGE, VERMILLION, Axis, Figure, Markers, Panel, Series, Symbol
+from friso.shown.text import listed, swing_with_unit, with_unit
+from friso.stage import Stage
+from friso.stage.correlations import correlations_file, correlations_text
+from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange, Standing
+from friso.studies.settings import settings
 
 if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
-    from friso.identification.kind import Facts, Source
-    from friso.identification.sources import LogFile
+    from friso.questions.identify.question import IdentifyAnswer
+
 
 COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or reason")
 """Columns of the table of estimates."""
@@ -248,3 +270,270 @@ def details(identification: Identification, files: Sequence[LogFile]) -> list[st
     for title, read, warned in read_rows(files):
         lines += ["", title, *(f"  {text}" for text in read), *(f"  note: {text}" for text in warned)]
     return lines
+
+
+def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[str]:
+    """Say what the log called `name` shows, whether the stage does so, and which change would explain a difference."""
+    standing = result.standing
+    machine = (
+        f"hunts, {_swing(standing)}"
+        if standing.hunts
+        else f"rests for {with_unit(standing.time, 's')} while its reference stands"
+    )
+    does = f"hunts, {_swing(result)}" if result.attracts else "does not hunt"
+    doubt = "" if result.certain else " (not certain: its values, or what attracts it, are not)"
+    if not standing.hunts and not standing.rests:
+        return [f"{name} does not tell: the machine neither rests nor swings evenly; the stage {does}{doubt}."]
+    if result.open and result.attracts and result.may_rest:
+        return [f"{name} does not tell: the machine {machine}; the stage may rest, too, and {does} after other moves."]
+    if result.open:
+        return [f"{name} does not tell: the machine {machine}, too briefly for that; the stage {does}{doubt}."]
+    if result.agrees:
+        return [f"{name} agrees with the stage: the machine {machine}; the stage {does}{doubt}."]
+    says = f"{name} contradicts the stage: the machine {machine}; the stage {does}{doubt}."
+    nearest = result.explanations[: settings.most_explanations]
+    if not nearest:
+        return [says, "No single change of friction, masses or the controller's speed explains that."]
+    changes = listed([_change(stage, one) for one in nearest], "or")
+    return [says, f"One change would explain that, the smallest first: {changes}."]
+
+
+def _swing(result: Standing | Contradiction) -> str:
+    """Write the size and period of the swing that a log shows, or of that in which a stage hunts."""
+    size = swing_with_unit(result.swing or 0.0, result.middle, "m")
+    return f"{size} every {with_unit(result.period or 0.0, 's')}"
+
+
+def _change(stage: Stage, change: ExplainingChange) -> str:
+    """Write a change by its factor, and by the value of its key if it has a single one."""
+    times = f"{change.name} {plain_factor(change.factor)} times"
+    keys, flat = CHANGES[change.name], stage.flat()
+    if len(keys) != 1:
+        return times
+    return f"{times} ({with_unit(change.factor * flat[keys[0]], stage.numeric_keys()[keys[0]].unit)})"
+
+
+def _numbers(result: Standing | Contradiction) -> dict[str, Any]:
+    """Return size, middle and period of the swing that a log shows, or of that in which a stage hunts."""
+    return {"swing_m": result.swing, "offset_m": result.middle, "period_s": result.period}
+
+
+def against_document(name: str, result: Contradiction) -> dict[str, Any]:
+    """Return what a log shows, what the stage does, and the changes that explain a difference."""
+    changes: Sequence[dict[str, Any]] = [
+        {"change": one.name, "factor": one.factor, "swing_m": one.swing, "period_s": one.period}
+        for one in result.explanations
+    ]
+    standing = result.standing
+    return {
+        "log": name,
+        "machine": {"hunts": standing.hunts, **_numbers(standing)},
+        "stands_s": standing.time,
+        "stage": {"hunts": result.attracts, "certain": result.certain, **_numbers(result)},
+        "agrees": result.agrees,
+        "explanations": changes,
+    }
+
+
+SHORT = {
+    "masses.cart": "cart",
+    "masses.stage": "stage",
+    "friction.coulomb": "Coulomb",
+    "friction.viscous_asymmetry": "asymm.",
+    "friction.stribeck_velocity": "Stribeck v",
+    "friction.stribeck_exponent": "exponent",
+    "friction.bristle_stiffness": "bristle k",
+    "friction.bristle_damping": "bristle d",
+    "bias.cart": "constant",
+    "bias.stage": "constant",
+    "joint.stiffness": "joint k",
+    "joint.damping": "joint d",
+}
+"""Short names of keys for the limited room beside an axis."""
+
+
+def identify_figures(identification: Identification, predictions: Sequence[Prediction]) -> list[Figure]:
+    """Return all figures, in the order in which they are read."""
+    figures, subject = _intervals(identification), identification.stage.name if identification.stage else ""
+    for experiment, label in zip(identification.experiments, labels(identification), strict=True):
+        figures += KINDS[experiment.kind].figures(experiment.result, experiment.logs, f"identify_{label}")
+    for number, prediction in enumerate(predictions, 1):
+        figures += KINDS[prediction.kind].prediction_figures(prediction.log, prediction.result, number)
+    return [replace(figure, subject=subject) for figure in figures]
+
+
+def _intervals(identification: Identification) -> list[Figure]:
+    """Draw the half-width of every key's interval, relative to its value.
+
+    For a key without a value, the half-width is relative to the middle of the interval.
+    """
+    bounded = [
+        estimate
+        for estimate in ordered(identification.estimates)
+        if np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low
+    ]
+    if len(bounded) < 2:
+        return []
+    bounded = bounded[::-1]  # the first on top
+    half = np.array([estimate.half_width for estimate in bounded])
+    middle = np.array(
+        [abs(estimate.value) if estimate.determined else (estimate.low + estimate.high) / 2 for estimate in bounded]
+    )
+    share = np.minimum(100 * half / np.maximum(np.abs(middle), 1e-3 * half), 100.0)
+    determined, lost = np.array([estimate.determined for estimate in bounded]), share >= 100
+    visible = determined & ~lost
+    places = np.arange(len(bounded), dtype=float)
+    left = 0.5 * float(share.min())
+    stems = [
+        Series(np.array([left, x]), np.full(2, y), "", BLUE if ok else ORANGE, width=2.0)
+        for x, y, ok in zip(share[~lost], places[~lost], visible[~lost], strict=True)
+    ]
+    kinds: tuple[tuple[np.ndarray, str, str, Symbol], ...] = (
+        (visible, "shown", BLUE, "circle"),
+        (~determined & ~lost, "not shown: the range left", ORANGE, "triangle"),
+        (lost, "none found", ORANGE, "cross"),
+    )
+    points = [
+        Markers(share[chosen], places[chosen], label, colour, symbol)
+        for chosen, label, colour, symbol in kinds
+        if chosen.any()
+    ]
+    x = Axis("Half the interval, in % of the value", "", (left, 150.0), log=True)
+    y = Axis(
+        "",
+        "",
+        (-0.6, len(bounded) - 0.4),
+        words=tuple(SHORT.get(estimate.name, estimate.name.partition(".")[2]) for estimate in bounded),
+    )
+    caption = "Shorter is better known. A cross at 100 %: not even the sign or order of magnitude is."
+    panel = Panel("", x, y, tuple(stems), tuple(points))
+    return [Figure("identify_intervals", "How well each quantity is known", caption, (panel,))]
+
+
+STAGE = "identified.toml"
+
+
+def blocks(answer: IdentifyAnswer) -> list[AnswerBlock]:
+    """Return the blocks: what was identified, and the verdict on the stage if that was asked for."""
+    result, inputs, predictions, checked = answer.result, answer.inputs, answer.predictions, answer.checked
+    identified = AnswerBlock(
+        sentences=sentences(result, predictions),
+        columns=COLUMNS[1:],
+        rows=[(first, rest) for first, *rest in (row.texts for row in estimate_rows(result))],
+        details=details(result, inputs),
+        draw=lambda: identify_figures(result, predictions),
+        numbers=lambda: identify_document(result, inputs, predictions),
+    )
+    besides = AnswerBlock(
+        sentences=_compared_words(answer),
+        numbers=lambda: plain_json({"against": [against_document(name, one) for name, one in answer.compared.items()]}),
+    )
+    against = [besides] if answer.suspect is not None else []
+    if checked is None:
+        return [*against, identified]
+    verdict = AnswerBlock(sentences=checked.sentences(), numbers=lambda: {"check": checked.document()})
+    tables = [
+        AnswerBlock(title=table.title, columns=table.columns, rows=table.rows, behind=table.behind)
+        for table in checked.tables()
+    ]
+    return [*against, verdict, identified, *tables]
+
+
+def _compared_words(answer: IdentifyAnswer) -> list[str]:
+    """Say of each log whether it contradicts the verdict on the suspected stage; nothing without one."""
+    stage = answer.suspect
+    if stage is None:
+        return []
+    return [text for name, one in answer.compared.items() for text in against_sentences(name, stage, one)]
+
+
+def _asked_besides(answer: IdentifyAnswer) -> list[str]:
+    """Return what the answer says besides the estimates: the comparison with a stage, and the verdict."""
+    return [*_compared_words(answer), *(answer.checked.sentences() if answer.checked else [])]
+
+
+def page_values(answer: IdentifyAnswer) -> dict[str, Any]:
+    """Return what the page shows beside the figures: estimates, experiments, predictions, and logs as read."""
+    identification = answer.result
+    several = zip(identification.experiments, labels(identification), strict=True)
+    return {
+        "verdicts": [*((ORANGE, text) for text in _asked_besides(answer)), *headline(identification)],
+        "columns": COLUMNS,
+        "rows": estimate_rows(identification),
+        "files": read_rows(answer.inputs),
+        "parts": summaries(identification),
+        "predicted": [prediction_line(prediction) for prediction in answer.predictions],
+        "warnings": [axis_shown().text(warning) for warning in identification.warnings],
+        "opening": [f"identify_{label}_{KINDS[experiment.kind].opening}" for experiment, label in several],
+    }
+
+
+def further_files(answer: IdentifyAnswer) -> dict[str, Content]:
+    """Return the stage file, and the correlations of its keys.
+
+    Those of an earlier run are removed if this run has none.
+    """
+    identification, stage, correlations = answer.result, answer.result.stage, None
+    if stage is not None and identification.correlations.keys:
+        correlations = correlations_text(identification.correlations, stage)
+    return {
+        STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
+        correlations_file(Path(STAGE)).name: correlations,
+    }
+
+
+def identify_document(
+    identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]
+) -> dict[str, Any]:
+    """Return the JSON document of an identification, without the files written.
+
+    It has the conclusion, the logs, the experiments with their numbers, all estimates, and predictions of other logs.
+    """
+    document = {
+        "conclusion": headline(identification)[0][1],
+        "stage": identification.stage.name if identification.stage else None,
+        "logs": [_log(file) for file in files],
+        "estimates": [key_document(estimate) for estimate in identification.estimates],
+        "experiments": [_experiment(experiment) for experiment in identification.experiments],
+        "predictions": [
+            {"log": prediction.log.name, **KINDS[prediction.kind].prediction_numbers(prediction.result)}
+            for prediction in predictions
+        ],
+        "failed": identification.failed,
+        "doubts": [axis_shown().text(doubt) for doubt in identification.doubts],
+        "warnings": [axis_shown().text(warning) for warning in identification.warnings],
+    }
+    return plain_json(document)
+
+
+def _log(file: LogFile) -> dict[str, Any]:
+    """Return for the document which kind of log a file holds and why, and what was read."""
+    return {
+        "file": str(file.path),
+        **entries(file, "kind", "reason"),
+        "mapping_file": None if file.mapping_file is None else str(file.mapping_file),
+        **_content(file.source),
+        **entries(file.source, "read"),
+    }
+
+
+def _content(source: Source) -> dict[str, Any]:
+    """Return what a file holds: signals over time, or a response."""
+    if not isinstance(source, Log):
+        return {"roles": {}, "lines": len(source.frequency), "unit": source.unit, "warnings": []}
+    return {
+        "roles": {role: unit_shown(source.unit(role)) for role in source.signals},
+        "samples": len(source.time),
+        **entries(source, "sample_time_s", "warnings"),
+        "segments": len(source.segments),
+    }
+
+
+def _experiment(experiment: Experiment) -> dict[str, Any]:
+    """Return an experiment with its numbers and estimates, for the document."""
+    return {
+        "kind": experiment.kind,
+        "logs": [log.name for log in experiment.logs],
+        **KINDS[experiment.kind].numbers(experiment.result),
+        "estimates": [key_document(estimate) for estimate in experiment.estimates],
+    }

@@ -13,10 +13,21 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from friso.questions.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, look, plane_first
+from friso.questions.map.cells import (
+    SAMPLE,
+    SHOWN,
+    CellAxis,
+    Look,
+    axes_of,
+    cuts,
+    is_of_verdicts,
+    look,
+    machine_of,
+    plane_first,
+    verdict_panel,
+    with_places,
+)
 from friso.questions.map.findings import message, own_values, second_scale, statement, subject_of
-from friso.questions.map.places import SHOWN, machine_of, with_places
-from friso.questions.map.verdicts import is_of_verdicts, verdict_panel
 from friso.questions.map.words import variable
 from friso.shown.drawing.drawable import MOST_CELLS, cell_edges, pick
 from friso.shown.drawing.figure import BLUE, Axis, Cloud, Figure, Map, Markers, Panel, Series, Told

@@ -1,9 +1,15 @@
-"""Say in which part of a map the stage swings or hunts."""
+"""What a map finds, in words and as a document.
+
+Say in which part of a map the stage swings or hunts.
+
+Build the JSON document of `friso map`.
+"""
 
 from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +19,9 @@ from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria import ATTRACTED, CREEPS, PEAK_RULE, RESTS, SWINGS
 from friso.questions.map import words as map_words
-from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
-from friso.questions.map.places import machine_of
-from friso.questions.map.words import failures, grouped
+from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of, machine_of
+from friso.questions.map.words import failures, grouped, text_counts, word_counts
+from friso.shown.documents import plain_json
 from friso.shown.drawing.figure import SecondScale
 from friso.shown.text import listed, range_with_unit, unstable_loop
 from friso.stage import Stage
@@ -443,3 +449,38 @@ def loop_first(stage: Stage) -> list[str]:
     from friso.hunting import unstable  # imported here, because looking at a map needs no engine
 
     return unstable_loop(unstable(stage))
+
+
+def map_document(
+    runs: xr.Dataset, study: Study, store: Path | None, metric: str, edges: MapEdges | None = None
+) -> dict[str, Any]:
+    """Return the axes and the results."""
+    criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
+    document = {
+        "stage": study.stage.name,
+        "store": str(store) if store else None,
+        "axes": {
+            axis.name: {
+                "points": len(axis.values),
+                "unit": axis.unit,
+                "first": axis.values[0].item(),
+                "last": axis.values[-1].item(),
+            }
+            for axis in study.axes
+        },
+        "cells": study.cells,
+        "rtol": study.rtol,
+        "conclusion": " ".join([*loop_first(study.stage), *answers(runs, metric, edges), *statements(runs, metric)]),
+        "edges": [] if edges is None else [_own_line(line) for line in edges.own],
+        "outcomes": word_counts(runs, "outcome"),
+        "verdicts": word_counts(runs, "verdict") or None,
+        "sketched_verdicts": word_counts(runs, "sketch") or None,
+        "attractors": text_counts(runs, "attractor") or None,
+        "criteria": criteria,
+    }
+    return plain_json(document)
+
+
+def _own_line(line: OwnLine) -> dict[str, Any]:
+    """Return where hunting begins and ends along an axis, at the stage's own value of the other: values in SI."""
+    return {"axis": line.key, "own": line.own, "hunts": line.attracts, "changes": line.changes.tolist()}
