@@ -7,7 +7,7 @@ import pytest
 
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.log import Log
-from friso.identification.logs.mapping import from_options
+from friso.identification.logs.roles import from_options
 
 EMPS = Path(__file__).parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 

@@ -17,7 +17,7 @@ from machines import Machine, drawn
 import friso
 from friso.equations.rail import friction_factors
 from friso.identification.kind import Source
-from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
+from friso.identification.logs.roles import Mapping, mapping_text, sidecar
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.sources import LogFile, read_all
 from friso_thesis.questions.rig.blocks import write_csv

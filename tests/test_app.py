@@ -45,7 +45,7 @@ from friso.axis import LINEAR
 from friso.engine.settings import BuildSettings
 from friso.engine.side_by_side import Overtaken, ended_by, go_on, going_first, is_first
 from friso.errors import InputError, LogError
-from friso.identification.logs.mapping import sidecar
+from friso.identification.logs.roles import sidecar
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Cloud, Figure, Panel, Series
 from friso.studies.sweep import local_crew

@@ -23,10 +23,8 @@ from friso.cli.app import main
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.kinds import KINDS, in_order
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.format import FORMATS, LogFormat
-from friso.identification.logs.log import Log
-from friso.identification.logs.read import file_format, read_table
+from friso.identification.logs.log import Channel, ChannelTable, Log
+from friso.identification.logs.read import FORMATS, LogFormat, file_format, read_table
 from friso.interface.question import HUNTS, QUESTIONS
 from friso.progress import Progress
 from friso.shown.drawing.figure import Axis, Figure, Panel, Series

@@ -8,15 +8,11 @@ import pytest
 import scipy.io
 
 from friso.identification.estimate import Estimate
-from friso.identification.response.analysis import visible
-from friso.identification.response.closed_loop import feedback
-from friso.identification.response.departure import departure
-from friso.identification.response.estimators import multisine
+from friso.identification.response.analysis import departure, feedback, visible
 from friso.identification.response.mass_line import mass_lines
 from friso.identification.response.masses import TwoMass, fit_two_mass, widened
 from friso.identification.response.modes import fit_modes
-from friso.identification.response.records import ResponseRecord, relative_error
-from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.records import Channels, FrequencyResponse, ResponseRecord, multisine, relative_error
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 BAND = (3.0, 20.1)

@@ -27,8 +27,7 @@ from friso.identification import method
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.stage_file import identified_stage, origins, with_unknown
-from friso.identification.stage_keys import fitting
+from friso.identification.stage_file import fitting, identified_stage, origins, with_unknown
 from friso.interface.answer import Answer
 from friso.stage.correlations import correlations_file, read_correlations
 

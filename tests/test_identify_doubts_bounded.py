@@ -23,7 +23,7 @@ from friso.identification.doubt import (
 )
 from friso.identification.inverse_model import inverse_model, passes_once
 from friso.identification.logs.checks import clipped_share
-from friso.identification.output_error.coverage import Coverage
+from friso.identification.output_error.identifiable import Coverage
 from friso.identification.readings.common import record
 
 DT = 1e-3

@@ -28,10 +28,9 @@ from friso.identification.readings.common import block_mean, correlated_mean, lo
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity
-from friso.identification.readings.ramps import force_ramps
-from friso.identification.readings.rate_effect import break_away, share_below, static_friction
+from friso.identification.readings.motion_events import break_away, force_ramps, share_below, static_friction
 from friso.identification.readings.settings import ReadingSettings
-from friso.identification.response.fitting import ResponseFit
+from friso.identification.response.modes import ResponseFit
 from friso.identification.sources import recognised
 from friso_thesis.studies.identification.steps import StepStiffness, stiffness_from_steps
 from friso_thesis.studies.identification.stick_slip import static_from_stick_slip

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 import friso
 from friso.errors import InputError
-from friso.identification.combine import combined, correlations
+from friso.identification.combine import combined, correlation_length, correlations
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
@@ -23,9 +23,7 @@ from friso.identification.readings.course import external
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
 from friso.identification.sources import recognised
-from friso.identification.spread import correlation_length
-from friso.identification.stage_file import identified_stage
-from friso.identification.stage_keys import fitting
+from friso.identification.stage_file import fitting, identified_stage
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
 

@@ -17,15 +17,24 @@ from scipy.signal import lsim
 
 import friso
 from friso.identification import moves as moves_analysis
-from friso.identification.doubt import DOUBTS, FitCase, RaisedDoubt, RecordCase, leading_effect
-from friso.identification.doubts import coupling, delay, friction_by_direction, load_friction, play
+from friso.identification.doubt import DOUBTS, FitCase, Quality, RaisedDoubt, RecordCase, leading_effect
+from friso.identification.doubts import forces
+from friso.identification.doubts import record as delay
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model, moved_in
 from friso.identification.logs.assemble import integrated
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, errors_of, identify_moves, simulated_log
 from friso.identification.output_error import fit as fitting
-from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
+from friso.identification.output_error.fit import (
+    OutputErrorFit,
+    everywhere,
+    first_values,
+    fit,
+    mean_square,
+    nearby,
+    polished,
+)
 from friso.identification.output_error.identifiable import (
     IdentifiableFit,
     believed,
@@ -35,10 +44,8 @@ from friso.identification.output_error.identifiable import (
 )
 from friso.identification.output_error.parameters import BRISTLES, EXPONENT, MASS, RATIO, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
-from friso.identification.output_error.refine import mean_square
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.output_error.to_keys import estimates_of
-from friso.identification.quality import Quality
 from friso.identification.readings.common import record
 from friso.identification.settings import DoubtSettings
 from friso.identification.stage_file import made_up
@@ -347,7 +354,7 @@ def sound() -> Log:
 def test_no_effect_is_seen_where_there_is_none(sound: Log) -> None:
     case = fit_case(sound, *rigid(sound))
     assert case.leading is None
-    assert not [raised for doubt in (coupling, load_friction, delay) for raised in doubt.find(case)]
+    assert not [raised for doubt in (forces, forces, delay) for raised in doubt.find(case)]
     assert not [*DOUBTS["force-digits"].find(RecordCase(sound, inverse_model(sound)))]
 
 
@@ -362,8 +369,8 @@ def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
     assert (off < 0) == behind
     assert abs(off) > NORMAL_COVERAGE * np.sqrt(fitted.covariance[0, 0])
     case = fit_case(log, fitted, bandwidth)
-    (unspoilt,) = coupling.find(case)
-    (spoiled,) = coupling.find(replace(case, quality=replace(WELL, spoilt=True), leading=None))
+    (unspoilt,) = forces.find_coupling(case)
+    (spoiled,) = forces.find_coupling(replace(case, quality=replace(WELL, spoilt=True), leading=None))
     assert reach(unspoilt)[0] > 1.5 * abs(off)
     assert unspoilt.size == pytest.approx(off, rel=0.3)
     assert {*unspoilt.refuses} == {*spoiled.refuses} == {*BRISTLES}
@@ -378,10 +385,10 @@ def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, 
     against = np.sign(sound["force"]) * way * share
     log = with_force(sound, sound["force"] * against / (1 - against))
     fitted, bandwidth = rigid(log)
-    (doubt,) = load_friction.find(fit_case(log, fitted, bandwidth))
+    (doubt,) = forces.find_load_friction(fit_case(log, fitted, bandwidth))
     assert doubt.size == pytest.approx(share, rel=0.3)
     assert abs(mass_off(fitted)) < reach(doubt)[0]
-    assert not [*load_friction.find(replace(fit_case(log, fitted, bandwidth), leading=None))]
+    assert not [*forces.find_load_friction(replace(fit_case(log, fitted, bandwidth), leading=None))]
 
 
 @pytest.mark.cases(first=2)
@@ -393,7 +400,7 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, sound
     way, acceleration = np.tanh(velocity / 1e-3), np.gradient(velocity, step)
     coulomb, mass, width = FRICTION[0], sum(TWO_MASSES), 5e-5
     late = 0.004 * time / time[-1]
-    (speed,) = play.loose_loads(position, velocity, step, np.array([width]), np.zeros(1))
+    (speed,) = forces.loose_loads(position, velocity, step, np.array([width]), np.zeros(1))
     loose = np.diff(speed, prepend=speed[0]) / step
     force, truth = {
         "cogging": (0.15 * coulomb * np.sin(2 * np.pi * position / 0.02), 0.3 * coulomb),
@@ -412,7 +419,7 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, sound
     assert abs(mass_off(fitted)) < reach(doubt)[0]
     if effect == "play":  # as wide as any that is tried, it is something slower
         tried = replace(case.leading.tried, label=max(DoubtSettings.current().plays_tried))
-        (nameless,) = play.find(replace(case, leading=replace(case.leading, tried=tried)))
+        (nameless,) = forces.find_play(replace(case, leading=replace(case.leading, tried=tried)))
         assert not nameless.words
         assert not nameless.explains
         assert nameless.fit is not None
@@ -469,12 +476,12 @@ def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(lat
     log = replace(sound, signals={**sound.signals, "force": np.roll(sound["force"], -late)})
     fitted, bandwidth = rigid(log)
     case = fit_case(log, fitted, bandwidth)
-    (finding,) = delay.find(case)
+    (finding,) = delay.find_delay(case)
     assert finding.size == pytest.approx(late * log.sample_time, rel=0.2)
     names = [fitted.problem.parameters[number].name for number in fitted.free]
     off = [np.log(fitted.value(name) / true) for name, true in zip(names[1:3], FRICTION, strict=True)]
     assert (reach(finding)[1:3] > np.abs(off)).all()
-    (spoiled,) = delay.find(replace(case, quality=replace(WELL, spoilt=True), leading=None))
+    (spoiled,) = delay.find_delay(replace(case, quality=replace(WELL, spoilt=True), leading=None))
     assert not spoiled.words
 
 
@@ -522,7 +529,7 @@ def test_static_friction_of_one_direction_is_named_and_intervals_reach_further()
     more = 0.3 * machine.flat["friction.coulomb"] * np.exp(-((speed / velocity) ** 2))
     both = followed(log := with_force(log, more * (speed > 0)), machine.flat, len(log.time))
     case = fit_case(log, both, 20.0)
-    (apart,) = friction_by_direction.find(case)
+    (apart,) = forces.find_friction_by_direction(case)
     wider = apart.fit
     assert wider is not None
     assert case.leading is not None
@@ -614,4 +621,4 @@ def on_bristles(rate: float, step: float, seconds: float) -> Log:
 def test_what_friction_does_at_the_reversals_of_a_sine_is_no_delay_and_no_coupling(rate: float, step: float) -> None:
     """Delays of 4 to 100 ms were named, and a coupling that changed the mass infinitely."""
     case = fit_case(log := on_bristles(rate, step, 20.0), *rigid(log), led=False)
-    assert not "".join(one.words for doubt in (delay, coupling) for one in doubt.find(case))
+    assert not "".join(one.words for doubt in (delay, forces) for one in doubt.find(case))

@@ -15,40 +15,38 @@ from scipy.signal import lfilter
 from snapshots import Snapshots
 from variants import VARIANTS
 
-from friso.identification.combine import combined
+from friso.identification.combine import combined, groups_of, spread_of
 from friso.identification.doubt import (
     DOUBTS,
     IMITATED,
     Doubt,
     KeyCase,
+    Quality,
     RaisedDoubt,
     RecordCase,
     ValueCase,
     causes,
     judged_keys,
+    whole_error,
 )
-from friso.identification.doubts import (
-    changing_gains,
-    differing_halves,
-    little_friction,
-    missing_feedforward,
-    perhaps_feedforward,
-)
-from friso.identification.doubts.changing_friction import changes_beside, inverse_reaching
-from friso.identification.estimate import Estimate
-from friso.identification.estimate_words import interval_text, value_text
+from friso.identification.doubts import controller, values
+from friso.identification.doubts import record as differing_halves
+from friso.identification.doubts.forces import changes_beside, inverse_reaching
+from friso.identification.estimate import Estimate, interval_text, value_text
 from friso.identification.inverse_model import InverseModel, directions, inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for, of_inverse_model, with_model_error
-from friso.identification.output_error.effects import explained_by
-from friso.identification.output_error.fit import OutputErrorFit, first_values, polished
+from friso.identification.output_error.fit import (
+    OutputErrorFit,
+    as_far_off_as_repeated,
+    explained_by,
+    first_values,
+    polished,
+    refine_fit,
+)
 from friso.identification.output_error.parameters import BRISTLES, FitParameter, fit_parameters
 from friso.identification.output_error.problem import Problem, tracking
-from friso.identification.output_error.refine import refine_fit
-from friso.identification.output_error.repeated import as_far_off_as_repeated
-from friso.identification.quality import Quality, whole_error
 from friso.identification.readings.common import noise_of, record
-from friso.identification.spread import groups_of, spread_of
 from friso.identification.stage_file import (
     estimate_text,
     identified_stage,
@@ -187,7 +185,7 @@ def allowed(
 
 def of_little_friction(log: Log) -> str:
     """Return the message on too little Coulomb friction in a log, or nothing."""
-    return "".join(finding.words for finding in little_friction.find(ValueCase(log, inverse_model(log, 5.0))))
+    return "".join(finding.words for finding in values.find_little_friction(ValueCase(log, inverse_model(log, 5.0))))
 
 
 @pytest.mark.parametrize("noise", [0.01, 0.05, 0.5])
@@ -232,7 +230,7 @@ def test_halves_that_differ_are_named() -> None:
     (apart,) = (one for one in differing_halves.halves(inverse) if one.name == "coulomb")
     assert (apart.first, apart.second) == pytest.approx((COULOMB, 2 * COULOMB), rel=0.1)
     sure = Estimate.normal("friction.coulomb", "N", 1.5 * COULOMB, 0.01, "output error")
-    findings = tuple(differing_halves.find(ValueCase(log, inverse, lacks=True)))
+    findings = tuple(differing_halves.find_differing_halves(ValueCase(log, inverse, lacks=True)))
     (fair,) = allowed([sure], replace(GOOD, findings=findings), inverse).estimates
     assert fair.holds(COULOMB)
     assert fair.holds(2 * COULOMB)
@@ -455,9 +453,9 @@ def test_a_feed_forward_that_is_not_logged_is_found(monkeypatch: pytest.MonkeyPa
     assert cause.without is not None
     assert inverse.value("mass") < 0.5 * MASS
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.05)
-    assert not [*perhaps_feedforward.find(case)]  # it is certain
-    monkeypatch.setattr(missing_feedforward, "lacks_when_fast", lambda *_: False)
-    (perhaps,) = perhaps_feedforward.find(case)
+    assert not [*controller.find_perhaps_feedforward(case)]  # it is certain
+    monkeypatch.setattr(controller, "lacks_when_fast", lambda *_: False)
+    (perhaps,) = controller.find_perhaps_feedforward(case)
     assert perhaps.size == pytest.approx(MASS, rel=0.05)
 
 
@@ -490,7 +488,7 @@ def test_a_controller_that_changes_its_gains_is_named(change: str) -> None:
     parts = {"after": log.time > 3.5, "above": speed > 0.25, "beyond": position > 0.02}
     error = servo_error(force / np.where(parts.get(change, False), 0.6, 1.0))
     followed = with_signals(log, reference=position + error)
-    doubts = [*changing_gains.find(RecordCase(followed, inverse_model(followed, 5.0)))]
+    doubts = [*controller.find_changing_gains(RecordCase(followed, inverse_model(followed, 5.0)))]
     assert len(doubts) == (change != "none")
     for doubt in doubts:
         assert doubt.size == pytest.approx(0.6, rel=0.15)
@@ -511,7 +509,7 @@ def test_an_integral_that_stands_while_the_force_is_limited_is_no_change_of_gain
         x += DT * v
     assert np.mean(np.abs(force) == most) > 0.05
     log = record("limited", DT, position=position, force=force + noise, reference=reference)
-    assert not [*changing_gains.find(RecordCase(log, inverse_model(log)))]
+    assert not [*controller.find_changing_gains(RecordCase(log, inverse_model(log)))]
 
 
 def test_much_that_nothing_explains_makes_intervals_wider() -> None:

@@ -15,11 +15,10 @@ from friso.identification.inverse_model import inverse_model, motion, unit_of
 from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.assemble import NOTE, read_log
 from friso.identification.logs.log import Log
-from friso.identification.logs.mapping import Mapping
+from friso.identification.logs.roles import Mapping
 from friso.identification.method import Identification, identify
 from friso.identification.moves import IdentifiedMoves
-from friso.identification.output_error.coverage import coverage
-from friso.identification.output_error.identifiable import IdentifiableFit
+from friso.identification.output_error.identifiable import IdentifiableFit, coverage
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import record
 from friso.identification.readings.settings import ReadingSettings

@@ -14,16 +14,20 @@ from friso.frequency.loops import linear
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
-from friso.identification.response.analysis import analyse, visible
-from friso.identification.response.closed_loop import crossovers, feedback
-from friso.identification.response.departure import departure
-from friso.identification.response.estimators import local_polynomial, multisine
+from friso.identification.response.analysis import analyse, crossovers, departure, feedback, visible
 from friso.identification.response.mass_line import mass_lines, straight_lines
 from friso.identification.response.masses import fit_one_mass, fit_two_mass, two_masses, widened
 from friso.identification.response.modes import fit_modes
-from friso.identification.response.period import find_periods
-from friso.identification.response.records import ResponseRecord, drift, from_log, relative_error
-from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.records import (
+    FrequencyResponse,
+    ResponseRecord,
+    drift,
+    find_periods,
+    from_log,
+    local_polynomial,
+    multisine,
+    relative_error,
+)
 from friso.identification.response.settings import ResponseSettings
 
 DT, PERIOD = 2e-3, 1000  # period of 2 s: lines at 0.5, 1, ... Hz

@@ -20,7 +20,7 @@ from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
-from friso.identification.logs.mapping import Mapping, load_mapping, mapping_text, sidecar
+from friso.identification.logs.roles import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.method import axis_of_all
 from friso.identification.output_error.parameters import bends
 from friso.identification.output_error.settings import OutputErrorSettings

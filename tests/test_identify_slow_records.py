@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 
 from friso.errors import InputError
-from friso.identification.doubt import KeyCase, RaisedDoubt
-from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
-from friso.identification.doubts.break_away_friction import friction_beyond
+from friso.identification.doubt import KeyCase, Quality, RaisedDoubt, quality_of
+from friso.identification.doubts import values
+from friso.identification.doubts.values import friction_beyond
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import bandwidth_of, inverse_model
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.output_error.to_keys import drawn_from
-from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import record
-from friso.identification.readings.ramps import Ramps
+from friso.identification.readings.motion_events import Ramps
 from friso.identification.stage_file import made_up
 
 FLAT = {"friction.stribeck_velocity": 1e-3, "axis.kind": "linear"}
@@ -57,7 +56,7 @@ def judged(find: Callable[[KeyCase], Iterable[RaisedDoubt]], case: KeyCase) -> K
 )
 def test_friction_at_slow_speeds_alone_is_no_coulomb_friction(stribeck: Estimate, top: float, left: bool) -> None:
     case = case_of((MASSES, COULOMB, stribeck), velocity=np.array([0.0, -top]))
-    kept = judged(slow_motion.find, case).determined
+    kept = judged(values.find_slow_motion, case).determined
     assert (COULOMB.name in kept) == left
     assert "masses.cart" in kept
 
@@ -67,7 +66,7 @@ def test_all_friction_at_the_highest_slow_speed_may_be_dry() -> None:
     viscous = Estimate.normal("friction.viscous", "N*s/m", 4e3, 100.0, "drawn")
     static = Estimate.unknown("friction.static", "N", "drawn", "not covered", 7.8, 16.0)
     case = case_of((MASSES, COULOMB, viscous, static, UNKNOWN), velocity=np.array([1e-3]))
-    coulomb, rest, static = judged(slow_motion.find, case).estimates[1:4]
+    coulomb, rest, static = judged(values.find_slow_motion, case).estimates[1:4]
     assert {one.determined for one in (coulomb, rest, static)} == {False}
     assert coulomb.high == pytest.approx(COULOMB.high + viscous.high * 1e-3)
     assert (static.low, static.high) == pytest.approx((coulomb.low, 4 * coulomb.high))
@@ -86,17 +85,17 @@ def test_stiffer_bristles_beside_errors_of_the_position(
     fit: Any = SimpleNamespace(problem=problem, inner=np.array([np.log(3e5)]), free=(0,), slopes=None)
     refitted = SimpleNamespace(inner=np.zeros((4, 1)), cost=2.0 * np.array(beyond))
     own = SimpleNamespace(residuals=lambda inner: np.full((1, 100), 2**0.5))
-    monkeypatch.setattr(stiffer_bristles, "refine_fit", lambda *arguments, **named: refitted)
-    monkeypatch.setattr(stiffer_bristles, "simulated_log", lambda *arguments: own)
+    monkeypatch.setattr(values, "refine_fit", lambda *arguments, **named: refitted)
+    monkeypatch.setattr(values, "simulated_log", lambda *arguments: own)
     case = case_of((stiffness,), fit=fit, inverse=SimpleNamespace(bandwidth=20.0))
-    assert (stiffness.name in judged(stiffer_bristles.find, case).determined) == left
+    assert (stiffness.name in judged(values.find_stiffer_bristles, case).determined) == left
 
 
 @pytest.mark.parametrize(("share", "off"), [(0.01, MASSES.half_width), (0.9, 0.81 * 3.0), (1.1, None)])
 def test_what_is_left_passes_for_inertia(share: float, off: float | None) -> None:
     """Little of it does nothing, much of it makes the mass uncertain, and beyond the inertia there is no mass."""
     case = case_of((MASSES,), acceleration=np.array([0.5, -0.5]), unexplained=share * 3.0 * 0.5)
-    (mass,) = judged(lost_inertia.find, case).estimates
+    (mass,) = judged(values.find_lost_inertia, case).estimates
     assert mass.determined == (off is not None)
     assert off is None or mass.half_width == pytest.approx(off)
 

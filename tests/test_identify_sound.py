@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.identify_effects import KEYS, Effects, plain, simulated
-from friso.identification.doubts import decaying_damping
+from friso.identification.doubts import values
 from friso.identification.experiments.moves import KIND
 from friso.identification.kind import NOTHING_CHOSEN, Prior
 
@@ -52,7 +52,7 @@ def test_bristles_are_refused_if_their_damping_falls_with_the_speed(seed: int, f
     moves = KIND.analyse([log], Prior(KIND.around(log)), NOTHING_CHOSEN)
     (stiffness,) = (estimate for estimate in moves.estimates if estimate.name == "friction.bristle_stiffness")
     assert stiffness.determined == (falls == 0)
-    assert stiffness.reason == decaying_damping.WHY if falls else stiffness.holds(machine["bristle"])
+    assert stiffness.reason == values.WHY_OF_DECAYING_DAMPING if falls else stiffness.holds(machine["bristle"])
 
 
 @pytest.mark.slow

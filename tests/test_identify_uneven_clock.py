@@ -14,7 +14,7 @@ from refusals import refused
 import friso
 from friso.identification.logs.log import Log
 from friso.identification.logs.time_base import is_uneven
-from friso.identification.readings.stamped_friction import local_polynomials, stamped_friction
+from friso.identification.readings.friction_velocity import local_polynomials, stamped_friction
 
 MOVE, DWELL, STROKE = 0.8, 0.3, 0.05
 MASS, VISCOUS, COULOMB, OFFSET = "mass", "friction.viscous", "friction.coulomb", "bias.cart"

@@ -16,8 +16,8 @@ from pages import Page
 from snapshots import Snapshots
 
 from friso.identification.combine import combined
-from friso.identification.estimate import Estimate
-from friso.identification.estimate_words import interval_text, value_text, with_interval
+from friso.identification.doubt import Quality
+from friso.identification.estimate import Estimate, interval_text, value_text, with_interval
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.experiments.constant_speed import KIND as CONSTANT_SPEED
 from friso.identification.experiments.constant_speed import FrictionAtSpeeds
@@ -29,12 +29,10 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.method import Experiment, Identification, Prediction
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, SimulationErrors, residual_of
-from friso.identification.output_error.coverage import coverage
 from friso.identification.output_error.fit import OutputErrorFit, first_values
-from friso.identification.output_error.identifiable import Profile
+from friso.identification.output_error.identifiable import Profile, coverage
 from friso.identification.output_error.parameters import fit_parameters
 from friso.identification.output_error.problem import Simulated, loop_problem, tracking
-from friso.identification.quality import Quality
 from friso.identification.readings.at_bearing import Between
 from friso.identification.readings.common import deflections, record
 from friso.identification.readings.friction_position import friction_position

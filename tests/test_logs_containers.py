@@ -18,7 +18,7 @@ import pytest
 from refusals import refused
 
 from friso.errors import LogError
-from friso.identification.logs import confined
+from friso.identification.logs import read
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.read import file_format, read_table
 from friso.identification.logs.settings import LogSettings
@@ -173,7 +173,7 @@ def test_a_missing_library_is_told_with_what_installs_it(
     excel(tmp_path / name)
     if start:
         (tmp_path / name).write_bytes(start + bytes(60))
-    monkeypatch.setattr(confined, "is_installed", lambda library: False)
+    monkeypatch.setattr(read, "is_installed", lambda library: False)
     with pytest.raises(LogError) as error:
         read_table(tmp_path / name)
     assert error.value.example == f'pip install "friso[{WITH_LIBRARY[name][1]}]"'

@@ -24,12 +24,12 @@ from scipy.io import savemat
 from systems import posix
 
 from friso.errors import InputError, LogError
-from friso.identification.logs import confined
-from friso.identification.logs import format as reading
+from friso.identification.logs import read
+from friso.identification.logs import read as reading
 from friso.identification.logs.assemble import read_log
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.mapping import Mapping
+from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
+from friso.identification.logs.roles import Mapping
 from friso.identification.logs.settings import LogSettings
 from friso.platform.system import LIMITS_MEMORY
 
@@ -628,9 +628,9 @@ def test_a_small_file_that_its_library_cannot_read_is_refused(
 @pytest.mark.slow
 def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit counts processor time; a file is given up only if it takes far longer."""
-    slow, program = tmp_path / "slow.py", confined.binary.__file__
+    slow, program = tmp_path / "slow.py", read.binary.__file__
     slow.write_text(f"import runpy, time\ntime.sleep(4.5)\nrunpy.run_path({program!r}, run_name='__main__')\n")
-    monkeypatch.setattr(confined.binary, "__file__", str(slow))
+    monkeypatch.setattr(read.binary, "__file__", str(slow))
     zeros_as_mat(tmp_path / "a.mat", 1000)
     with LogSettings(time_of_reading=4.0).in_use():
         assert channel(read_table(tmp_path / "a.mat"), "x").values.shape == (1000,)
@@ -671,7 +671,7 @@ def test_a_library_that_crashes_or_writes_for_ever_is_an_error_of_the_file(
 ) -> None:
     program = tmp_path / "crash.py"
     program.write_text(text, encoding="utf-8")
-    monkeypatch.setattr(confined.binary, "__file__", str(program))
+    monkeypatch.setattr(read.binary, "__file__", str(program))
     zeros_as_mat(tmp_path / "a.mat", 10)
     with refused("log"):
         read_table(tmp_path / "a.mat")
@@ -682,7 +682,7 @@ def test_nothing_but_numbers_and_texts_comes_back(tmp_path: Path, monkeypatch: p
     program, mark = tmp_path / "taken_over.py", tmp_path / "mark"
     evil = f"type('E', (), {{'__reduce__': lambda self: (__import__('os').mkdir, ({str(mark)!r},))}})()"
     program.write_text(f"import pickle, sys\nsys.stdout.buffer.write(pickle.dumps(({evil}, '')))\n", encoding="utf-8")
-    monkeypatch.setattr(confined.binary, "__file__", str(program))
+    monkeypatch.setattr(read.binary, "__file__", str(program))
     zeros_as_mat(tmp_path / "a.mat", 10)
     with pytest.raises(InputError):
         read_table(tmp_path / "a.mat")

@@ -10,10 +10,10 @@ import pytest
 
 from friso.errors import InputError
 from friso.identification.logs.assemble import read_log
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.mapping import Mapping
+from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.merge import aligned, merged, motions_of
 from friso.identification.logs.read import read_file
+from friso.identification.logs.roles import Mapping
 
 FINE = np.arange(-10.0, 45.0, 1e-3)
 

@@ -16,7 +16,7 @@ import friso
 from friso.errors import LogError
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import repeated_stamps
-from friso.identification.logs.mapping import from_options
+from friso.identification.logs.roles import from_options
 
 M = log_files.motion()
 

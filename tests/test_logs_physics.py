@@ -9,7 +9,7 @@ import pytest
 import friso
 from friso.errors import LogError
 from friso.identification.logs.checks import clipped_share
-from friso.identification.logs.mapping import Mapping, from_options
+from friso.identification.logs.roles import Mapping, from_options
 from friso.identification.readings.common import digit_of
 from friso.identification.sources import read_all, read_usable
 

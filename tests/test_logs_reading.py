@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 import friso
 from friso.errors import InputError
-from friso.identification.logs import mapping as mappings
+from friso.identification.logs import roles as mappings
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import (
     clipped_share,
@@ -26,8 +26,7 @@ from friso.identification.logs.checks import (
 )
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import ROLES, Log
-from friso.identification.logs.mapping import Mapping, from_options
-from friso.identification.logs.roles import role_of
+from friso.identification.logs.roles import Mapping, from_options, role_of
 from friso.identification.logs.time_base import resample_tracks, track
 from friso.identification.logs.units import in_si, read_scale, spelled, unit_factor
 from friso.identification.output_error.problem import loop_problem

@@ -7,7 +7,7 @@ from refusals import refused
 
 import friso
 from friso.identification.kind import as_set_up
-from friso.identification.logs.mapping import Mapping, load_mapping, mapping_text, sidecar
+from friso.identification.logs.roles import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.sources import read_all
 from friso.progress import silent
 from friso.stage import Stage

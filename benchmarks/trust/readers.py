@@ -22,7 +22,7 @@ import psutil
 
 import friso
 from friso.design_method.spec import load_spec
-from friso.identification.logs import binary, confined, mapping
+from friso.identification.logs import binary, read, roles
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.read import is_frequency_response, read_frequency_response
@@ -61,7 +61,7 @@ def _uncertain() -> Stage:
 
 
 def _mapping(path: Path) -> None:
-    mapping.load_mapping(path.with_name("log.csv"))
+    roles.load_mapping(path.with_name("log.csv"))
 
 
 def _log(path: Path) -> None:
@@ -69,12 +69,12 @@ def _log(path: Path) -> None:
         read_frequency_response(path)
         return
     with suppress(GapsError):  # a MAT file without units is read, and asks for them
-        read_log(path, mapping.Mapping(), strict=False, needed=("position", "force"))
+        read_log(path, roles.Mapping(), strict=False, needed=("position", "force"))
 
 
 def _binary_log(path: Path) -> None:
     """Read a log as friso does, but in a copy of this process instead of a new Python."""
-    with mock.patch.object(confined, "_answer", _forked):
+    with mock.patch.object(read, "_answer", _forked):
         _log(path)
 
 

@@ -34,7 +34,7 @@ from friso.errors import InputError
 from friso.hunting import cannot_hunt, is_moved_evenly, unstable
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.log import Log
-from friso.identification.logs.mapping import MAPPABLE
+from friso.identification.logs.roles import MAPPABLE
 from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
 from friso.questions.logs.question import LogsAnswer, options_of

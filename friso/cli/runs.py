@@ -30,7 +30,7 @@ from friso.platform.system import shell_word
 from friso.progress import Progress
 
 if TYPE_CHECKING:
-    from friso.identification.logs.mapping import Mapping as LogMapping
+    from friso.identification.logs.roles import Mapping as LogMapping
     from friso.interface.output_folder import OutputFolder
     from friso.shown.blocks import Content
 
@@ -59,7 +59,7 @@ def run_identify(question: Question, about: Sequence[Any], options: Mapping[str,
 
     Raises InputError with the command to type if a question about a log is open.
     """
-    from friso.identification.logs.mapping import sidecar
+    from friso.identification.logs.roles import sidecar
     from friso.identification.sources import OpenQuestions
     from friso.interface.output_folder import OutputFolder
     from friso.questions.identify.words import STAGE
@@ -91,7 +91,7 @@ def _keep(mappings: dict[Path, LogMapping], target: OutputFolder) -> list[Path]:
 
     A log whose stored mapping is unchanged is left out.
     """
-    from friso.identification.logs.mapping import load_mapping, mapping_text
+    from friso.identification.logs.roles import load_mapping, mapping_text
     from friso.identification.sources import kept_at
     from friso.interface.output_folder import write
 

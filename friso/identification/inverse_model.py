@@ -24,11 +24,11 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.errors import InputError
+from friso.identification.combine import groups_of, spread_of
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.readings.common import noise_of, on_bearing, turns_of
 from friso.identification.settings import doubt_settings, identification_settings
-from friso.identification.spread import groups_of, spread_of
 
 METHOD = "least squares on the inverse model"
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.combine import Correlated, determined
-from friso.identification.estimate import Estimate
-from friso.identification.estimate_words import name_of, with_interval
+from friso.identification.estimate import Estimate, name_of, with_interval
 from friso.identification.logs.log import Log, join_alike
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import Course

@@ -19,8 +19,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
 from friso.identification.kinds import KINDS, in_order
 from friso.identification.logs.log import Log
-from friso.identification.stage_file import identified_stage, origins, with_unknown
-from friso.identification.stage_keys import Fitting, fitting
+from friso.identification.stage_file import Fitting, fitting, identified_stage, origins, with_unknown
 from friso.progress import Progress, silent, together
 from friso.stage import Stage
 from friso.stage.correlations import Correlations

@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.identification.doubt import FitCase, FittedCase, KeyCase, judged_fit, judged_keys, leading_effect, raised
+from friso.identification.combine import binned, correlation_length
+from friso.identification.doubt import (
+    FitCase,
+    FittedCase,
+    KeyCase,
+    Quality,
+    judged_fit,
+    judged_keys,
+    leading_effect,
+    quality_of,
+    raised,
+)
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import (
     FilteredMotion,
@@ -22,17 +33,19 @@ from friso.identification.inverse_model import (
 from friso.identification.kind import FirstEstimates
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for
-from friso.identification.output_error.coverage import Coverage, coverage
-from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import IdentifiableFit, Profile, fit_identifiable
+from friso.identification.output_error.fit import OutputErrorFit, as_far_off_as_repeated, late_by_a_sample
+from friso.identification.output_error.identifiable import (
+    Coverage,
+    IdentifiableFit,
+    Profile,
+    coverage,
+    fit_identifiable,
+)
 from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
-from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
 from friso.identification.output_error.to_keys import drawn_from, estimates_of
-from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
 from friso.identification.settings import identification_settings
-from friso.identification.spread import binned, correlation_length
 from friso.identification.witness import Replay, witnessed
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER

@@ -122,10 +122,9 @@ def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | Non
     `names` has the channel of the reference, that of the time, and the unit of the reference; None leaves the choice to
     friso. Raises LogError for a file that cannot be read, or one without such channels.
     """
-    from friso.identification.logs.format import FORMATS
     from friso.identification.logs.gaps import check_gaps
-    from friso.identification.logs.mapping import Mapping as Told
-    from friso.identification.logs.read import file_format, read_table
+    from friso.identification.logs.read import FORMATS, file_format, read_table
+    from friso.identification.logs.roles import Mapping as Told
     from friso.identification.logs.roles import propose, role_of
     from friso.identification.logs.signals import Notes, Reading, instants, signal, with_user_units
 

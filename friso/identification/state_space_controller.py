@@ -103,7 +103,7 @@ def _from_file(path: Path, names: list[str]) -> list[np.ndarray]:
     Raises InputError for a missing file or variable.
     """
     from friso.identification.logs.binary import is_hdf5
-    from friso.identification.logs.confined import content, content_by
+    from friso.identification.logs.read import content, content_by
 
     if not path.is_file():
         raise InputError("controller.file", quoted(str(path)), "a MAT file with the matrices", '"controller.mat"')

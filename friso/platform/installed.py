@@ -24,7 +24,7 @@ from friso.errors import InputError
 
 EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo"), "fmu": ("fmpy",)}
 """Packages of each extra that commands or what they write need, by the extra's name in pyproject.toml.
-`friso.identification.logs.confined` lists packages of log formats."""
+`friso.identification.logs.read` lists packages of log formats."""
 
 
 def install(extra: str) -> str:

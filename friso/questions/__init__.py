@@ -8,7 +8,7 @@ from friso.interface.question import HELP, HUNTS, MACHINE, STOPS, WHERE, WHY, Ch
 
 def listed_formats() -> list[tuple[str, str]]:
     """Return the formats of logs that friso reads, with one line on each."""
-    from friso.identification.logs.format import FORMATS
+    from friso.identification.logs.read import FORMATS
 
     return [(FORMATS[name].title, FORMATS.one_line(name)) for name in FORMATS]
 

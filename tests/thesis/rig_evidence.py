@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.records import FrequencyResponse
 from friso_thesis.studies.rig.experiments.frf import MeasuredLoop, Plant
 from friso_thesis.studies.rig.in_position import InPosition, NoisyStandstill, Standstill
 from friso_thesis.studies.rig.moves_on_rails import RailRuns

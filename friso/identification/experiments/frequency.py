@@ -10,9 +10,7 @@ import numpy as np
 
 from friso.identification.combine import Correlated, determined
 from friso.identification.doubt import words_of
-from friso.identification.estimate import Estimate
-from friso.identification.estimate_documents import estimate_document, estimates_document
-from friso.identification.estimate_words import digits, name_of, unit_of, with_interval
+from friso.identification.estimate import Estimate, digits, name_of, unit_of, with_interval
 from friso.identification.kind import (
     AREA,
     AnalysisSettings,
@@ -26,9 +24,9 @@ from friso.identification.readings.course import Course
 from friso.identification.response.analysis import Bench, analyse, predicted
 from friso.identification.response.mass_line import StraightLine
 from friso.identification.response.masses import TwoMass
-from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.records import FrequencyResponse
 from friso.identification.settings import experiment_settings
-from friso.identification.stage_keys import shared_masses
+from friso.identification.stage_file import estimate_document, estimates_document, shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import (

@@ -13,15 +13,22 @@ from scipy.integrate import cumulative_trapezoid
 
 from friso.errors import InputError, LogError
 from friso.identification.logs import checks
-from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.gaps import GapsError, check_gaps, told_by_mechanics
-from friso.identification.logs.log import ROLES, Log
-from friso.identification.logs.mapping import Mapping, option
-from friso.identification.logs.physics import MotionReading, is_ramp
+from friso.identification.logs.log import ROLES, Channel, ChannelTable, Log
 from friso.identification.logs.read import ReadFile, read_file
-from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of, wanted_of
+from friso.identification.logs.roles import AssignedRole, Mapping, Proposal, option, propose, role_of, wanted_of
 from friso.identification.logs.settings import settings
-from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
+from friso.identification.logs.signals import (
+    MotionReading,
+    Notes,
+    Reading,
+    instants,
+    is_ramp,
+    no_time,
+    signal,
+    unused,
+    with_user_units,
+)
 from friso.identification.logs.time_base import Track, as_stamped, is_uneven, resample_tracks, track
 from friso.identification.logs.units import unit_factor
 from friso.quantities import percent, quoted

@@ -1,4 +1,4 @@
-"""Program that reads binary logs by the libraries of their formats, run by `friso.identification.logs.confined`.
+"""Program that reads binary logs by the libraries of their formats, run by `friso.identification.logs.read`.
 
 The program imports nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY CPU SECONDS``, with
 the memory in bytes (0 for no limit), and the processor time [s], which not every system limits. The program writes a

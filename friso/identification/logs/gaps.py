@@ -13,31 +13,37 @@ import numpy as np
 
 from friso.axis import ROTARY
 from friso.errors import InputError, LogError
-from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.checks import samples_held
-from friso.identification.logs.log import ROLES
-from friso.identification.logs.mapping import guess, option
-from friso.identification.logs.physics import (
-    KINDS,
-    MotionReading,
-    is_ramp,
-    leads,
-    motion_readings,
-    with_positions_first,
-)
+from friso.identification.logs.log import ROLES, Channel, ChannelTable
 from friso.identification.logs.roles import (
     MEASURED,
     AssignedRole,
     Proposal,
+    guess,
     is_wanted,
     listing,
     of_no_signal,
+    option,
     role_of,
     wanted_of,
     words,
 )
 from friso.identification.logs.settings import settings
-from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, turning_names, unit_gap
+from friso.identification.logs.signals import (
+    KINDS,
+    TURNS,
+    MotionReading,
+    Notes,
+    Reading,
+    instants,
+    is_ramp,
+    leads,
+    motion_readings,
+    no_time,
+    turning_names,
+    unit_gap,
+    with_positions_first,
+)
 from friso.identification.logs.units import OTHERS, unit_factor
 from friso.quantities import quoted
 

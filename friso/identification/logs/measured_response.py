@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from friso.errors import LogError
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.number_format import NUMBER
+from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.roles import words
-from friso.identification.logs.units import RESPONSES, of_decibels, spelled, unit_factor
-from friso.identification.logs.word_lists import channel_words
+from friso.identification.logs.sniff import NUMBER
+from friso.identification.logs.units import RESPONSES, channel_words, of_decibels, spelled, unit_factor
 from friso.quantities import Quantity, any_sign
 
 _KEYS = channel_words()["response"]

@@ -13,10 +13,9 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.stats import t as student
 
 from friso.errors import LogError
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.mapping import Mapping
+from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.read import ReadFile
-from friso.identification.logs.roles import AssignedRole, propose
+from friso.identification.logs.roles import AssignedRole, Mapping, propose
 from friso.identification.logs.settings import settings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, with_user_units
 from friso.quantities import percent

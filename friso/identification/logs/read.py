@@ -1,22 +1,340 @@
-"""Read a file by its content, not by its name; every format gives a table of channels."""
+"""Read files of logs: unpacked, within limits, by their format.
+
+Unpack files that are packed by gzip, bzip2 or xz, or alone in a ZIP archive.
+
+Read binary logs in a separate process, in which a damaged or hostile file can crash only its own reader.
+
+Some formats need optional libraries.
+
+Take a sample of a large text: its beginning, middle and end, in a file of their own.
+
+Define what a log format declares, and the registry of formats.
+
+Read a file by its content, not by its name; every format gives a table of channels.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import bz2
+import gzip
+import io
+import lzma
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from pathlib import Path
+from functools import cached_property, lru_cache, partial
+from pathlib import Path, PurePosixPath
+from shutil import rmtree
+from tempfile import mkdtemp
+from threading import Timer
+from typing import IO, Any
+from weakref import finalize
 
 from friso.errors import InputError, LogError
-from friso.identification.logs.channel import ChannelTable
-from friso.identification.logs.format import FORMATS, FileHead, LogFormat
+from friso.identification.logs import binary
+from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.measured_response import MeasuredResponse
-from friso.identification.logs.packed import unpacked
-from friso.identification.logs.sample import sample_of
 from friso.identification.logs.settings import settings
-from friso.platform.system import cause_of, once_free
+from friso.identification.logs.sniff import decoded_head
+from friso.platform.installed import install, is_installed
+from friso.platform.system import LIMITS_MEMORY, cause_of, once_free
 from friso.quantities import percent
+from friso.registry import Registry
+
+_OPENERS = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ\x00": lzma.open}
+"""First bytes of packed files, with what opens them."""
+ZIP = b"PK\x03\x04"
+"""First bytes of a ZIP archive."""
+
+
+class UnpackedFile:
+    """A file unpacked into a folder of its own, which lasts as long as this object."""
+
+    def __init__(self, name: str) -> None:
+        """Make the folder for a file of a name."""
+        folder = mkdtemp(prefix="friso-")
+        finalize(self, rmtree, folder, ignore_errors=True)
+        self.path = Path(folder) / (name or "log")
+
+
+def members(path: Path) -> list[str]:
+    """Return the names of the files in a ZIP archive; [] for another file."""
+    with suppress(OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        if _start(path).startswith(ZIP):
+            with zipfile.ZipFile(path) as archive:
+                return [name for name in archive.namelist() if not name.endswith("/")]
+    return []
+
+
+def _start(path: Path) -> bytes:
+    """Return the first six bytes of a file."""
+    with path.open("rb") as file:
+        return file.read(6)
+
+
+def unpacked(path: Path) -> UnpackedFile | None:
+    """Unpack a packed file; None for a file that is not packed.
+
+    Archives that are workbooks or arrays are no packed files. Raises LogError for a damaged file, for one that grows
+    too much, and for an archive of several files.
+    """
+    try:
+        start = _start(path) if path.is_file() else b""
+    except (OSError, ValueError):  # the reading of the file says why
+        return None
+    if not start.startswith((*_OPENERS, ZIP)):
+        return None
+    status = path.stat()
+    return _unpacked(path.resolve(), start, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=2)  # recognising a format and reading the file unpack one file
+def _unpacked(path: Path, start: bytes, size: int, changed: int) -> UnpackedFile | None:
+    """Unpack a file that begins with some bytes; `size` and the time of the last change identify its state."""
+    names = members(path)
+    if start.startswith(ZIP) and (is_workbook(names) or is_of_arrays(names)):
+        return None
+    if start.startswith(ZIP) and len(names) != 1:
+        actual = f"a ZIP archive of {len(names)} files"
+        raise LogError("log", actual, "an archive of one file, or the log unpacked from it", "", str(path))
+    most = min(settings.bytes_of_a_log, settings.bytes_unpacked + settings.bytes_unpacked_per_byte * size)
+    kept = UnpackedFile(PurePosixPath(names[0].replace("\\", "/")).name if names else path.stem)
+    try:
+        if names:
+            with zipfile.ZipFile(path) as archive, archive.open(names[0]) as packed:
+                written = _copied(packed, kept.path, most)
+        else:
+            opener = next(_OPENERS[mark] for mark in _OPENERS if start.startswith(mark))
+            with opener(path, "rb") as packed:
+                written = _copied(packed, kept.path, most)
+    except (OSError, EOFError, lzma.LZMAError, zlib.error, zipfile.BadZipFile, RuntimeError, ValueError) as error:
+        why = str(error) or type(error).__name__
+        raise LogError(
+            "log", f"a packed file that cannot be unpacked ({why})", "a complete file", "", str(path)
+        ) from None
+    if written > most:
+        actual = f"a packed file of {size / 1e6:.3g} MB that holds more than {most / 1e6:.3g} MB"
+        raise LogError("log", actual, "the log unpacked from it", "", str(path))
+    return kept
+
+
+def is_workbook(names: list[str]) -> bool:
+    """Tell whether the files in an archive make it a workbook, of Excel or OpenDocument."""
+    return "xl/workbook.xml" in names or {"mimetype", "content.xml"} <= {*names}
+
+
+def is_of_arrays(names: list[str]) -> bool:
+    """Tell whether all files in an archive are arrays of NumPy."""
+    return bool(names) and all(name.endswith(".npy") for name in names)
+
+
+def _copied(packed: IO[Any], path: Path, most: int) -> int:
+    """Copy at most a little over `most` bytes into a file; return how many."""
+    written = 0
+    with path.open("wb") as file:
+        while written <= most and (block := packed.read(1 << 20)):
+            written += file.write(block)
+    return written
+
+
+CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
+"""Signal that ends a process that has used too much processor time, on systems that count it."""
+
+
+def content(kind: str, path: Path) -> dict[str, Any]:
+    """Read a binary log in a separate process; `kind` names a reader of `binary`.
+
+    Raises LogError for a file that cannot be read within bounds of time, and of memory where the system has such limits
+    (`LIMITS_MEMORY`).
+    """
+    status = path.stat()
+    return _content(kind, path.resolve(), status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=1)  # recognising a format and reading the file ask for one content
+def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
+    """Read a binary log in a separate process; the result is cached until the file changes.
+
+    `size` [B] and the time of the last change, `changed`, identify its state. Raises LogError for a file that cannot be
+    read.
+    """
+    memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
+    seconds = settings.time_of_reading + size / settings.speed_of_reading
+    patience = settings.patience_with_a_busy_machine * seconds
+    command = [sys.executable, "-P", binary.__file__, kind, str(path), *map(str, (memory, seconds, 2 * patience))]
+    try:
+        answer = _answer(command, patience, binary.most_bytes(size))
+    except TimeoutError:
+        why = f"it was not read within {patience:.0f} s: the machine is busy, or the disk slow"
+        raise broken(kind, why, path) from None
+    if answer is None:
+        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path)
+    try:
+        read, message = _PlainUnpickler(io.BytesIO(answer)).load()
+    except Exception:  # any failure of unpickling means that the output is not the reader's
+        raise broken(kind, "it makes the library crash", path) from None
+    if read is None:
+        raise broken(kind, message, path)
+    return read
+
+
+def _answer(command: list[str], seconds: float, most: int) -> bytes | None:
+    """Return the first `most` + 1 bytes of a program's output.
+
+    Returns None if it exceeded its processor time. Raises TimeoutError if it takes longer than `seconds`.
+    """
+    environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
+    pipe, late = subprocess.PIPE, []
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=environ) as process:
+        timer = Timer(seconds, lambda: (late.append(True), process.kill()))
+        timer.start()
+        try:
+            assert process.stdout is not None
+            answer = process.stdout.read(most + 1)
+            if not answer:
+                process.wait()
+        finally:
+            timer.cancel()
+            process.kill()
+    if late:
+        raise TimeoutError
+    return None if process.returncode == -CPU_SIGNAL < 0 else answer
+
+
+class _PlainUnpickler(pickle.Unpickler):
+    """Unpickler of plain types and NumPy arrays that refuses everything else."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return a class or function of which arrays consist, and refuse everything else."""
+        if module.partition(".")[0] == "numpy" and name in ("ndarray", "dtype", "_reconstruct", "_frombuffer"):
+            return super().find_class(module, name)
+        raise pickle.UnpicklingError(f"{module}.{name}")
+
+
+def broken(kind: str, why: str, path: Path) -> LogError:
+    """Return the error for a file that cannot be read."""
+    return LogError("log", f"a {kind} file that cannot be read ({why})", f"a complete {kind} file", "", str(path))
+
+
+def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
+    """Read the contents of a log in the format `kind`, which needs an optional library.
+
+    Raises LogError, which says how to install a missing library.
+    """
+    if not is_installed(library):
+        actual = f"a {kind} file, and the library {library} is not installed"
+        raise LogError("log", actual, "the library", install(kind.lower()), str(path))
+    return content(kind, path)
+
+
+def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
+    """Write a line for each channel that has fewer samples than the (truncated) file states.
+
+    `stated` has the stated number for each channel, or None. Returns [] if no channel is shorter.
+    """
+    return [
+        f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
+        for channel, count in zip(channels, stated, strict=True)
+        if count is not None and channel.values.size < count < math.inf
+    ]
+
+
+def filled_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
+    """Make a table of the channels with samples.
+
+    Raises LogError if no channel has samples.
+    """
+    filled = tuple(channel for channel in channels if channel.values.size)
+    if not filled:
+        raise LogError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))
+    return ChannelTable(filled, {}, (f"format: {kind}", f"{len(filled)} channels", *notes))
+
+
+@dataclass(frozen=True)
+class TextSample:
+    """Lines of a text in a `file` of their own.
+
+    `growth` is the ratio of the sizes of text and sample; `later` counts the lines that do not stand at the beginning.
+    """
+
+    file: UnpackedFile
+    growth: float
+    later: int
+
+
+def sample_of(path: Path) -> TextSample | None:
+    """Take whole lines from the beginning, the middle and the end of a text.
+
+    Returns None for a text that is hardly larger than its sample, or whose lines end with another sign than a line
+    feed. Raises LogError for what is no text.
+    """
+    size, part = path.stat().st_size, settings.bytes_of_a_part
+    encoding = decoded_head(path)[0]
+    if size < 2 * 3 * part or encoding.startswith("utf-16"):
+        return None
+    pieces = []
+    with path.open("rb") as file:
+        for place in (0, size // 2, size - part):
+            file.seek(place)
+            piece = file.read(part)
+            first, last = piece.find(b"\n") + 1 if place else 0, piece.rfind(b"\n") + 1
+            pieces.append(piece[first:last])
+    if not all(pieces):
+        return None
+    sample = UnpackedFile(path.name)
+    sample.path.write_bytes(b"".join(pieces))
+    return TextSample(sample, size / sum(map(len, pieces)), sum(piece.count(b"\n") for piece in pieces[1:]))
+
+
+@dataclass(frozen=True)
+class FileHead:
+    """Data from which the format of a file is recognised: its path, and its first 520 bytes."""
+
+    path: Path
+    start: bytes
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """Return the first lines of the file; [] for one that is no text."""
+        try:
+            return decoded_head(self.path)[1]
+        except LogError:
+            return []
+
+
+@dataclass(frozen=True)
+class LogFormat:
+    """A format of logs: its `title`, how it is recognised, and the reader of its channels.
+
+    Formats are tried by rank: 0 for those recognised by their first bytes, 1 by their first lines, 2 for any text.
+    `units` tells whether files can contain units; `times` whether channels come with their instants, so that no time
+    column is needed. `of_lines` tells whether any lines of a file can be read without the others, below its first ones.
+    `holds_response` tells whether a file contains a frequency response instead of signals over time,
+    which `read_response` reads. Readers raise LogError.
+    """
+
+    title: str
+    recognise: Callable[[FileHead], bool]
+    read: Callable[[Path], ChannelTable]
+    rank: int = 0
+    units: bool = True
+    times: bool = True
+    of_lines: bool = False
+    holds_response: Callable[[Path], bool] = lambda path: False
+    read_response: Callable[[Path], MeasuredResponse] | None = None
+
+
+FORMATS: Registry[LogFormat] = Registry("friso.identification.logs.formats", "FORMAT")
+"""All log formats, in the table of `friso/identification/logs/formats/`."""
+
 
 _SAVED = "the same saved as one of the formats that friso reads"
 _OTHERS = {

@@ -1,11 +1,19 @@
-"""Convert unit texts of files and options to SI where possible."""
+"""Units of channels, and lists of words for them.
+
+Load the word lists by which channels and units are recognised, from the TOML files beside this module.
+
+Convert unit texts of files and options to SI where possible.
+"""
 
 from __future__ import annotations
 
 import re
+import tomllib
 import unicodedata
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +21,33 @@ from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.settings import settings
-from friso.identification.logs.word_lists import channel_words, read_lists
 from friso.quantities import Quantity, any_sign, quoted
+
+
+@cache
+def read_lists(name: str) -> dict[str, Any]:
+    """Return the tables of `NAME.toml`, read once."""
+    return tomllib.loads(files("friso.identification.logs").joinpath(f"{name}.toml").read_text("utf-8"))
+
+
+@cache
+def channel_words() -> dict[str, Any]:
+    """Return the words in a channel's name that tell what it is, from names.toml.
+
+    Keys are the tables of that file, nested as there. Values are sets of words, all languages together.
+    """
+    return _joined(read_lists("names"))
+
+
+def _joined(table: dict[str, Any]) -> dict[str, Any]:
+    """Join word lists, one for each language, into one set; nested tables likewise."""
+    return {
+        key: frozenset(word for words in value.values() for word in words)
+        if all(isinstance(words, list) for words in value.values())
+        else _joined(value)
+        for key, value in table.items()
+    }
+
 
 _WORDS = read_lists("units")
 RMS, COUNTS = (frozenset(_WORDS[name]) for name in ("rms", "counts"))

@@ -1,5 +1,14 @@
-"""Fit the whole model: simulate a thousand starts, refine the best few side by side, and iterate the best to the
-end."""
+"""Fits of simulated motion to logs: refined, repeated, and moved by what the model leaves out.
+
+Refine many starts at once by Levenberg-Marquardt; the runs of all starts are simulated side by side.
+
+Fit the whole model: simulate a thousand starts, refine the best few side by side, and iterate the best to the
+end.
+
+Estimate how far a force that the model leaves out would move a fit, by one linear step.
+
+Estimate the error of a fit by repeating it on simulated logs of the fitted machine, whose true values are known.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +18,190 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
+from scipy.stats import chi2, norm, qmc
+from scipy.stats import t as student
 
 from friso.engine.batch import Inputs
-from friso.identification.output_error.parameters import FitParameter, stages
-from friso.identification.output_error.problem import Problem
-from friso.identification.output_error.refine import refine_fit
+from friso.identification.combine import UPPER_PROBABILITY, binned, correlation_length, groups_of, spread_of
+from friso.identification.logs.log import Log
+from friso.identification.output_error.parameters import BRISTLES, FitParameter, stages
+from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.settings import settings
-from friso.identification.spread import correlation_length, groups_of, spread_of
+from friso.identification.readings.common import digit_of, noise_of
+from friso.identification.settings import identification_settings
 from friso.intervals import NORMAL_COVERAGE
 from friso.progress import Progress, Tally, share_of, silent
+
+TRIED_DAMPINGS = np.array([0.1, 1.0, 10.0, 100.0])
+"""Levenberg-Marquardt dampings that are tried at once, relative to the previous best damping."""
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Refined numbers, (starts, parameters), and their mean square residuals [N^2], (starts,)."""
+
+    inner: np.ndarray
+    cost: np.ndarray
+
+
+def refine_fit(
+    pieces: Sequence[Problem],
+    starts: np.ndarray,
+    free: np.ndarray,
+    iterations: int,
+    enough: float,
+    progress: Progress = silent,
+    aim: float = np.inf,
+    slopes: np.ndarray | None = None,
+) -> Refined:
+    """Fit all `pieces` of a problem from several starts at once (Levenberg, Marquardt).
+
+    The starts have the shape (starts, parameters); `free`, of equal shape or (parameters,), marks the numbers to fit. A
+    fit ends when its sum of squares falls by less than the fraction `enough`.
+
+    For every start several dampings are tried side by side, which costs less than derivatives. After a step the
+    derivatives are updated from the change of the residual (Broyden 1965, doi:10.1090/S0025-5718-1965-0198670-6). They
+    are computed anew if it falls little, or by much less than they predict. `slopes`, shape (samples, parameters), are
+    derivatives near the starts, if they are known. A fit that would not fall to the mean square `aim` at the pace of
+    its last iteration is abandoned. Only derivatives computed at its own numbers end or abandon a fit.
+    """
+    (low, high), free = pieces[0].bounds, np.broadcast_to(free, starts.shape)
+    margin = settings.range_share_inside * (high - low)
+    low, high = low + margin, high - margin
+    inner = np.clip(starts, low, high)
+    rest = _residuals(pieces, inner)
+    cost = mean_square(rest)
+    damping = np.full(len(inner), settings.first_damping)
+    busy = np.isfinite(cost)
+    near = np.full((rest.shape[1], inner.shape[1]), np.nan) if slopes is None else slopes
+    slopes = np.where(free[:, None, :], near, 0.0)
+    exact, asked = np.zeros(len(inner), bool), ~np.all(np.isfinite(slopes), axis=(1, 2))
+    for iteration in range(iterations):
+        progress(iteration, iterations, "")
+        anew = np.flatnonzero(busy & asked)
+        slopes[anew], exact[anew] = _derivatives(pieces, inner[anew], free[anew], rest[anew]), True
+        busy &= np.all(np.isfinite(slopes), axis=(1, 2)) & (damping < settings.highest_damping)
+        rows = np.flatnonzero(busy)
+        if not rows.size:
+            break
+        step = _best_steps(
+            pieces, inner[rows], rest[rows], slopes[rows], damping[rows, None] * TRIED_DAMPINGS, (low, high)
+        )
+        fallen = cost[rows] - step.cost
+        better, slow = fallen > 0, fallen < enough * cost[rows]
+        late = cost[rows] - (iterations - iteration) * np.maximum(fallen, 0.0) > aim
+        poor = fallen < settings.share_of_predicted_fall * (cost[rows] - step.predicted)
+        raised = np.where(
+            exact[rows],
+            damping[rows] * TRIED_DAMPINGS[-1] * (TRIED_DAMPINGS[1] / TRIED_DAMPINGS[0]) / TRIED_DAMPINGS[0],
+            damping[rows],
+        )
+        damping[rows] = np.where(better, step.damping, raised)
+        busy[rows] = ~(exact[rows] & (late | (better & slow)))
+        asked[rows] = np.where(better, poor | slow | late, ~exact[rows])
+        taken, rows = np.flatnonzero(better), rows[better]
+        for k, row in zip(taken, rows, strict=True):
+            slopes[row] += np.outer(step.missed[k], step.weights[k])
+        inner[rows], cost[rows], rest[rows] = step.inner[taken], step.cost[taken], step.residual[taken]
+        exact[rows] = False
+    return Refined(inner, cost)
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """The best of several damped steps of each row.
+
+    Fields are the numbers after it, (rows, parameters), with their `residual` [N], (rows, samples), and its mean square
+    `cost` [N^2], (rows,); the `damping`, (rows,); the mean square `predicted` by the derivatives, (rows,); the part of
+    the residual's change that they `missed`, (rows, samples), and the `weights`, (rows, parameters), with which it
+    enters the derivatives by the parameters.
+    """
+
+    inner: np.ndarray
+    residual: np.ndarray
+    cost: np.ndarray
+    damping: np.ndarray
+    predicted: np.ndarray
+    missed: np.ndarray
+    weights: np.ndarray
+
+
+def _best_steps(
+    pieces: Sequence[Problem],
+    inner: np.ndarray,
+    rest: np.ndarray,
+    slopes: np.ndarray,
+    dampings: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+) -> _Steps:
+    """Try several dampings, shape (rows, dampings), of each row of numbers (rows, parameters); return the best steps.
+
+    `rest` [N] has the residuals, (rows, samples), and `slopes` their derivatives, (rows, samples, parameters). `ends`
+    are those of the parameters' ranges: a number at one of them stays there while it is driven outwards.
+    """
+    low, high = ends
+    across = np.swapaxes(slopes, 1, 2)
+    squares, downhill = across @ slopes, -(across @ rest[:, :, None])[:, :, 0]
+    inside = ((inner > low) | (downhill > 0)) & ((inner < high) | (downhill < 0))
+    steps = _steps(squares * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
+    trials = np.clip(inner[:, None] + steps, low, high)
+    rests = _residuals(pieces, trials.reshape(-1, inner.shape[1])).reshape(*dampings.shape, -1)
+    costs = mean_square(rests)
+    best = np.arange(len(inner)), costs.argmin(axis=1)
+    step = trials[best] - inner
+    linear = rest + (slopes @ step[:, :, None])[:, :, 0]
+    missed, weights = rests[best] - linear, _weights(step, squares)
+    return _Steps(trials[best], rests[best], costs[best], dampings[best], mean_square(linear), missed, weights)
+
+
+def _weights(steps: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """Return the shares of a change of the residual in its derivatives, for steps (rows, parameters).
+
+    The result has the shape of the steps. `squares` (rows, parameters, parameters) are products of derivatives, whose
+    diagonal scales the parameters.
+    """
+    weighted = np.diagonal(squares, axis1=1, axis2=2) * steps
+    length = np.sum(weighted * steps, axis=1, keepdims=True)
+    return np.divide(weighted, length, out=np.zeros_like(steps), where=length > 0)
+
+
+def _residuals(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
+    """Return the residuals [N] of all pieces for fitted numbers (runs, parameters), shape (runs, samples).
+
+    They are infinite for runs that failed.
+    """
+    return np.concatenate([problem.residuals(inner) for problem in pieces], axis=1)
+
+
+def mean_square(residuals: np.ndarray) -> np.ndarray:
+    """Return the mean squares of residuals over their last axis."""
+    return np.mean(residuals**2, axis=-1)
+
+
+def _derivatives(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the residuals by fitted numbers, shape (rows, samples, parameters).
+
+    They are 0 for numbers that are not `free`. `rest` has the residuals [N], (rows, samples).
+    """
+    slopes = np.zeros((len(inner), sum(len(problem.target) for problem in pieces), inner.shape[1]))
+    first = 0
+    for problem in pieces if len(inner) else ():
+        part = slice(first, first := first + len(problem.target))
+        for row, jacobian in enumerate(problem.jacobians(inner, free, rest[:, part])):
+            slopes[row][part, free[row]] = jacobian
+    return slopes
+
+
+def _steps(squares: np.ndarray, downhill: np.ndarray, dampings: np.ndarray) -> np.ndarray:
+    """Return damped Gauss-Newton steps, shape (rows, dampings, parameters).
+
+    `squares` (rows, parameters, parameters) is J' J, and `downhill` (rows, parameters) is -J' r. `dampings` has the
+    shape (rows, dampings).
+    """
+    curvature = np.diagonal(squares, axis1=1, axis2=2)
+    diagonal = np.where(curvature > 0, curvature, 1.0)[:, :, None] * np.eye(downhill.shape[1])
+    damped = squares[:, None] + dampings[:, :, None, None] * diagonal[:, None]
+    return np.linalg.solve(damped, downhill[:, None, :, None])[..., 0]
 
 
 @dataclass(frozen=True)
@@ -306,3 +489,203 @@ def shift_against(change: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     size = np.linalg.norm(slopes, axis=0)
     size = np.where(size > 0, size, 1.0)
     return -np.linalg.lstsq(slopes / size, change, rcond=settings.smallest_singular_value)[0] / size
+
+
+@dataclass(frozen=True)
+class ExplainedResidual:
+    """What additional forces, which the model leaves out, explain of a fit's residual.
+
+    `moved`, shape (free,), is the shift of the fitted numbers. `sizes`, shape (forces,), are the fitted sizes of the
+    forces, and `left` is the fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining
+    residual, and `slopes`, shape (n, numbers + forces), its derivatives by numbers and sizes.
+    """
+
+    moved: np.ndarray
+    sizes: np.ndarray
+    left: float
+    rest: np.ndarray
+    slopes: np.ndarray
+
+    def sure(self, fit: OutputErrorFit) -> np.ndarray:
+        """Tell for each additional force, shape (forces,), whether it is present: its size is not 0 within its error.
+
+        The error allows for residuals that repeat at every reversal. With a slow sine, a coupling or a delay cannot
+        then be told from slightly different friction.
+        """
+        size = np.linalg.norm(self.slopes, axis=0)
+        usable = np.isfinite(size) & (size > 0)
+        covariance = spread_along(fit.problem, self.slopes[:, usable], self.rest)
+        chance = 1 - settings.probability_of_an_effect
+        deviations = np.sqrt(np.diag(covariance)[-len(self.sizes) :])
+        return np.abs(self.sizes) > norm.isf(chance / 2) * deviations
+
+
+def explained_by_forces(
+    fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float], searched: int = 1
+) -> ExplainedResidual | None:
+    """Fit additional forces to the residual of a fit, while its parameters may change, too.
+
+    A force [N], shape (n,), is that of an effect of size 1. It is simulated at its size in `units`, small enough to be
+    linear. Returns None if the forces explain no more than the best of `searched` random ones.
+    """
+    rest, slopes = fit.linearised
+    return explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted, searched)
+
+
+def explained_by(
+    slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray, searched: int = 1
+) -> ExplainedResidual | None:
+    """Explain a residual, shape (n,), by changes of the fitted numbers and additional effects.
+
+    `slopes` are the derivatives by the numbers, (n, numbers). Each of the `effects`, and the weights `counted` of the
+    samples, has the shape (n,). A number without effect, or with infinite derivatives, does not move. Returns None if
+    the effects explain no more than the best of `searched` random ones.
+    """
+    every = np.column_stack([slopes, *effects])
+    size = np.linalg.norm(every, axis=0)
+    usable = np.isfinite(size) & (size > 0)
+    if not (usable[slopes.shape[1] :].all() and np.isfinite(rest).all()):
+        return None
+    solution = np.zeros(len(size))
+    scaled, smallest = every[:, usable] / size[usable], settings.smallest_singular_value**2
+    solution[usable] = np.linalg.lstsq(scaled.T @ scaled, -rest @ scaled, rcond=smallest)[0] / size[usable]
+    left = rest + every[:, usable] @ solution[usable]
+    independent = max(float(counted.sum()), 1.0) / correlation_length(left)
+    chance = chi2.isf((1 - settings.probability_of_an_effect) / searched, len(effects))
+    if rest @ rest <= left @ left * (1 + chance / independent):
+        return None
+    moved, sizes = np.split(solution, [slopes.shape[1]])
+    return ExplainedResidual(moved, sizes, float(left @ left) / float(rest @ rest), left, every)
+
+
+def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
+    """Tell whether a residual shows the last of some forces even if all parameters may change.
+
+    `forces` [N], shape (n,) each, have size 1; `units` are the sizes at which they are simulated.
+    """
+    rest, slopes = beside_all_numbers(fit)
+    explained = explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted)
+    return explained is not None and bool(explained.sure(fit)[-1])
+
+
+def beside_all_numbers(fit: OutputErrorFit, further: Sequence[np.ndarray] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """Return the residual after a linear refit of all parameters and `further` effects, with its derivatives.
+
+    The residual [N] and each of the effects have the shape (n,), the derivatives (n, parameters + effects).
+
+    Parameters that the log does not determine take part: what they explain, such as the Stribeck effect at a reversal,
+    is no effect outside the model.
+    """
+    rest, slopes = fit.problem.linearised(fit.inner, np.ones(len(fit.inner), bool))
+    slopes = np.column_stack([slopes, *further])
+    size = np.linalg.norm(slopes, axis=0)
+    usable = np.isfinite(size) & (size > 0)
+    scaled = slopes[:, usable] / size[usable]
+    solution = np.linalg.lstsq(scaled, -rest, rcond=settings.smallest_singular_value)[0]
+    return rest + scaled @ solution, slopes
+
+
+def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
+    """Return the fit with intervals extended at both ends by `further`, shape (free,)."""
+    return fit.with_deviations(fit.deviation + further / NORMAL_COVERAGE)
+
+
+def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: OutputErrorFit) -> list[np.ndarray]:
+    """Return the change of a fit's residual per unit of each additional force, shape (n,) each.
+
+    A force [N], shape (n,), is that of an effect of size 1, and is simulated at its size in `units`. All forces are
+    simulated side by side.
+    """
+    inputs, (rest, _), sizes = fit.problem.inputs, fit.linearised, np.array(units)[:, None]
+    pushed = replace(fit.problem, inputs=replace(inputs, force=inputs.force + sizes * np.array(forces)))
+    return [*(pushed.residuals(np.tile(fit.inner, (len(forces), 1))) - rest) / sizes]
+
+
+def as_far_off_as_repeated(
+    once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
+) -> OutputErrorFit:
+    """Widen a fit to a log by the errors of fits to simulated logs of the fitted machine.
+
+    The stage followed `part` of the log; `noise` [N] is that of its force, and `bandwidth` [Hz] that of its motion.
+    Noise of position and force shifts break-aways, which biases the fit to one side in a way that a Jacobian does not
+    show (parametric bootstrap: Efron, Tibshirani 1993, chapter 6).
+
+    If the residual of the log exceeds the residuals of the simulated logs, errors are scaled up by the ratio.
+    """
+    free, rng = np.isin(np.arange(len(once.inner)), once.free), np.random.default_rng(settings.seed_of_repetitions)
+    again = []
+    for number in range(settings.repetitions_of_a_fit):
+        progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
+        like = simulated_log(once.problem, once.inner, log, part, bandwidth, noise, rng)
+        until = settings.iterations_of_a_repetition, settings.cost_share_of_refinement
+        again.append(refine_fit([like], once.inner[None], free, *until, slopes=once.slopes))
+    off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
+    off = off * float(student.ppf(UPPER_PROBABILITY, settings.repetitions_of_a_fit)) / NORMAL_COVERAGE
+    usual = float(np.mean([fit.cost[0] for fit in again]))
+    off *= np.sqrt(max(1.0, once.cost / usual)) if 0 < usual < np.inf else 1.0
+    return once.with_deviations(np.maximum(off, once.deviation))
+
+
+def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
+    """Widen the damping of the bristles by the effect of one sample of delay.
+
+    A delay looks like bristle damping of delay times bristle stiffness. The widening is for a stage that followed a log
+    without explaining it to its noise. A fit without both bristle parameters stays as it is.
+    """
+    if not {*BRISTLES} <= {*fit.fitted}:
+        return fit
+    late = fit.value("friction.bristle_stiffness") * fit.problem.inputs.sample_time
+    covariance = fit.covariance.copy()
+    place = fit.fitted.index("friction.bristle_damping")
+    covariance[place, place] += (late / fit.value("friction.bristle_damping") / NORMAL_COVERAGE) ** 2
+    return fit.with_covariance(covariance)
+
+
+def simulated_log(
+    problem: Problem, inner: np.ndarray, log: Log, part: slice, bandwidth: float, noise: float, rng: np.random.Generator
+) -> Problem:
+    """Return the problem of fitting a simulated log of a machine with the fitted numbers `inner`.
+
+    The simulated log has the logged force plus the guiding controller's, and the stage's own position, both with the
+    errors of the logged ones in `part` of the log. `noise` [N] is the force's; a force whose resolution is coarser than
+    its noise has errors of rounding instead. `bandwidth` [Hz] is the motion's.
+    """
+    record, speed = problem.record(inner), np.abs(problem.inputs.velocity)
+    digit = digit_of(log["force"][part])
+    signals = {role: values.copy() for role, values in log.signals.items()}
+    signals["position"][part] = _measured(record.position, log, part, problem, rng)
+    force = problem.inputs.force + record.force
+    rounded = 0 < noise <= digit / np.sqrt(12)
+    rough = _rounding(log["force"][part], speed, digit, rng) if rounded else noise * rng.standard_normal(len(force))
+    signals["force"][part] = force + rough
+    like = tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
+    level = len(like.sharper) - len(problem.sharper)
+    like = like.held_to(level - 1) if level else like
+    return replace(like, inputs=replace(like.inputs, held=problem.inputs.held))
+
+
+def _measured(position: np.ndarray, log: Log, part: slice, problem: Problem, rng: np.random.Generator) -> np.ndarray:
+    """Return simulated positions [m], (n,), as the sensor of a log would measure them.
+
+    Digits coarser than the noise round them, as an encoder does. Otherwise errors are white; those of a position that
+    was integrated from a velocity are the integral of the velocity's.
+    """
+    logged, white = log["position"][part], rng.standard_normal(len(position))
+    digit = digit_of(logged)
+    if log.is_integrated:
+        return position + np.cumsum(noise_of(log["velocity"][part]) * white) * log.sample_time
+    if digit > 0 and noise_of(logged) <= digit / np.sqrt(12):
+        return logged[0] + digit * np.rint((position - logged[0]) / digit)
+    return position + blur_of(logged, problem.inputs.reference) * white
+
+
+def _rounding(force: np.ndarray, speed: np.ndarray, digit: float, rng: np.random.Generator) -> np.ndarray:
+    """Sample errors of rounding [N], (n,), of a force that was logged in coarse digits [N].
+
+    Forces at one level and one `speed` [m/s] are rounded alike, in both directions, so that errors last as long as a
+    motion is steady and do not average out as noise does. Rounding the force of the fit again would not show them: its
+    levels are those that the rounded log has.
+    """
+    levels = np.stack([np.rint(np.abs(force) / digit), binned(speed, identification_settings.bins_of_place_and_speed)])
+    alike = np.unique(levels, axis=1, return_inverse=True)[1].ravel()
+    return digit * np.sign(force) * (rng.random(alike.max() + 1) - 0.5)[alike]

@@ -7,9 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import IdentifiableFit, Profile, why_not_shown
+from friso.identification.output_error.identifiable import Coverage, IdentifiableFit, Profile, why_not_shown
 from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, FitParameter, keys_at
 from friso.identification.output_error.settings import settings
 from friso.identification.output_error.settings import settings as output_error_settings

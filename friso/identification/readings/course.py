@@ -13,10 +13,9 @@ from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import bends
 from friso.identification.readings.friction_velocity import distinct
-from friso.identification.readings.passes import Pass, passes
-from friso.identification.readings.ramps import force_ramps
+from friso.identification.readings.motion_events import Pass, force_ramps, passes
 from friso.identification.readings.settings import settings
-from friso.identification.response.period import find_periods
+from friso.identification.response.records import find_periods
 from friso.identification.settings import experiment_settings
 
 

@@ -16,7 +16,7 @@ from scipy.signal import lfilter, periodogram
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import block_mean, by_t, channel, low_pass, on_bearing
-from friso.identification.readings.passes import Pass, passes
+from friso.identification.readings.motion_events import Pass, passes
 from friso.identification.readings.settings import settings
 from friso.intervals import NORMAL_COVERAGE
 

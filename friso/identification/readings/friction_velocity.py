@@ -1,4 +1,16 @@
-"""Read friction over velocity from stretches of constant velocity: Coulomb, viscous and, if it shows, Stribeck."""
+"""Friction over speed: its curve, its parameters, and friction that is stamped unevenly.
+
+Fit a Stribeck curve to friction at constant speeds, with profile intervals.
+
+At a given Stribeck velocity and exponent the curve is linear in all other parameters. Least squares are therefore
+computed over a grid of both, and an interval contains every value that explains the forces within chance, for any
+exponent (profile likelihood). A linearised interval at the best fit is much too narrow, because another exponent with
+another velocity may fit as well.
+
+Read friction over velocity from stretches of constant velocity: Coulomb, viscous and, if it shows, Stribeck.
+
+Mass and friction from motion and force at uneven instants, by regression on local polynomials.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +18,243 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import f as fisher
 
 from friso.errors import InputError
+from friso.identification.combine import spread_of
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import inverse_model
+from friso.identification.inverse_model import inverse_model, unit_of
+from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import Mean, by_direction, by_t, t_value
-from friso.identification.readings.passes import Pass, on_common_places, passes, places_of
+from friso.identification.output_error.settings import settings as output_error_settings
+from friso.identification.readings.common import Mean, by_direction, by_t, channel, t_value
+from friso.identification.readings.motion_events import Pass, on_common_places, passes, places_of
 from friso.identification.readings.settings import settings
-from friso.identification.readings.stribeck import FittedStribeck, Forces, Possible, stribeck_fit
+from friso.identification.readings.settings import settings as reading_settings
 from friso.intervals import NORMAL_COVERAGE
+
+
+@dataclass(frozen=True)
+class Possible:
+    """A parameter's best value, and the range that the forces allow.
+
+    The range is `closed` unless it reaches an end of the search.
+    """
+
+    value: float
+    low: float
+    high: float
+    closed: bool
+
+
+@dataclass(frozen=True)
+class FittedStribeck:
+    """A Stribeck curve through forces at some speeds, with the remaining ranges.
+
+    Ranges are given for Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the
+    exponent, and the constant force [N] that adds to friction in forward motion. The covariance (SI) covers the first
+    five, or four with a given exponent; a given exponent may be `refuted`.
+    """
+
+    coulomb: Possible
+    viscous: Possible
+    static: Possible
+    velocity: Possible
+    exponent: Possible
+    offset: Possible
+    covariance: np.ndarray
+    refuted: bool
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Friction [N] against the motion at speeds [m/s], shape (n,), to which a curve is fitted.
+
+    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation common to all. `both` is
+    true if both directions share one curve and a constant force.
+    """
+
+    speeds: np.ndarray
+    friction: np.ndarray
+    directions: np.ndarray
+    deviations: np.ndarray
+    level: float
+    both: bool
+
+
+def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
+    """Fit a Stribeck curve to forces; return None if a straight line fits as well.
+
+    `plain` is the line's sum of squares over variances. A given `exponent` is used unless the forces refute it; too few
+    forces leave all exponents possible.
+    """
+    speeds = forces.speeds
+    low = speeds.min() / reading_settings.ratio_below_the_slowest
+    high = speeds.max() * reading_settings.ratio_above_the_fastest
+    velocities = np.geomspace(low, high, reading_settings.grid_of_velocities)
+    least, most = output_error_settings.stribeck_exponents
+    shapes = np.linspace(least, most, reading_settings.grid_of_exponents)
+    left = len(speeds) - 5 - forces.both
+    apart = left < 1
+    left += apart
+    if left < 1:
+        return None
+    grid = _Grid(forces, velocities, shapes, apart).around(left)
+    refuted = False
+    if exponent is not None:
+        stated = _Grid(forces, velocities, np.array([exponent]), False).around(left + (not apart))
+        worse = (stated.least - grid.least) / max(grid.least / left, 1.0)
+        refuted = not apart and bool(fisher.sf(worse, 1, left) < reading_settings.chance_of_a_curve)
+        if not refuted:
+            grid, left = stated, left + (not apart)
+    free = len(grid.shapes) > 1 and not apart
+    usual = grid
+    if free:
+        usual = _Grid(forces, velocities, np.array([reading_settings.usual_exponent]), False).around(left + free)
+    if not (_better(plain, grid.least, 2 + free, left) or _better(plain, usual.least, 2, left + free)):
+        return None
+    return grid.curve(left, refuted, (velocities[0], velocities[-1]))
+
+
+def _better(plain: float, least: float, more: int, left: int) -> bool:
+    """Tell whether a curve fits significantly better than a line with fewer parameters (F-test).
+
+    `plain` and `least` are the sums of squares of line and curve. The curve has `more` parameters than the line, and
+    leaves `left` degrees of freedom.
+    """
+    if not 0 < least < plain:
+        return least < plain
+    chance = fisher.sf((plain - least) / more * left / least, more, left)
+    return bool(chance < reading_settings.chance_of_a_curve)
+
+
+class _Grid:
+    """Least squares of the linear parameters, at each Stribeck velocity and exponent of a grid.
+
+    Arrays begin with the axes (velocities, exponents). `cost` is the sum of squares over variances, infinite where
+    friction would not rise towards rest. `solutions` (..., p) have the `covariance` (..., p, p), not yet scaled to the
+    scatter of the residual. If `apart`, each exponent is compared with its own best velocity only.
+    """
+
+    def __init__(self, forces: Forces, velocities: np.ndarray, shapes: np.ndarray, apart: bool) -> None:
+        """Solve the grid of Stribeck `velocities` [m/s], (velocities,), and exponents `shapes`."""
+        self.forces, self.velocities, self.shapes, self.apart = forces, velocities, shapes, apart
+        speeds = forces.speeds
+        decay = np.exp(-((speeds / velocities[:, None, None]) ** shapes[:, None]))
+        columns = [1 - decay, np.broadcast_to(speeds / speeds.max(), decay.shape), decay]
+        if forces.both:
+            columns.append(np.broadcast_to(forces.directions, decay.shape))
+        design = np.stack(columns, axis=-1) / forces.deviations[:, None]
+        target = forces.friction / forces.deviations
+        inverse = np.linalg.pinv(design, rcond=1e-9)
+        self.solutions = inverse @ target
+        self.cost = np.sum((target - np.einsum("vsnp,vsp->vsn", design, self.solutions)) ** 2, axis=-1)
+        self.covariance = inverse @ np.swapaxes(inverse, -1, -2)
+        coulomb, static = self.solutions[..., 0], self.solutions[..., 2]
+        self.cost[(static <= coulomb) | (coulomb <= 0)] = np.inf
+
+    @property
+    def least(self) -> float:
+        """Return the smallest sum of squares over variances in the grid."""
+        return float(self.cost.min())
+
+    def around(self, left: int) -> _Grid:
+        """Return a finer grid around the curves that the forces allow, at `left` degrees of freedom.
+
+        The new grid lies within this one. If no curve is possible, this grid is returned.
+        """
+        grid = self
+        for _ in range(reading_settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
+            inside, ends, margin = grid.room(left) >= 0, [], reading_settings.margin_of_the_grid
+            for points, here in ((grid.velocities, inside.any(axis=1)), (grid.shapes, inside.any(axis=0))):
+                at = np.flatnonzero(here)
+                ends += [points[max(at[0] - margin, 0)], points[min(at[-1] + margin, len(points) - 1)]]
+            several = np.linspace(ends[2], ends[3], reading_settings.grid_of_exponents)
+            velocities = np.geomspace(ends[0], ends[1], reading_settings.grid_of_velocities)
+            grid = _Grid(grid.forces, velocities, several if len(grid.shapes) > 1 else grid.shapes, grid.apart)
+        return grid
+
+    def room(self, left: int) -> np.ndarray:
+        """Return how far the cost of each grid point is below the limit for a possible curve.
+
+        The result has the shape (velocities, exponents), and is negative where the forces exclude the curve. `left` is
+        the number of degrees of freedom.
+        """
+        least = self.cost.min(axis=0, keepdims=True) if self.apart else np.array([[self.least]])
+        least = np.where(np.isfinite(least), least, 0.0)
+        return t_value(left) ** 2 * np.maximum(least / left, 1.0) - (self.cost - least)
+
+    def curve(self, left: int, refuted: bool, outer: tuple[float, float]) -> FittedStribeck:
+        """Return the best curve of the grid, with the ranges of its parameters.
+
+        `left` is the number of degrees of freedom, and `refuted` is stored in the result. Ranges that reach an `outer`
+        Stribeck velocity or exponent are not closed.
+        """
+        forces, open_shape = self.forces, len(self.shapes) > 1
+        best = np.unravel_index(int(np.argmin(self.cost)), self.cost.shape)
+        scatter, t = max(float(self.cost[best]) / left, 1.0), t_value(left)
+        room = self.room(left)
+        inside = room >= 0
+        fast, shaped = np.asarray(inside.any(axis=1)), np.asarray(inside.any(axis=0))
+        ends = [bool(self.velocities[fast][end] == outer[end]) for end in (0, -1)]
+        cut = any(float(self.shapes[shaped][end]) == output_error_settings.stribeck_exponents[end] for end in (0, -1))
+
+        def linear(place: int, scale: float, level: float, closed: bool) -> Possible:
+            centre = self.solutions[..., place][inside] * scale
+            half = np.sqrt(room[inside] * self.covariance[..., place, place][inside]) * scale
+            value = float(self.solutions[(*best, place)]) * scale
+            below, above = value - float((centre - half).min()), float((centre + half).max()) - value
+            return Possible(value, value - float(np.hypot(below, level)), value + float(np.hypot(above, level)), closed)
+
+        shared = t * forces.level
+        fastest = forces.speeds.max()
+        velocities, shapes = _between(self.velocities, fast, True), _between(self.shapes, shaped, False)
+        return FittedStribeck(
+            linear(0, 1.0, shared, not ends[1]),
+            linear(1, 1 / fastest, 0.0, not ends[1]),
+            linear(2, 1.0, shared, not ends[0]),
+            Possible(float(self.velocities[best[0]]), *velocities, not any(ends)),
+            Possible(float(self.shapes[best[1]]), *shapes, open_shape and not (cut or self.apart)),
+            linear(3, 1.0, 0.0, True) if forces.both else Possible(0.0, 0.0, 0.0, False),
+            self._covariance((int(best[0]), int(best[1])), scatter, open_shape and not self.apart),
+            refuted,
+        )
+
+    def _covariance(self, best: tuple[int, int], scatter: float, open_shape: bool) -> np.ndarray:
+        """Return the covariance of the curve's parameters (SI), linearised at the best curve.
+
+        `best` is its place in the grid. Variances are multiplied by `scatter`. With an `open_shape`, the exponent is
+        among the parameters.
+        """
+        forces, speeds = self.forces, self.forces.speeds
+        velocity, shape = float(self.velocities[best[0]]), float(self.shapes[best[1]])
+        ratio = speeds / velocity
+        decay, drop = np.exp(-(ratio**shape)), float(self.solutions[(*best, 2)] - self.solutions[(*best, 0)])
+        columns = [1 - decay, speeds, decay, drop * decay * ratio**shape * shape / velocity]
+        if open_shape:
+            columns.append(-drop * decay * ratio**shape * np.log(ratio))
+        count = len(columns)
+        columns += [forces.directions] if forces.both else []
+        design = np.stack(columns, axis=1)
+        size = np.linalg.norm(design, axis=0)
+        inverse = np.linalg.pinv(design / size / forces.deviations[:, None]) / size[:, None]
+        covariance = (inverse @ inverse.T * scatter)[:count, :count]
+        covariance[np.ix_([0, 2], [0, 2])] += forces.level**2
+        return covariance
+
+
+def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
+    """Return the range of grid points that lie inside, widened by half a step on each side.
+
+    `points` ascend by equal differences or, if `ratios`, by equal ratios. The mask `inside` has their shape.
+    """
+    (at,) = np.nonzero(inside)
+    scale = np.log(points) if ratios else points
+    step = float(scale[1] - scale[0]) if len(points) > 1 else 0.0
+    ends = np.array([scale[at[0]] - step / 2, scale[at[-1]] + step / 2])
+    low, high = np.exp(ends) if ratios else np.clip(ends, points[0], points[-1])
+    return float(low), float(high)
+
 
 METHOD = "mean forces over stretches of constant velocity"
 
@@ -320,3 +559,145 @@ def _ranged(name: str, unit: str, fitted: Possible, method: str, reason: str) ->
     if reason:
         return Estimate.unknown(key, unit, method, reason, max(fitted.low, 0.0), fitted.high)
     return Estimate(key, unit, fitted.value, fitted.low, fitted.high, method)
+
+
+METHOD_OF_STAMPS = "least squares on local polynomials at the stamps"
+_NAMES = (("mass", "kg"), ("friction.viscous", "N*s/m"), ("friction.coulomb", "N"), ("bias.cart", "N"))
+"""Names and units of the fitted numbers, in their order."""
+_ONE_WAY = "the motion is in one direction only, in which a constant force passes for friction"
+
+
+@dataclass(frozen=True)
+class StampedFriction:
+    """Mass and friction from a log without an even clock.
+
+    `estimates` have intervals, and `correlation` is that of those determined. `velocity` [m/s] and `friction` [N], the
+    force less inertia, have the shape (rows,); `fitted` [N] is the curve there. Polynomials reach over `width` samples,
+    and samples are `steps` [s] apart: the least, the usual, and the largest step without gaps.
+    """
+
+    log: Log
+    estimates: tuple[Estimate, ...]
+    correlation: np.ndarray
+    velocity: np.ndarray
+    friction: np.ndarray
+    fitted: np.ndarray
+    width: int
+    steps: tuple[float, float, float]
+
+    @property
+    def by_name(self) -> Mapping[str, Estimate]:
+        """Return the estimates by name."""
+        return {estimate.name: estimate for estimate in self.estimates}
+
+
+@dataclass(frozen=True)
+class _StampedFit:
+    """A fit with polynomials over some samples: rows, their solution and its covariance."""
+
+    width: int
+    columns: np.ndarray
+    force: np.ndarray
+    solution: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """Return the standard deviation of each fitted number."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def local_polynomials(time: np.ndarray, values: np.ndarray, degree: int, width: int) -> np.ndarray:
+    """Fit a polynomial around each instant [s], and return its value, slope and curvature there, shape (3, n).
+
+    A polynomial of the `degree` is fitted to `width` samples, an odd number. The ends, without enough samples, are NaN.
+    """
+    out, half = np.full((3, len(time)), np.nan), width // 2
+    if len(time) < width:
+        return out
+    times, held = (np.lib.stride_tricks.sliding_window_view(array, width) for array in (time, values))
+    apart = times - time[half : len(time) - half, None]
+    scale = np.abs(apart).max(axis=1)
+    powers = (apart / scale[:, None])[..., None] ** np.arange(degree + 1)
+    solution = (np.linalg.pinv(powers) @ held[..., None])[..., 0]
+    for order, factor in enumerate((1.0, 1.0, 2.0)):
+        out[order, half : len(time) - half] = factor * solution[:, order] / scale**order
+    return out
+
+
+def stamped_friction(log: Log) -> StampedFriction:
+    """Identify mass, Coulomb and viscous friction from a log with a force and a velocity or position.
+
+    Of several widths of the polynomials the one counts whose error is least: chance, together with the difference to
+    the next narrower one. Raises InputError for a log with too little steady sliding.
+    """
+    fits = [fit for width in settings.widths_of_polynomials if (fit := _fit(log, width)) is not None]
+    if not fits:
+        least = settings.rows_of_a_stamped_fit
+        expected = f"{least} samples or more within moves: faster sampling, or longer moves"
+        raise InputError("position", f"{len(log.time)} samples, of which fewer slide", expected, "", log.name)
+    apart = [np.abs(fit.solution - other.solution) for fit, other in zip(fits, [fits[0], *fits], strict=False)]
+    apart[0] = apart[1] if len(fits) > 1 else np.zeros(4)
+    relative = [(fit.deviations[0] + away[0]) / abs(fit.solution[0]) for fit, away in zip(fits, apart, strict=True)]
+    best = int(np.argmin(relative))
+    fit, away = fits[best], apart[best]
+    steps = np.diff(log.time)
+    usual = float(np.median(steps))
+    regular = steps[steps <= settings.steps_of_a_hole * usual]
+    estimates, correlation = _estimates(log, fit, away)
+    curve = fit.columns[:, 1:] @ fit.solution[1:]
+    velocity, inertia = fit.columns[:, 1], fit.columns[:, 0] * fit.solution[0]
+    shown = (float(steps.min()), usual, float(regular.max()))
+    return StampedFriction(log, estimates, correlation, velocity, fit.force - inertia, curve, fit.width, shown)
+
+
+def _estimates(log: Log, fit: _StampedFit, away: np.ndarray) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """Return the estimates of a fit, and the correlation of those with a value.
+
+    The fitted numbers are `away` from those with narrower polynomials.
+    """
+    size, both = fit.deviations, len(np.unique(np.sign(fit.columns[:, 1]))) == 2
+    estimates = []
+    for i, (name, unit) in enumerate(_NAMES):
+        unit = unit_of(unit, log)
+        if not both and i > 1:
+            estimates.append(Estimate.unknown(name, unit, METHOD_OF_STAMPS, _ONE_WAY))
+            continue
+        one = Estimate.normal(name, unit, fit.solution[i], size[i], METHOD_OF_STAMPS).widened(float(away[i]))
+        estimates.append(one if i > 2 else one.if_positive("its interval reaches down to zero"))
+    kept = [i for i, estimate in enumerate(estimates) if estimate.determined]
+    return tuple(estimates), fit.covariance[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
+
+
+def _fit(log: Log, width: int) -> _StampedFit | None:
+    """Fit force = M a + F_v v + F_c sign(v) + offset within moves, with polynomials over `width` samples.
+
+    The result is None if too few polynomials lie within moves in one direction and without holes.
+    """
+    time, force = log.time, channel(log, "force")
+    smooth = local_polynomials(time, force, settings.degree_of_polynomials, width)[0]
+    if "velocity" in log:
+        velocity, acceleration, _ = local_polynomials(time, log["velocity"], settings.degree_of_polynomials, width)
+    else:
+        place = channel(log, "position")
+        _, velocity, acceleration = local_polynomials(time, place, settings.degree_of_polynomials + 1, width)
+    speed = np.abs(velocity)
+    direction = np.sign(velocity) * (speed > settings.speed_share_of_stamped_sliding * np.nanmax(speed, initial=0.0))
+    whole = np.append(np.diff(time) <= settings.steps_of_a_hole * np.median(np.diff(time)), False)
+    groups, rows, half = np.zeros(len(time), int), np.zeros(len(time), bool), width // 2
+    number = 0
+    for sign in (-1.0, 1.0):
+        for part in runs(direction == sign):
+            for piece in runs(np.append(whole[part.start : part.stop - 1], False)) or []:
+                first, last = part.start + piece.start + half, part.start + piece.stop + 1 - half
+                rows[first:last], number = True, number + 1
+                groups[first:last] = number
+    if np.count_nonzero(rows) < settings.rows_of_a_stamped_fit:
+        return None
+    columns = np.stack([acceleration, velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)[rows]
+    if len(np.unique(np.sign(velocity[rows]))) == 1:
+        columns[:, 3] = 0.0  # motion in one direction only adds a constant force to Coulomb friction
+    scale = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    solution = np.linalg.lstsq(columns / scale, smooth[rows], rcond=1e-10)[0] / scale
+    covariance = spread_of(columns, smooth[rows] - columns @ solution, (groups[rows],))
+    return _StampedFit(width, columns, smooth[rows], solution, covariance)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 
 from friso.identification.estimate import Estimate
-from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.records import FrequencyResponse
 from friso.identification.response.settings import settings
 from friso.intervals import NORMAL_COVERAGE
 

@@ -22,9 +22,8 @@ from scipy import stats
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.response.fitting import ResponseFit, ResponseTarget, deviations
-from friso.identification.response.modes import fit_modes
-from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.modes import ResponseFit, ResponseTarget, deviations, fit_modes
+from friso.identification.response.records import FrequencyResponse
 from friso.identification.response.settings import settings
 from friso.intervals import NORMAL_COVERAGE
 

@@ -1,18 +1,303 @@
-"""Turn records of a periodic experiment into spectra, period by period."""
+"""Frequency responses from records: periods, estimators, and their intervals.
+
+Define the frequency response of a record: complex values on lines, with their uncertainty.
+
+Find the period of an input in samples, and the samples of whole periods.
+
+Turn records of a periodic experiment into spectra, period by period.
+
+Estimate responses from periodic excitation, with noise and distortion separated, and from any other.
+
+For periodic excitation, the robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4:
+noise differs from period to period, nonlinear distortion from one random-phase realisation to another. With an external
+reference (closed loop, indirect) both spectra are taken relative to it, which makes them comparable.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy import fft, stats
 from scipy.interpolate import CubicSpline
 
 from friso.errors import InputError
 from friso.identification.logs.log import Log
-from friso.identification.response.period import Periods, find_periods
-from friso.identification.response.response import Channels
 from friso.identification.response.settings import settings
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Names and units of input and output."""
+
+    input: str = "force"
+    input_unit: str = "N"
+    output: str = "position"
+    output_unit: str = "m"
+
+
+@dataclass(frozen=True)
+class ResponseBand:
+    """Limits of the 95 % intervals of magnitude [output per input unit] and phase [rad], (lines,)."""
+
+    magnitude_low: np.ndarray
+    magnitude_high: np.ndarray
+    phase_low: np.ndarray
+    phase_high: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrequencyResponse:
+    """A response at the spectral lines `frequency` [Hz]; all arrays have the shape (lines,).
+
+    `response` is complex [output unit per input unit]. `deviation` is its total standard deviation, sqrt(E|error|^2).
+    Its parts are `noise` (differs from period to period) and `distortion` (differs from realisation to realisation):
+    deviation^2 = noise^2 + distortion^2 if both are known, else NaN.
+
+    `degrees` is the number of real degrees of freedom behind the deviation. `coherence` is between input and output
+    (None: not known). `kind` is "multisine", "local polynomial" or "measured". `sample_time` [s] is the
+    record's (None: not known).
+    """
+
+    frequency: np.ndarray
+    response: np.ndarray
+    deviation: np.ndarray
+    noise: np.ndarray
+    distortion: np.ndarray
+    degrees: np.ndarray
+    kind: str
+    channels: Channels = Channels()
+    coherence: np.ndarray | None = None
+    warnings: tuple[str, ...] = ()
+    sample_time: float | None = None
+
+    @classmethod
+    def undivided(
+        cls, frequency: np.ndarray, response: np.ndarray, deviation: np.ndarray, degrees: float, **further: Any
+    ) -> FrequencyResponse:
+        """Make a response whose deviation is not divided into noise and distortion.
+
+        Frequencies [Hz] and all other arrays have the shape (lines,). All lines have equally many `degrees` of freedom.
+        `further` has the other fields.
+        """
+        unknown = np.full(len(frequency), np.nan)
+        freedom = np.full(len(frequency), degrees)
+        lines = {"frequency": frequency, "response": response, "deviation": deviation, "degrees": freedom}
+        return cls(**lines, noise=unknown, distortion=unknown, **further)
+
+    def band(self) -> ResponseBand:
+        """Return the 95 % intervals of magnitude and phase.
+
+        Half of the variance is taken in the direction of the complex response, half across it.
+        """
+        half = stats.t.ppf(0.975, self.degrees) * self.deviation / np.sqrt(2)
+        size, phase = np.abs(self.response), np.unwrap(np.angle(self.response))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = np.where(half < size, np.arcsin(np.minimum(half / size, 1.0)), np.pi)
+        return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
+
+    def accelerations(self) -> FrequencyResponse:
+        """Return the response of the acceleration in place of the position: times (i omega)^2."""
+        factor = (2 * np.pi * self.frequency) ** 2
+        channels = replace(self.channels, output="acceleration", output_unit=f"{self.channels.output_unit}/s^2")
+        scaled = {name: factor * getattr(self, name) for name in ("deviation", "noise", "distortion")}
+        return replace(self, response=-factor * self.response, channels=channels, **scaled)
+
+    def at(self, chosen: np.ndarray) -> FrequencyResponse:
+        """Return the response at spectral lines that a mask or their numbers choose."""
+        names = ("frequency", "response", "deviation", "noise", "distortion", "degrees")
+        lines = {name: getattr(self, name)[chosen] for name in names}
+        return replace(self, coherence=None if self.coherence is None else self.coherence[chosen], **lines)
+
+    def between(self, low: float, high: float) -> FrequencyResponse:
+        """Return the response at spectral lines from `low` to `high` [Hz], both included.
+
+        Raises InputError where there are none.
+        """
+        inside = (self.frequency >= low) & (self.frequency <= high)
+        if not inside.any():
+            text = f"{low:g} to {high:g} Hz"
+            held = f"{self.frequency.min():g} to {self.frequency.max():g} Hz" if self.frequency.size else "no lines"
+            raise InputError("band", text, f"a band that holds lines of the response, which has {held}", "3 to 20 Hz")
+        return self.at(inside)
+
+    def usable(self, ratio: float = 3.0) -> FrequencyResponse:
+        """Return the response at spectral lines that are clear of noise: `ratio` deviations large.
+
+        Their coherence must also suffice, if it is known. Warnings list the lines left out. Raises InputError if none
+        is left, because the excitation is too weak.
+        """
+        enough = np.abs(self.response) >= ratio * self.deviation
+        if self.coherence is not None:
+            enough &= self.coherence >= settings.coherence_of_a_line
+        if not enough.any():
+            best = np.max(np.abs(self.response) / np.maximum(self.deviation, np.finfo(float).tiny), initial=0.0)
+            text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
+            if self.coherence is not None and self.coherence.size:
+                text += f", coherence at most {np.max(self.coherence):.2g}"
+            coherence = f"a coherence of {settings.coherence_of_a_line:g}"
+            expected = f"a response of {ratio:g} deviations and {coherence} on some line"
+            raise InputError("excitation", text, expected, "a larger force, or a longer record")
+        if enough.all():
+            return self
+        left_out = self.frequency[~enough]
+        band = f"{left_out.min():.3g} to {left_out.max():.3g} Hz"
+        warning = f"{left_out.size} of {enough.size} lines left out, too weakly excited ({band})"
+        return replace(self.at(enough), warnings=(*self.warnings, warning))
+
+    def scatter(self) -> np.ndarray:
+        """Return the deviations (lines,), raised to the scatter between neighbouring lines.
+
+        Nonlinear distortion makes the lines of one realisation scatter beyond their noise; a smooth system cannot.
+        """
+        size = np.abs(self.response)
+        if len(size) < 3 or not np.all(size > 0):
+            return self.deviation
+        second = np.abs(np.diff(np.log(size), 2)) / np.sqrt(6)
+        width = min(settings.lines_of_a_scatter, len(second))
+        medians = np.median(np.lib.stride_tricks.sliding_window_view(second, width), axis=1)
+        places = np.arange(len(size)) - 1 - (width - 1) / 2
+        rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # of normal deviations
+        return np.maximum(self.deviation, np.sqrt(2) * rough * size)
+
+
+@dataclass(frozen=True)
+class Periods:
+    """Whole periods of `samples` each, `count` of them, from sample `start` to `stop`."""
+
+    samples: int
+    start: int
+    stop: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Return the number of whole periods."""
+        return (self.stop - self.start) // self.samples
+
+    def cut(self, signal: np.ndarray) -> np.ndarray:
+        """Cut a signal into periods, shape (periods, samples)."""
+        return signal[self.start : self.stop].reshape(self.count, self.samples)
+
+
+def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
+    """Find the whole periods of an input, shape (n,), counted backward from its end.
+
+    `expected` is the approximate number of samples in a period; the search covers 2 % about it. Raises InputError if
+    the signal does not repeat, or has fewer than two periods.
+    """
+    stop = _switched_off(signal)
+    if np.unique(signal[:stop]).size < 2:
+        raise _not_periodic("an input that is constant")
+    change = repetition(signal[:stop])
+    samples = _shortest(change) if expected is None else _near(change, expected)
+    warnings: tuple[str, ...] = ()
+    if expected is not None and samples != round(expected):
+        warnings = (f"the input repeats every {samples} samples, not every {expected:g}: those are used",)
+    start, stop = _repeating(signal[:stop], samples)
+    start = stop - (stop - start) // samples * samples
+    if (stop - start) // samples < 2:
+        raise _not_periodic(f"{len(signal)} samples, which hold no two whole periods of {samples}")
+    return Periods(samples, start, stop, warnings)
+
+
+def repetition(signal: np.ndarray) -> np.ndarray:
+    """Return how much a signal, shape (n,), changes over lags of 0 to n/2 samples.
+
+    The change is the mean square over the record, in units of twice the variance.
+    """
+    centred = signal - signal.mean()
+    n, lags = len(centred), np.arange(len(centred) // 2 + 1)
+    size = fft.next_fast_len(2 * n, real=True)
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2, size)[: len(lags)]
+    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
+    parts = squares[n - lags] + squares[n] - squares[lags]
+    return np.maximum(parts - 2 * correlation, 0.0) / ((n - lags) * 2 * squares[n] / n)
+
+
+def _switched_off(signal: np.ndarray) -> int:
+    """Return the number of samples before an input is switched off.
+
+    An input that is off at the end for 10 samples or fewer, or 0.5 % of the record, is not switched off: all samples
+    count.
+    """
+    moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
+    stop = int(moving[-1]) + 1 if moving.size else 0
+    return stop if len(signal) - stop > max(10, len(signal) // 200) else len(signal)
+
+
+def _shortest(change: np.ndarray) -> int:
+    """Return the shortest lag at which a signal repeats as well as at any other.
+
+    Lags before the signal has changed do not count. Raises InputError if it repeats at no lag.
+    """
+    away = np.flatnonzero(change > 0.5)
+    first = int(away[0]) if away.size else len(change)
+    lags = np.arange(max(first, 2), len(change))
+    if not lags.size or change[lags].min() > settings.change_between_periods:
+        raise _not_periodic("an input that does not repeat within half the record")
+    good = lags[change[lags] <= 1.5 * change[lags].min() + 1e-9]
+    return min([_lowest(change, int(good[0])), *_slipping(change, lags)[:1]])
+
+
+def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
+    """Return lags [samples] at which a signal nearly repeats, as it would with a drifting clock.
+
+    After twice such a lag the signal has changed several times as much as after one. `change`, over all lags, is how
+    much it changes; `lags` are those searched.
+    """
+    inner = lags[2 * lags < len(change)]
+    inner = inner[inner + 1 < len(change)]
+    here = change[inner]
+    lowest = (here <= change[inner - 1]) & (here <= change[inner + 1]) & (here < settings.change_of_a_slip)
+    return [int(lag) for lag in inner[lowest] if change[2 * lag] > settings.growth_of_a_slip * change[lag]]
+
+
+def _lowest(change: np.ndarray, lag: int) -> int:
+    """Return the lag of the first minimum of `change` at or above a `lag`."""
+    while lag + 1 < len(change) and change[lag + 1] < change[lag]:
+        lag += 1
+    return lag
+
+
+def _near(change: np.ndarray, expected: float) -> int:
+    """Return the lag within 2 % of an expected one at which the signal repeats best.
+
+    `change` is how much the signal changes over each lag. Raises InputError if it does not repeat there, or if the
+    expected lag is beyond half the record.
+    """
+    low, high = int(0.98 * expected), int(np.ceil(1.02 * expected)) + 1
+    if not 2 <= expected < len(change):
+        raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")
+    lags = np.arange(max(low, 2), min(high, len(change)))
+    best = int(lags[np.argmin(change[lags])])
+    if change[best] > settings.change_between_periods:
+        raise _not_periodic(f"an input that does not repeat near {expected:g} samples")
+    return best
+
+
+def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
+    """Return from which sample to before which a signal repeats itself, with a known period.
+
+    The period has a number of `samples`. Parts at the beginning and the end are cut off if most of their samples differ
+    from those one period away.
+    """
+    change = np.abs(signal[samples:] - signal[:-samples])
+    unlike = change > 8 * 1.4826 * np.median(change) + 1e-5 * np.ptp(signal)
+    width = max(3, samples // 50)
+    mostly = np.flatnonzero(np.convolve(unlike, np.full(width, 1 / width), "same") > 0.5)
+    early, late = mostly[mostly < samples], mostly[mostly >= max(len(change) - samples, samples)]
+    start = int(early[-1]) + width // 2 + 1 if early.size else 0
+    stop = int(late[0]) - width // 2 + samples if late.size else len(signal)
+    return start, stop
+
+
+def _not_periodic(problem: str) -> InputError:
+    """Build the error for an input that does not repeat."""
+    expected = "an input that repeats at least twice"
+    return InputError("period", problem, expected, "a multisine of 5 s, repeated 20 times")
 
 
 @dataclass(frozen=True)
@@ -261,3 +546,179 @@ def relative_error(
         raise InputError("band", f"{band[0]:g} to {band[1]:g} Hz", "a band that holds excited lines", "3 to 20 Hz")
     force, reaction = measured.input.mean(axis=0)[inside], measured.output.mean(axis=0)[inside]
     return float(np.linalg.norm(model(measured.frequency[inside]) * force - reaction) / np.linalg.norm(reaction))
+
+
+def multisine(records: Sequence[ResponseRecord], channels: Channels | None = None) -> FrequencyResponse:
+    """Estimate the response on excited lines from realisations of a periodic excitation.
+
+    A realisation is a record with its own random phases. With a reference, the response is indirect: output over input,
+    each relative to the reference. The deviation covers
+    noise and, with two realisations or with lines left free in the excitation, nonlinear distortion. Raises InputError
+    for records that are not periodic or do not belong together.
+    """
+    spectra_of_records, remarks = _together([spectra(record) for record in records])
+    excited = np.logical_and.reduce([realisation.excited for realisation in spectra_of_records])
+    if not excited.any():
+        actual = "realisations without a common line"
+        raise InputError("records", actual, "the same excited lines", "one period for all")
+    response, noise = _averaged(spectra_of_records, excited)
+    degrees = np.full(response.shape, 2.0 * sum(len(realisation.input) - 1 for realisation in spectra_of_records))
+    if len(spectra_of_records) > 1:
+        total, total_degrees = _total(spectra_of_records, excited, response)
+        distortion, distortion_known = np.sqrt(np.maximum(total**2 - noise**2, 0.0)), True
+        degrees = np.where(distortion > 0, total_degrees, degrees)
+    else:
+        distortion = _at_free_lines(spectra_of_records[0], excited, response)
+        distortion_known = bool(np.isfinite(distortion).any())
+    deviation = np.hypot(noise, np.nan_to_num(distortion))
+    warnings = dict.fromkeys([*remarks, *(text for realisation in spectra_of_records for text in realisation.warnings)])
+    if not distortion_known:
+        warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
+    return FrequencyResponse(
+        frequency=spectra_of_records[0].frequency[excited],
+        response=response,
+        deviation=deviation,
+        noise=noise,
+        distortion=distortion,
+        degrees=degrees,
+        kind="multisine",
+        channels=channels or Channels(),
+        warnings=tuple(warnings),
+        sample_time=records[0].sample_time,
+    )
+
+
+def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
+    """Bring the spectra of realisations to common frequencies; also return remarks on clocks.
+
+    Raises InputError without common lines.
+    """
+    if not records:
+        raise InputError("records", "none", "at least one record", "two realisations of a multisine")
+    spacings = np.array([realisation.frequency[0] for realisation in records])
+    apart = float(np.ptp(spacings) / spacings.min())
+    counts = np.array([len(realisation.frequency) for realisation in records])
+    if apart > settings.period_tolerance or np.ptp(counts) > 1 + settings.period_tolerance * counts.min():
+        text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
+        raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
+    records = [_first_lines(realisation, int(counts.min())) for realisation in records]
+    if apart <= settings.tolerance_of_equal_periods:
+        return records, []
+    mean = float(spacings.mean())
+    lines = np.arange(1, counts.min() + 1) * mean
+    remark = f"the periods of the records differ by {1e6 * apart:.3g} ppm, as clocks do: {1 / mean:.6g} s is used"
+    return [replace(realisation, frequency=lines) for realisation in records], [remark]
+
+
+def _first_lines(realisation: Spectra, count: int) -> Spectra:
+    """Return the first `count` spectral lines of a realisation."""
+    names = ("frequency", "reference", "excited", "input", "output")
+    return replace(realisation, **{name: getattr(realisation, name)[..., :count] for name in names})
+
+
+def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the response and its deviation by noise, each (lines,), from all realisations.
+
+    `excited` marks the lines that count.
+    """
+    outputs, inputs = _relative(records, excited)
+    gain = inputs.mean(axis=0)
+    response = outputs.mean(axis=0) / gain
+    variance = np.zeros(len(response))
+    for realisation in records:
+        left = realisation.output[:, excited] - response * realisation.input[:, excited]
+        variance += np.var(left / realisation.reference[excited], axis=0, ddof=1) / len(left)
+    return response, np.sqrt(variance) / (len(records) * np.abs(gain))
+
+
+def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return output and input relative to the external signal, each (realisations, lines).
+
+    Both are averaged over periods.
+    """
+    outputs, inputs = (
+        np.array([getattr(one, name)[:, excited].mean(axis=0) / one.reference[excited] for one in records])
+        for name in ("output", "input")
+    )
+    return outputs, inputs
+
+
+def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the deviation of the mean response over realisations, and its degrees of freedom.
+
+    Both are arrays of shape (lines,). With few realisations, neighbouring spectral lines share their variance.
+    """
+    outputs, inputs = _relative(records, excited)
+    count = len(records)
+    squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
+    relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
+    freedom = 2 * (count - 1)
+    width = 1 if freedom >= settings.freedom_of_a_variance else min(settings.lines_sharing_variance, len(relative))
+    window = np.ones(width)
+    shared = np.convolve(np.ones(len(relative)), window, "same")
+    relative = np.convolve(relative, window, "same") / shared
+    return np.sqrt(relative) * np.abs(response), freedom * shared
+
+
+def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
+    """Return the nonlinear distortion (lines,), from the output at lines that are not excited.
+
+    Noise and the linear response to the input at these lines are subtracted. The result is NaN if fewer than two lines
+    of the band were left free.
+    """
+    places = np.flatnonzero(excited)
+    free = np.setdiff1d(np.arange(places[0], places[-1] + 1), places)
+    if len(free) < 2:
+        return np.full(len(places), np.nan)
+    parts = [np.interp(free, places, part) for part in (np.real(response), np.imag(response))]
+    left = realisation.output[:, free] - (parts[0] + 1j * parts[1]) * realisation.input[:, free]
+    power = np.abs(left.mean(axis=0)) ** 2 - np.var(left, axis=0, ddof=1) / len(left)
+    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[: settings.lines_sharing_variance]
+    local = np.maximum(power[near].mean(axis=0), 0.0)
+    return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])
+
+
+def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
+    """Estimate a response by the local polynomial method, free of leakage.
+
+    The method is that of Pintelon, Schoukens, 2nd ed., ch. 7: about every line, response and transient are polynomials
+    of order 2 in the frequency over 17 lines of the spectrum of the whole record; the residual is the noise. One line
+    in 9 is returned, so that neighbours share little. With a reference the method is indirect, which a closed loop
+    requires: the response is the ratio of the responses of output and input to the reference. Raises InputError for a
+    record of fewer than 200 samples.
+    """
+    record, side = record.checked(200), settings.lines_on_a_side
+    size = len(record.driving)
+    driving, excitation, answer = (
+        np.fft.rfft(channel - channel.mean()) / size for channel in (record.driving, record.input, record.output)
+    )
+    centres = np.arange(1 + side, len(driving) - side - 1, side + 1)
+    around = np.arange(-side, side + 1)
+    strength = np.sqrt(np.mean(np.abs(driving[centres[:, None] + around]) ** 2, axis=1))
+    strong = strength > settings.amplitude_of_a_weak_line * strength.max()
+    centres, scale = centres[strong], strength[strong]
+    window = centres[:, None] + around
+    powers = (around / side)[:, None] ** np.arange(settings.order_of_local_polynomials + 1)
+    regressors = driving[window][:, :, None] * powers / scale[:, None, None]
+    transient = np.broadcast_to(powers, (len(centres), *powers.shape))
+    columns = np.concatenate([regressors, transient], axis=2)
+    q, r = np.linalg.qr(columns)
+    row = np.linalg.inv(r)[:, 0, :]
+    fitted = [np.einsum("kij,ki->kj", q.conj(), quantity[window]) for quantity in (excitation, answer)]
+    gain, output = (np.einsum("kj,kj->k", row, quantity) for quantity in fitted)
+    response = output / gain
+    left = answer[window] - response[:, None] * excitation[window]
+    left = left - np.einsum("kij,kj->ki", q, np.einsum("kij,ki->kj", q.conj(), left))
+    free = window.shape[1] - columns.shape[2]
+    variance = np.sum(np.abs(left) ** 2, axis=1) / free
+    deviation = np.sqrt(variance * np.sum(np.abs(row) ** 2, axis=1)) / np.abs(gain)
+    return FrequencyResponse.undivided(
+        centres / (size * record.sample_time),
+        response,
+        deviation,
+        2.0 * free,
+        kind="local polynomial",
+        channels=channels or Channels(),
+        warnings=("noise and nonlinear distortion cannot be distinguished: the deviation covers both",),
+        sample_time=record.sample_time,
+    )

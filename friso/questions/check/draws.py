@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting import cannot_hunt
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS
-from friso.identification.ways import ways_to_show
+from friso.identification.estimate import ways_to_show
 from friso.quantities import plain_factor
 from friso.questions.check.words import speed_text
 from friso.shown.drawing.figure import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel

@@ -13,8 +13,15 @@ from friso.axis import LINEAR, speak_of
 from friso.errors import InputError
 from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
-from friso.identification.logs.mapping import Mapping
-from friso.identification.method import Prediction, around, axis_of_all, check_predictions, nothing_learnt
+from friso.identification.logs.roles import Mapping
+from friso.identification.method import (
+    Identification,
+    Prediction,
+    around,
+    axis_of_all,
+    check_predictions,
+    nothing_learnt,
+)
 from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_merged, read_usable
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface import inputs
@@ -39,7 +46,6 @@ from friso.stage.stage import axis_written, changed
 
 if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
-    from friso.identification.method import Identification
     from friso.questions.check.question import CheckAnswer
     from friso.shown.pages import Report
     from friso.studies.contradiction import Contradiction
@@ -294,7 +300,7 @@ def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:
 
     The message goes to the logger "friso", at the level INFO. Nothing is logged if no estimate has a value.
     """
-    from friso.identification.estimate_words import with_interval
+    from friso.identification.estimate import with_interval
 
     shown = [f"{one.name} {with_interval(one)}" for one in estimates if one.determined and one.name != "offset"]
     if shown:

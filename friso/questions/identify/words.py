@@ -21,15 +21,21 @@ import numpy as np
 
 from friso.axis import KINDS as AXES
 from friso.axis import axis_shown, unit_shown
-from friso.identification.estimate_documents import key_document
-from friso.identification.estimate_words import interval_text, name_of, value_text, with_interval, within
+from friso.identification.estimate import (
+    Estimate,
+    interval_text,
+    name_of,
+    value_text,
+    ways_to_show,
+    with_interval,
+    within,
+)
 from friso.identification.kind import Facts, Source
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import Experiment, Identification, Prediction, nothing_learnt
 from friso.identification.sources import LogFile
-from friso.identification.stage_file import with_origins
-from friso.identification.ways import ways_to_show
+from friso.identification.stage_file import key_document, with_origins
 from friso.quantities import plain_factor
 from friso.shown.blocks import AnswerBlock, Content
 from friso.shown.documents import entries, plain_json
@@ -41,7 +47,6 @@ from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange
 from friso.studies.settings import settings
 
 if TYPE_CHECKING:
-    from friso.identification.estimate import Estimate
     from friso.questions.identify.question import IdentifyAnswer
 
 

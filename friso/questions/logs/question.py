@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.identification.contents import ChannelContent, LogContent, log_content
-from friso.identification.logs.mapping import from_options
+from friso.identification.logs.roles import from_options
 from friso.identification.logs.settings import settings
+from friso.identification.sources import ChannelContent, LogContent, log_content
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, ChannelUnits, KindName, Roles, RoleScales, TimeLike, text_of
 from friso.platform.system import shell_word

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from friso.axis import LINEAR, unit_shown
-from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
+from friso.identification.logs.roles import Mapping, mapping_text, sidecar
 from friso.shown.blocks import AnswerBlock, Content
 from friso.stage import Stage
 from friso_thesis.questions.rig.words import rig_document, rig_figures, sentences

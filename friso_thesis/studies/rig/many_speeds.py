@@ -23,7 +23,7 @@ from friso.frequency.system import steady_force
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identification.readings.at_bearing import machine_between
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
-from friso.identification.readings.passes import passes
+from friso.identification.readings.motion_events import passes
 from friso.stage import Stage
 from friso.stage.tables import moving_mass
 from friso.virtual_rig.run import as_built_keys, run

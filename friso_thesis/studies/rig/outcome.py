@@ -19,9 +19,7 @@ from friso.equations.bandwidth import bandwidth, breakaway, proportional_stiffne
 from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import record
-from friso.identification.response.estimators import multisine
-from friso.identification.response.records import ResponseRecord, from_log
-from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.records import Channels, FrequencyResponse, ResponseRecord, from_log, multisine
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.tables import moving_mass

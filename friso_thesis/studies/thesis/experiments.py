@@ -18,7 +18,7 @@ from friso.engine.batch import simulate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import record
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
-from friso.identification.readings.passes import passes
+from friso.identification.readings.motion_events import passes
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
 from friso_thesis.studies.describing.response import mass_line

@@ -10,9 +10,8 @@ import numpy as np
 
 from friso.errors import LogError
 from friso.identification.logs.binary import OBJECT, is_hdf5
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.confined import content, content_by
-from friso.identification.logs.format import FileHead, LogFormat
+from friso.identification.logs.log import Channel, ChannelTable
+from friso.identification.logs.read import FileHead, LogFormat, content, content_by
 from friso.identification.logs.settings import settings
 from friso.identification.logs.units import split_heading
 

@@ -14,11 +14,18 @@ import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
-from friso.identification.logs.cells import read_cells
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.format import LogFormat
-from friso.identification.logs.number_format import as_floats, is_number, likely_format, number_texts
-from friso.identification.logs.sniff import TextLayout, csv_cells, decoded_head
+from friso.identification.logs.log import Channel, ChannelTable
+from friso.identification.logs.read import LogFormat
+from friso.identification.logs.sniff import (
+    TextLayout,
+    as_floats,
+    csv_cells,
+    decoded_head,
+    is_number,
+    likely_format,
+    number_texts,
+)
+from friso.identification.logs.text import read_cells
 from friso.identification.logs.units import spelled
 from friso.quantities import quoted
 

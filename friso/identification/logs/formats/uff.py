@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from friso.errors import LogError
-from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.confined import content_by, cut_short
-from friso.identification.logs.format import LogFormat
+from friso.identification.logs.log import Channel, ChannelTable
 from friso.identification.logs.measured_response import MeasuredResponse, check_response, response_unit
+from friso.identification.logs.read import LogFormat, content_by, cut_short
 from friso.identification.logs.units import unit_factor
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE_TYPE = 1, 4, 6

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identification.estimate import Estimate
-from friso.identification.estimate_words import with_interval
+from friso.identification.estimate import Estimate, with_interval
 from friso.identification.experiments.slow_sliding import slow_sliding_caption, slow_sliding_panels
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity

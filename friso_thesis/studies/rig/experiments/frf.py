@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.response.closed_loop import crossovers
+from friso.identification.response.analysis import crossovers
 from friso.identification.response.mass_line import mass_lines
-from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.records import FrequencyResponse
 from friso.progress import Progress
 from friso.shown.drawing.figure import (
     BLUE,

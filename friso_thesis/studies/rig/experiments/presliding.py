@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.identification.estimate_words import with_interval
+from friso.identification.estimate import with_interval
 from friso.identification.experiments.presliding import (
     Presliding,
     bristles_from_presliding,

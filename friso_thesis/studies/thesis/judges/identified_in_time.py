@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.readings.rate_effect import static_friction
+from friso.identification.readings.motion_events import static_friction
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import (
