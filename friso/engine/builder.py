@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 
 from friso.engine.settings import build_settings
-from friso.platform.interrupts import answer_questions
+from friso.platform.helper_process import answer_questions
 
 
 def main(folder: Path) -> None:

@@ -18,7 +18,7 @@ from threading import Lock, Semaphore, Thread
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, leave_cache, logger, prune
 from friso.engine.settings import build_settings
 from friso.engine.side_by_side import ASKER, go_on
-from friso.platform.interrupts import HelperProcess
+from friso.platform.helper_process import HelperProcess
 from friso.platform.system import usable_cores
 from friso.progress import WORK_CLOCK
 
