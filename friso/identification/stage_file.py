@@ -1,10 +1,8 @@
-"""The stage file that estimates make, its keys, and its documents.
+"""The stage file that estimates make, and its keys.
 
 Write the identified stage file: the estimates in the given stage, or in a stage assumed for a log.
 
 Choose the estimates that the keys of a stage file can take: within their bounds, and consistent with each other.
-
-Convert estimates to what the JSON document holds of them.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.axis import LINEAR, axis_shown, unit_shown
+from friso.axis import LINEAR
 from friso.equations.controllers.van_dijk import controller_table
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
@@ -26,7 +24,6 @@ from friso.identification.output_error.settings import settings
 from friso.identification.settings import identification_settings
 from friso.intervals import uncertain_value
 from friso.quantities import Number, Quantity
-from friso.shown.documents import entries
 from friso.stage import Stage
 from friso.stage.contacts import usual_ranges, written
 from friso.stage.stage import numeric_keys
@@ -360,36 +357,3 @@ def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) ->
             continue
         fine += [estimates[key] for key in unit]
     return tuple(fine)
-
-
-def ends_document(estimate: Estimate) -> dict[str, Any]:
-    """Return the ends of an interval, None where one is infinite."""
-    return entries(estimate, "value", "low", "high")
-
-
-def estimate_document(estimate: Estimate) -> dict[str, Any]:
-    """Return an estimate with its interval, for the document.
-
-    If there is no value, the reason is given.
-    """
-    about = {
-        "unit": unit_shown(estimate.unit),
-        **ends_document(estimate),
-        "shown": estimate.determined,
-        "method": axis_shown().text(estimate.method),
-        "reason": axis_shown().text(estimate.reason) or None,
-    }
-    return {"name": estimate.name, **about}
-
-
-def estimates_document(result: object, *names: str) -> dict[str, Any]:
-    """Return estimates among the attributes of a result, by name, for the document."""
-    return {name: estimate_document(getattr(result, name)) for name in names}
-
-
-def key_document(estimate: Estimate) -> dict[str, Any]:
-    """Return an estimate of a key of the stage file, with the text that the file has for it."""
-    document = estimate_document(estimate)
-    stands = np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low
-    text = estimate_text(replace(estimate, unit=unit_shown(estimate.unit))) if stands else None
-    return {"key": document.pop("name"), **document, "written": text}

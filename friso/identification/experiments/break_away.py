@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from friso.identification.estimate import Estimate, with_interval
+from friso.identification.estimate_documents import estimates_document
 from friso.identification.kind import AREA, WAYS, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import by_direction
 from friso.identification.readings.course import Course
 from friso.identification.readings.motion_events import Ramps, force_ramps, static_friction
 from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.stage_file import estimates_document
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import INK, Axis, Band, Figure, Limit, Markers, Panel
 from friso.shown.text import range_with_unit

@@ -12,6 +12,7 @@ import numpy as np
 from friso.equations.bandwidth import bandwidth
 from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate, digits, estimates_in_words, with_interval, within
+from friso.identification.estimate_documents import estimate_document, estimates_document
 from friso.identification.kind import WAYS, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import EXPONENT
@@ -21,7 +22,6 @@ from friso.identification.readings.friction_position import FrictionPosition, fr
 from friso.identification.readings.friction_velocity import Direction, FrictionVelocity, distinct, friction_velocity
 from friso.identification.readings.motion_events import passes
 from friso.identification.readings.settings import settings as reading_settings
-from friso.identification.stage_file import estimate_document, estimates_document
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import (
     BLUE,

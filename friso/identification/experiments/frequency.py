@@ -11,6 +11,7 @@ import numpy as np
 from friso.identification.combine import Correlated, determined
 from friso.identification.doubt import words_of
 from friso.identification.estimate import Estimate, digits, name_of, unit_of, with_interval
+from friso.identification.estimate_documents import estimate_document, estimates_document
 from friso.identification.kind import (
     AREA,
     AnalysisSettings,
@@ -26,7 +27,7 @@ from friso.identification.response.mass_line import StraightLine
 from friso.identification.response.masses import TwoMass
 from friso.identification.response.records import FrequencyResponse
 from friso.identification.settings import experiment_settings
-from friso.identification.stage_file import estimate_document, estimates_document, shared_masses
+from friso.identification.stage_file import shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import (

@@ -13,6 +13,7 @@ from friso.errors import InputError
 from friso.identification.combine import Correlated
 from friso.identification.doubt import steady_friction
 from friso.identification.estimate import Estimate, digits, estimates_in_words, name_of, unit_of, with_interval, within
+from friso.identification.estimate_documents import ends_document
 from friso.identification.inverse_model import InverseModel, inverse_model, motion
 from friso.identification.kind import TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import ROLES, Log
@@ -24,7 +25,7 @@ from friso.identification.output_error.settings import settings
 from friso.identification.readings.common import cart, low_pass, on_bearing
 from friso.identification.readings.course import Course
 from friso.identification.settings import experiment_settings, identification_settings, presentation_settings
-from friso.identification.stage_file import ends_document, made_up
+from friso.identification.stage_file import made_up
 from friso.identification.witness import Replay
 from friso.quantities import percent
 from friso.shown.documents import entries, unit_suffix

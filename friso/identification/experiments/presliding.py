@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 from friso.errors import InputError
 from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate, with_interval
+from friso.identification.estimate_documents import estimates_document
 from friso.identification.kind import (
     TIME,
     AnalysisSettings,
@@ -42,7 +43,7 @@ from friso.identification.readings.common import (
 from friso.identification.readings.course import Course
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
-from friso.identification.stage_file import estimates_document, shared_masses
+from friso.identification.stage_file import shared_masses
 from friso.quantities import percent
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series

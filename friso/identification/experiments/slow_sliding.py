@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 
 from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate, with_interval
+from friso.identification.estimate_documents import estimate_document
 from friso.identification.kind import TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source, by_rows
 from friso.identification.logs.log import Log
 from friso.identification.readings import at_bearing as bearing
@@ -25,7 +26,6 @@ from friso.identification.readings.at_bearing import BearingRecord, Between, Low
 from friso.identification.readings.common import Mean, by_t, correlation_of, deflections, jackknife, stribeck_curve
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings, presentation_settings
-from friso.identification.stage_file import estimate_document
 from friso.quantities import percent
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series

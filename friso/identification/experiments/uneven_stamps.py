@@ -10,13 +10,13 @@ import numpy as np
 
 from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
+from friso.identification.estimate_documents import estimate_document
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source, by_rows
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_velocity import METHOD_OF_STAMPS as METHOD
 from friso.identification.readings.friction_velocity import StampedFriction, stamped_friction
-from friso.identification.stage_file import estimate_document
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import BLUE, INK, Axis, Figure, Markers, Panel, Series
 from friso.shown.text import with_unit

@@ -30,12 +30,13 @@ from friso.identification.estimate import (
     with_interval,
     within,
 )
+from friso.identification.estimate_documents import key_document
 from friso.identification.kind import Facts, Source
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import Experiment, Identification, Prediction, nothing_learnt
 from friso.identification.sources import LogFile
-from friso.identification.stage_file import key_document, with_origins
+from friso.identification.stage_file import with_origins
 from friso.quantities import plain_factor
 from friso.shown.blocks import AnswerBlock, Content
 from friso.shown.documents import entries, plain_json

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from friso.identification.estimate import Estimate, with_interval
+from friso.identification.estimate_documents import estimates_document
 from friso.identification.kind import AREA, TIME, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.checks import runs
 from friso.identification.logs.log import Log
@@ -22,7 +23,6 @@ from friso.identification.readings.common import Mean, block_mean, by_segment, b
 from friso.identification.readings.course import Course
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
-from friso.identification.stage_file import estimates_document
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, Panel, Series
 from friso.stage import Stage

@@ -14,6 +14,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate, with_interval
+from friso.identification.estimate_documents import estimates_document
 from friso.identification.kind import TIME, WAYS, AnalysisSettings, ExperimentKind, Facts, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import (
@@ -32,7 +33,6 @@ from friso.identification.readings.common import (
 from friso.identification.readings.motion_events import Slip, slips, static_friction
 from friso.identification.readings.settings import settings as reading_settings
 from friso.identification.settings import experiment_settings
-from friso.identification.stage_file import estimates_document
 from friso.intervals import NORMAL_COVERAGE
 from friso.shown.documents import entries
 from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
