@@ -238,7 +238,7 @@ def design_thesis() -> Values:
 
 
 def hunting_adrc() -> Values:
-    from friso.equations.controllers.van_dijk import crossing_ratio
+    from friso.equations.controllers.pid import crossing_ratio
 
     keys = ("--set", "joint.locked=true", "--set", 'controller={kind="adrc", bandwidth="3 Hz", observer_ratio=5}')
     points = friso("boundary", "examples/thesis_rig.toml", *keys, "--x", "controller.bandwidth=0.5 Hz..15 Hz")["points"]

@@ -12,8 +12,7 @@ import numpy as np
 import xarray as xr
 
 from friso.axis import LINEAR
-from friso.equations.controllers.pid import PidGains
-from friso.equations.controllers.van_dijk import VanDijk
+from friso.equations.controllers.pid import PidGains, VanDijk
 from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare, ReturnMap, Target
 from friso.questions.check.question import CheckAnswer
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer

@@ -14,7 +14,7 @@ from variants import limit, lugre, stage, there_and_back
 import friso
 from friso.engine.batch import simulate
 from friso.equations.bandwidth import faster
-from friso.equations.controllers.van_dijk import crossing_ratio
+from friso.equations.controllers.pid import crossing_ratio
 from friso.errors import InputError
 from friso.frequency.margins import margins
 from friso.frequency.system import limit_cases

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 import friso
 from friso.equations.bandwidth import faster
-from friso.equations.controllers.van_dijk import numbers
+from friso.equations.controllers.pid import numbers
 from friso.equations.structure import structure
 from friso.frequency.bode import limits, settled_members
 from friso.frequency.loops import plant, response

@@ -45,7 +45,7 @@ from friso.design_method.verification import (
 )
 from friso.engine.side_by_side import both
 from friso.equations.bandwidth import least_breakaway
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.controllers.pid import CROSSOVER
 from friso.frequency.bode import Range
 from friso.progress import Progress, silent
 from friso.quantities import percent

@@ -33,7 +33,7 @@ from friso.design_method.requirements import (
 from friso.design_method.settings import settings
 from friso.design_method.spec import SIZES, Geometry, Sheet, Spec, box, mechanisms, moved_along, read_spec, sheets
 from friso.equations.bandwidth import least_breakaway
-from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, controller_table
+from friso.equations.controllers.pid import CROSSOVER, TUNED_MASS, controller_table
 from friso.equations.motion import size
 from friso.errors import InputError
 from friso.frequency.bode import rigid_bandwidth

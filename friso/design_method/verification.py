@@ -34,7 +34,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.engine.settings import room_settings
 from friso.equations.bandwidth import bandwidth, faster
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
+from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.errors import InputError

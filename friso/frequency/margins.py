@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from friso.engine.side_by_side import side_by_side
-from friso.equations.controllers.van_dijk import as_gains, numbers, tuned
+from friso.equations.controllers.pid import as_gains, numbers, tuned
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
 from friso.frequency.loops import (

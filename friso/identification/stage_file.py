@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from friso.axis import LINEAR
-from friso.equations.controllers.van_dijk import controller_table
+from friso.equations.controllers.pid import controller_table
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel, moved_in

@@ -19,7 +19,7 @@ from friso.design_method.requirements import Candidate, Confirmed, RelaxableKey,
 from friso.design_method.settings import settings
 from friso.design_method.spec import Geometry
 from friso.design_method.verification import Corners, MachineOutcomes
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
+from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.frequency.bode import COMFORTABLE_MARGIN
 from friso.quantities import percent, plain_factor
 from friso.questions.design import words

@@ -19,7 +19,7 @@ from friso.design_method.method import Design, LeavesAndCrossover, Need, NoDesig
 from friso.design_method.requirements import Relaxation
 from friso.design_method.spec import Geometry
 from friso.design_method.verification import Corners, MachineOutcomes
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.controllers.pid import CROSSOVER
 from friso.frequency.bode import COMFORTABLE_MARGIN, Range, searched_crossovers
 from friso.platform.system import shell_word
 from friso.quantities import outwards, percent

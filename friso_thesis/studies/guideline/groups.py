@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS, tuned
+from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS, tuned
 from friso.equations.model import assemble
 from friso.equations.structure import structure
 from friso.errors import InputError

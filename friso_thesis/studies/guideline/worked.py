@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.equations.controllers.pid import CROSSOVER, TUNED_MASS
 from friso.frequency import bode
 from friso.frequency.bode import Range, limits
 from friso.hunting import Ensemble, find_margin

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
+from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.equations.rail import friction_factors
 from friso.intervals import Share, share
 from friso.progress import Progress

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.controllers.pid import CROSSOVER
 from friso.equations.motions import CRUISE
 from friso.progress import silent
 from friso.stage import Stage

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from friso.engine.batch import simulate
-from friso.equations.controllers.van_dijk import ALPHA
+from friso.equations.controllers.pid import ALPHA
 from friso.studies.study import Request
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Response

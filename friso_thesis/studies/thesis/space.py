@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, LOW_PASS, TUNED_MASS
+from friso.equations.controllers.pid import ALPHA, BETA, LOW_PASS, TUNED_MASS
 from friso.equations.motions import CRUISE
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy
 

@@ -9,7 +9,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS, as_gains, numbers
+from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS, as_gains, numbers
 from friso.stage import Stage, loads
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.equations.controllers.pid import CROSSOVER, TUNED_MASS
 from friso.frequency.bode import settled_margin
 from friso.hunting.criteria import COUNTED_AFTER, FAILED, SWINGS
 from friso.quantities import percent

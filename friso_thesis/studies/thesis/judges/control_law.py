@@ -13,7 +13,7 @@ from functools import cache, lru_cache
 import numpy as np
 import sympy as sp
 
-from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, as_gains, numbers
+from friso.equations.controllers.pid import CROSSOVER, TUNED_MASS, as_gains, numbers
 from friso.frequency.bode import COMFORTABLE_MARGIN, settled_margin
 from friso.frequency.margins import loops, margins
 from friso.frequency.system import in_series, limit_cases, member

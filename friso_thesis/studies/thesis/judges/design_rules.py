@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.controllers.pid import CROSSOVER
 from friso.frequency.bode import COMFORTABLE_MARGIN, settled_margin
 from friso.hunting import find_margin
 from friso.quantities import percent

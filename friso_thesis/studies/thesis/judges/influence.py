@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER
+from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER
 from friso.intervals import separation
 from friso.stage import loads
 from friso.studies.axes import Samples

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER
+from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER
 from friso.equations.motions import CRUISE
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges

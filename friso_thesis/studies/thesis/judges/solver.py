@@ -7,7 +7,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.controllers.pid import CROSSOVER
 from friso.evidence import findings_on_file
 from friso.hunting.criteria import SWINGS
 from friso.quantities import percent

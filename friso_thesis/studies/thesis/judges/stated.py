@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 import sympy as sp
 
-from friso.equations.controllers.van_dijk import BETA
+from friso.equations.controllers.pid import BETA
 from friso.hunting.criteria import COUNTED_AFTER, FAILED
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.controllers.pid import CROSSOVER
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, Response, beside, judges
 from friso_thesis.studies.thesis.maps import (

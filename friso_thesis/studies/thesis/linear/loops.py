@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
-from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.equations.controllers.pid import CROSSOVER, TUNED_MASS
 from friso.frequency.bode import range_end, ranges_below, searched_crossovers, stable_crossovers
 from friso.frequency.margins import (
     Margins,

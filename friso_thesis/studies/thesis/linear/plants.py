@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from friso.equations.bandwidth import faster
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.controllers.pid import CROSSOVER
 from friso.frequency.bode import PRESCRIBED_SPEEDS, Range, ranges_below
 from friso.frequency.loops import DISTURBANCE, FORCE, STAGE, cart_states, closed_loop, operating_point, plant
 from friso.frequency.margins import frequencies, loops, plant_poles, plants, spectral_abscissa
