@@ -1,10 +1,9 @@
 """Define doubts: effects that may be in a log and are not in the model, with the test that detects each.
 
-Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`, or, if it is about the record itself, an
-entry in the table of that package. It states what it looks at, at which moment of an analysis, and which measurement
-would decide it; its `find` yields findings. A finding is the cause in words, with its size and its consequence: wider
-intervals, or values that are not reported. The analysis applies consequences in this module, so that one more effect is
-one more file.
+Each doubt is a row in the table of `friso/identification/doubts/`. It states what it looks at, at which moment of an
+analysis, and which measurement would decide it; its `find` yields findings. A finding is the cause in words, with its
+size and its consequence: wider intervals, or values that are not reported. The analysis applies consequences in this
+module, so that one more effect is one more row.
 
 Judge a fit of moves: its residual against the noise of the record, and possible causes.
 """

@@ -2,7 +2,7 @@
 
 Declare what every motion of the reference has: the table [motion].
 
-Each kind of motion is one file in `friso/equations/motions/`, or comes from a package.
+Each kind of motion is a class in `friso/equations/motions/`, or comes from a package.
 
 Declare the tables of a stage file for the real drive and the machine's surroundings.
 """

@@ -1,4 +1,4 @@
-"""Controllers, one file each; importing this package registers all of them."""
+"""Controllers; importing this package registers all of them."""
 
 from importlib import import_module
 from pkgutil import iter_modules

@@ -1,4 +1,4 @@
-"""Friction laws, one file each; importing this package registers all of them."""
+"""Friction laws; importing this package registers all of them."""
 
 from importlib import import_module
 from pkgutil import iter_modules
