@@ -161,6 +161,9 @@ def c_language(real: str = "double") -> Language:
     )
 
 
-def commented(lines: Iterable[str]) -> list[str]:
-    """Return a comment in C of some lines."""
-    return ["/*", *(f" * {line.replace('*/', '* /').replace('/*', '/ *')}".rstrip() for line in lines), " */"]
+def commented(text: str, begin: str = "/*", before: str = " * ", end: str = " */") -> str:
+    """Return lines of text as a comment, in C unless its marks are given; what would end it is broken up."""
+    marks = (begin.strip(), end.strip())
+    for mark in marks:
+        text = text.replace(mark, " ".join(mark))
+    return "\n".join([begin, *(f"{before}{line}".rstrip() for line in text.splitlines()), end, ""])
