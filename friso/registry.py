@@ -24,7 +24,8 @@ class Registry(Generic[Item]):
     and, if there is a `group` of entry points, those that installed packages name in it; what the latter declare must
     be of a `kind`. Names and their descriptions, the first line of each module's docstring, are read without importing
     any module. A module is imported when its declaration is first asked for. The package may declare more in a table,
-    TABLE, as (declared, description), by name. `added` takes what is declared elsewhere, in the same way.
+    TABLE, as (declared, description), by name; without an `attribute` it declares all there. `added` takes what is
+    declared elsewhere, in the same way.
     """
 
     def __init__(self, package: str, attribute: str, group: str = "", kind: type = object, dashes: bool = True) -> None:
@@ -35,7 +36,7 @@ class Registry(Generic[Item]):
     @cached_property
     def _own(self) -> dict[str, str]:
         """Return friso's own modules by name; of an entry in the table, the package."""
-        modules = iter_modules(import_module(self.package).__path__)
+        modules = iter_modules(import_module(self.package).__path__) if self.attribute else ()
         own = {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
         return own | dict.fromkeys(self._listed, self.package)
 

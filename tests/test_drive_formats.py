@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from patience import grows_with_the_square
 
 import friso
-from friso.drives.format import FORMATS
+from friso.drives.ask import Ask
+from friso.drives.drive import FORMATS
 from friso.drives.gains import gains_of
-from friso.drives.questions import UserAnswers
 from friso.drives.read import stage_from
 from friso.errors import InputError
 
@@ -198,7 +198,9 @@ def test_settings_that_a_drive_cannot_hold_are_named(
     stage = stage_from(written(tmp_path, kind), None, ANSWERS[kind]).stage
     stage = stage.replace({f"controller.{key}": value for key, value in keys.items()})
     units = {key: value for key, value in ANSWERS[kind].items() if "." not in key and key not in ONLY_THERE}
-    asked = {question.key for question in FORMATS[kind].questions_back(stage.flat(), UserAnswers({}))}
+    ask = Ask({})
+    FORMATS[kind].parameters(stage.flat(), ask)
+    asked = {question.key for question in ask.open}
     answers = {key: value for key, value in (units | BACK.get(kind, {})).items() if key in asked}
     assert f"controller.{lost}" in gains_of(stage, answers, kind).not_held
 

@@ -11,18 +11,15 @@ from dataclasses import dataclass
 from math import isclose, isfinite, pi
 from typing import Any
 
-from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.questions import OpenQuestion, UserAnswers
+from friso.axis import LINEAR, AxisKind, axis_of
+from friso.drives.ask import TRAVEL, TRAVELS, Ask
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
 from friso.stage.controllers import controller_of
 
-TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
-"""Keys of the user's answers: travel per turn, and motor constant.
+MOTOR_CONSTANT = "motor_constant"
+"""Key of the user's answer: torque per ampere [N m/A], or force per ampere [N/A] without a turn."""
 
-The motor constant is torque per ampere [N m/A], or force per ampere [N/A] without a turn."""
-
-TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), KINDS["rotary"]: Quantity("rad", positive, "360 deg")}
 TORQUE_PER_AMPERE, FORCE_PER_AMPERE = Quantity("N*m/A", positive, "0.5 N*m/A"), Quantity("N/A", positive, "30 N/A")
 
 
@@ -78,7 +75,7 @@ class Turn:
         return dict(self.exerts).get("A")
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any], answers: UserAnswers, exerts: Commands = ()) -> Turn:
+    def of(cls, flat: Mapping[str, Any], answers: Ask, exerts: Commands = ()) -> Turn:
         """Collect travel and force per command from the stage file and the user's answers.
 
         The transmission gives the travel, the actuator gives `exerts`; the user may add what is missing. Raises
@@ -105,35 +102,11 @@ class Turn:
         return cls(travel, (("A", exerted), *(one for one in exerts if one[0] != "A")))
 
 
-def kind_of_turn(answers: UserAnswers) -> AxisKind:
-    """Return the kind of axis that the answer on the travel of a turn implies; linear without an answer."""
-    return answers.kind_of(TRAVEL, TRAVELS)[0] if TRAVEL in answers else LINEAR
-
-
-def open_turn(answers: UserAnswers, meaning: str, example: str) -> list[OpenQuestion]:
-    """Ask how far a turn moves the load unless it is answered."""
-    return [] if TRAVEL in answers else [OpenQuestion(TRAVEL, meaning, example)]
-
-
-def open_turn_back(flat: Mapping[str, Any], answers: UserAnswers, meaning: str) -> list[OpenQuestion]:
-    """Ask how far a turn moves the load unless a transmission or an answer tells."""
-    if travel_of(flat) is not None:
-        return []
-    return open_turn(answers, meaning, TRAVELS[axis_of(flat)].written_example)
-
-
-def travel_back(flat: Mapping[str, Any], answers: UserAnswers) -> float:
-    """Return how far a turn moves the load [m or rad], by an answer or by the transmission."""
-    travel = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else travel_of(flat)
-    assert travel is not None  # refused earlier if missing
-    return float(travel)
-
-
 Convert = Callable[[float, Turn, AxisKind], list[Other]]
 """Function that converts a value in SI to other units."""
 
 
-def conversions(flat: Mapping[str, Any], answers: UserAnswers, exerts: Commands = ()) -> tuple[Conversion, ...]:
+def conversions(flat: Mapping[str, Any], answers: Ask, exerts: Commands = ()) -> tuple[Conversion, ...]:
     """Return every gain of a stage in SI and in the units that drives use.
 
     `flat` holds the stage as flat keys such as controller.kp. Units that need an unknown travel or motor constant are

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from friso.drives.conversions import MOTOR_CONSTANT, TRAVEL, Conversion, Turn, conversions
+from friso.drives.ask import TRAVEL, Ask
+from friso.drives.conversions import MOTOR_CONSTANT, Conversion, Turn, conversions
 from friso.drives.diagram import loop_diagram
-from friso.drives.format import FORMATS, TOLD, ParameterFormat
-from friso.drives.questions import UserAnswers, refuse_open
+from friso.drives.drive import FORMATS, TOLD, DriveFormat
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import Stage
@@ -30,7 +31,7 @@ class Gains:
     stage: Stage
     diagram: str
     conversions: tuple[Conversion, ...]
-    kind: ParameterFormat | None = None
+    kind: DriveFormat | None = None
     parameters: Mapping[str, float] | None = None
     not_held: tuple[str, ...] = ()
 
@@ -47,20 +48,28 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     drive does not have, for an answer that nothing asks for, and for all missing answers together.
     """
     flat = stage.flat()
-    answers = UserAnswers({**_told(stage, flat), **user_values})
+    answers = Ask({**_told(stage, flat), **user_values})
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
     askable = {TRAVEL, MOTOR_CONSTANT}
     if kind is not None:
-        askable |= {question.key for question in kind.questions_back(flat, UserAnswers({}))}
+        askable |= {question.key for question in _asked(kind, flat, {}).open}
     for key in user_values:
         if key not in askable:
             raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(askable))}")
     rows = conversions(flat, answers, stage.axis_kind.exerts)
     if kind is None:
         return Gains(stage, loop_diagram(flat), rows)
-    refuse_open(kind.questions_back(flat, answers), f"--to {to}")
+    _asked(kind, flat, answers.texts).refuse_open(f"--to {to}")
     back = kind.parameters(flat, answers)
     return Gains(stage, loop_diagram(flat), rows, kind, back.values, _not_held(flat, back.held))
+
+
+def _asked(kind: DriveFormat, flat: Mapping[str, Any], texts: Mapping[str, Any]) -> Ask:
+    """Return what a drive asks for on the way back, whether or not it can hold the controller."""
+    ask = Ask(texts)
+    with suppress(InputError):
+        kind.parameters(flat, ask)
+    return ask
 
 
 def output_of(stage: Stage, user_values: Mapping[str, Any]) -> tuple[str, float]:
@@ -73,7 +82,7 @@ def output_of(stage: Stage, user_values: Mapping[str, Any]) -> tuple[str, float]
         if key not in (TRAVEL, MOTOR_CONSTANT):
             raise InputError("--set", quoted(key), f"a key of the stage, {TRAVEL} or {MOTOR_CONSTANT}")
     flat = stage.flat()
-    answers = UserAnswers({**_told(stage, flat), **user_values})
+    answers = Ask({**_told(stage, flat), **user_values})
     if per_ampere := Turn.of(flat, answers, stage.axis_kind.exerts).per_ampere:
         return "A", 1 / per_ampere
     if of_output := flat.get("drive.force_per_output"):
