@@ -205,6 +205,16 @@ def test_settings_that_a_drive_cannot_hold_are_named(
     assert f"controller.{lost}" in gains_of(stage, answers, kind).not_held
 
 
+def test_gains_per_cycle_of_a_stage_without_a_drive_need_the_cycle(tmp_path: Path) -> None:
+    stage = stage_from(written(tmp_path, "ecmc"), None, ANSWERS["ecmc"]).stage
+    answers = {"length_per_unit": "1 mm", **BACK["ecmc"]}
+    with pytest.raises(InputError, match=r"--set drive\.sample_time="):
+        gains_of(stage.replace({"drive": None}), answers, "ecmc")
+    back = gains_of(stage.replace({"drive": {"sample_time": "2 ms"}}), answers, "ecmc").parameters
+    assert back is not None
+    assert back["Ki"] == pytest.approx(2 * 0.05)
+
+
 @pytest.mark.parametrize(
     ("kind", "without", "asked"),
     [

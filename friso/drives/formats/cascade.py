@@ -228,6 +228,7 @@ class Ecmc(CascadeDrive):
     source = "ecmcPIDController.cpp of epics-modules/ecmc"
     gain, time, most, constant = "MOT_VELO_KP", "MOT_VELO_TI", "MOT_I_MAX_MA", "MOT_TRQ_CONST_MNM_P_A"
     dead_band, inner, target = "controller.deadband.tol", "controller.inner.tol", "monitoring.target"
+    cycle = "cycle of the bus, in which ecmc controls the position"
     in_loop: ClassVar[Mapping[str, bool]] = {"windows_in_position_loop": True, "windows_at_rest": True}
     """Keys of [controller] with which windows act where ecmc has them."""
 
@@ -272,7 +273,7 @@ class Ecmc(CascadeDrive):
 
     def _cycle(self, ask: Ask, field: Quantity | None = None) -> Any:
         """Ask for the cycle of the bus [s]."""
-        return ask(POSITION_TIME, "cycle of the bus, in which ecmc controls the position", '"1 ms"', field)
+        return ask(POSITION_TIME, self.cycle, '"1 ms"', field)
 
     def _turn(self, ask: Ask, flat: FlatStage) -> DriveUnits:
         """Return N m and turns of the motor."""
@@ -375,10 +376,13 @@ class Ecmc(CascadeDrive):
         constant = ask(self.constant.lower(), what, "96", Number(positive, "96"))
         windows = self._windows(flat)
         unit = self._length(ask)[1] if windows else 1.0
+        cycle = flat.get(POSITION_TIME, flat.get(SAMPLE_TIME))
+        if cycle is None and ("controller.position_integral_time" in flat or "freeze_window" in windows):
+            ask(SAMPLE_TIME, self.cycle, '"1 ms"')  # gains are per cycle
+        cycle = cycle or 1.0
         if flat["controller.kind"] != "cascade":
             raise lacks(f'kind = "{flat["controller.kind"]}"', "a cascade, the only structure of ecmc and its drive")
         of = {key.removeprefix("controller."): value for key, value in flat.items() if key.startswith("controller.")}
-        cycle = flat.get(POSITION_TIME, flat.get(SAMPLE_TIME, 0.0))
         integral = of.get("position_integral_time")
         values = {"Kp": of["kv"], "Ki": of["kv"] * cycle / integral if integral else 0.0}
         values |= {"Kff": of["velocity_feedforward"], self.gain: of["kp"] / force**2 / (constant * 1e-3) * 1e3}
