@@ -11,8 +11,7 @@ import pytest
 import friso
 from friso.axis import KINDS
 from friso.drives.ask import Ask
-from friso.drives.conversions import conversions
-from friso.drives.gains import gains_of
+from friso.drives.gains import conversions, gains_of
 from friso.hunting import hunting as hunting_of
 from friso.stage import Stage
 from friso.studies.axes import SweptAxis, read_axis

@@ -15,9 +15,8 @@ from inside import friso_inside
 
 import friso
 from friso.drives.ask import Ask
-from friso.drives.conversions import conversions
 from friso.drives.drive import FORMATS
-from friso.drives.gains import gains_of
+from friso.drives.gains import conversions, gains_of
 from friso.drives.read import stage_from
 from friso.equations.blocks import Loop
 from friso.equations.component import state

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi
 from typing import Any
 
 from friso.axis import LINEAR, ROTARY, AxisKind
@@ -185,3 +186,13 @@ def moving_mass(kind: AxisKind) -> str:
     if kind == LINEAR:
         return "the mass of load and rotor; a rotor of inertia J counts as J (2 pi / travel of a turn)^2"
     return "the inertia of load and rotor about the axis; behind a gear the rotor's counts times the ratio squared"
+
+
+def travel_of(flat: Mapping[str, Any]) -> float | None:
+    """Return how far one turn of the motor moves the load [m or rad].
+
+    The transmission's ratio or lead gives it. Returns None for a stage without a transmission.
+    """
+    if "transmission.ratio" in flat:
+        return 2 * pi / flat["transmission.ratio"]
+    return flat.get("transmission.lead")

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from math import isclose, pi
+from math import inf, isclose, pi
+from operator import add, mul, neg, pos, pow, sub, truediv
 from typing import Any, ClassVar
 from xml.etree import ElementTree
 
 from friso.axis import LINEAR, AxisKind, axis_of
-from friso.drives.ask import TRAVEL, TRAVELS, Ask
-from friso.drives.conversions import travel_of
+from friso.drives.ask import TRAVEL, TRAVELS, Ask, travel_of
 from friso.errors import InputError
 from friso.escapes import one_line
 from friso.quantities import Quantity, positive, quoted
@@ -389,3 +390,52 @@ def root_of(text: str, expected: str) -> ElementTree.Element:
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError("", f"no XML: {error}", f"a file {expected}") from None
+
+
+LONGEST_EXPRESSION = 200
+"""Longest arithmetic expression in characters."""
+
+_NAMED: Mapping[str, float] = {
+    "float('inf')": inf,
+    **{f"{module}{name}": value for name, value in (("pi", pi), ("inf", inf)) for module in ("", "math.", "np.")},
+}
+_PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow}
+_SIGNS = {ast.USub: neg, ast.UAdd: pos}
+
+_OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
+"""Pattern of texts that are not arithmetic and would make Python's parser warn, such as letters after a digit in
+0x10."""
+
+
+def number_in(text: str) -> float | None:
+    """Return the number that a text stands for, or None if it is no number.
+
+    Arithmetic with +, -, *, /, **, brackets, pi and inf is evaluated. Python code is never executed.
+    """
+    if len(text) > LONGEST_EXPRESSION or _OTHER.search(text):
+        return None
+    try:
+        return _worked_out(ast.parse(text.strip(), mode="eval").body)
+    except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError):
+        return None
+
+
+def _worked_out(node: ast.expr) -> float:
+    """Return the value of an arithmetic expression.
+
+    Raises ValueError for anything but arithmetic of numbers, and for a root of a negative number.
+    """
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return float(value)
+        case ast.BinOp(left, sign, right) if type(sign) in _PAIRS:
+            value = _PAIRS[type(sign)](_worked_out(left), _worked_out(right))
+            if isinstance(value, complex):
+                raise ValueError(value)
+            return value
+        case ast.UnaryOp(sign, operand) if type(sign) in _SIGNS:
+            return _SIGNS[type(sign)](_worked_out(operand))
+    name = ast.unparse(node)
+    if name not in _NAMED:
+        raise ValueError(name)
+    return _NAMED[name]

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.drives.carried_out import single_difference
-from friso.drives.languages import commented
+from friso.drives.languages import commented, single_difference
 from friso.drives.machine import MachineRun
 from friso.drives.program import MEANINGS, LinearController, Program, identifier
 from friso.drives.settings import settings

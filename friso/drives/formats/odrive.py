@@ -16,7 +16,6 @@ from collections.abc import Mapping
 from math import inf, isclose, pi
 from typing import Any
 
-from friso.drives.arithmetic import number_in
 from friso.drives.ask import Ask
 from friso.drives.drive import (
     AsStage,
@@ -27,6 +26,7 @@ from friso.drives.drive import (
     ParameterRow,
     Parameters,
     lacks,
+    number_in,
     si,
     there_and_back,
     torque,

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.drives.carried_out import carried_out
 from friso.drives.gains import output_of
+from friso.drives.languages import carried_out
 from friso.drives.machine import machine_of, machine_run
 from friso.drives.program import MEANINGS, OUTPUT, PER_NEWTON, linear_controller, program_of
 from friso.drives.settings import settings
