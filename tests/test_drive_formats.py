@@ -205,6 +205,16 @@ def test_settings_that_a_drive_cannot_hold_are_named(
     assert f"controller.{lost}" in gains_of(stage, answers, kind).not_held
 
 
+@pytest.mark.parametrize(
+    ("name", "text"), [("a.prg", "SLPKP(0)=140\nSLVKP(0)=65\n"), ("a.yaml", "controller:\n  Kp: 12\n")]
+)
+def test_a_length_in_degrees_makes_a_rotary_axis_without_a_window_too(tmp_path: Path, name: str, text: str) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    answers = {**JOINT, **CYCLES, "length_per_unit": "1 deg", "controller.kp": "5 N*m*s/rad"}
+    assert stage_from(path, None, answers).stage.flat()["axis.kind"] == "rotary"
+
+
 def test_gains_per_cycle_of_a_stage_without_a_drive_need_the_cycle(tmp_path: Path) -> None:
     stage = stage_from(written(tmp_path, "ecmc"), None, ANSWERS["ecmc"]).stage
     answers = {"length_per_unit": "1 mm", **BACK["ecmc"]}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import pi
 from typing import Any
 
-from friso.axis import LINEAR, ROTARY, AxisKind
+from friso.axis import LINEAR, ROTARY, AxisKind, axis_of
 from friso.equations.motions.there_and_back import ThereAndBack
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, positive, quoted
@@ -105,6 +105,18 @@ class Ask:
         field = FORCE_FIELD.on(kind)
         return self(FORCE, f"what {output} exerts at the load", field.written_example, field)
 
+    def turn(self, meaning: str, example: str, flat: Mapping[str, Any]) -> tuple[AxisKind, float]:
+        """Return the kind of axis, and how far a turn of the motor moves the load [m or rad].
+
+        A stage, unless `flat` is empty, tells its kind, and the travel if it has a transmission.
+        """
+        if not flat:
+            return self.of_kind(TRAVEL, meaning, example, TRAVELS)
+        kind, told = axis_of(flat), travel_of(flat)
+        if told is not None and TRAVEL not in self:
+            return kind, told
+        return kind, self(TRAVEL, meaning, TRAVELS[kind].written_example, TRAVELS[kind])
+
     def kind(self, *keys: str) -> AxisKind:
         """Return the kind of axis that an answer on a length or a travel implies; linear without an answer."""
         for key in keys:
@@ -177,6 +189,7 @@ FORCE, LENGTH, TRAVEL = "force_per_output", "length_per_unit", "travel_per_turn"
 """Keys of answers on units: what an output of 1 exerts at the load, and how far a position of 1 and a turn move it."""
 
 FORCE_FIELD = Quantity("N", positive, "20 N")
+GAIN_FIELD = Quantity("N*s/m", positive, "500 N*s/m")
 LENGTHS = {LINEAR: Quantity("m", positive, "1 um"), ROTARY: Quantity("rad", positive, "0.01 deg")}
 TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), ROTARY: Quantity("rad", positive, "360 deg")}
 

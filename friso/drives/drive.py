@@ -11,11 +11,11 @@ from operator import add, mul, neg, pos, pow, sub, truediv
 from typing import Any, ClassVar
 from xml.etree import ElementTree
 
-from friso.axis import LINEAR, AxisKind, axis_of
-from friso.drives.ask import TRAVEL, TRAVELS, Ask, travel_of
+from friso.axis import LINEAR, AxisKind
+from friso.drives.ask import GAIN_FIELD, Ask
 from friso.errors import InputError
 from friso.escapes import one_line
-from friso.quantities import Quantity, positive, quoted
+from friso.quantities import quoted
 from friso.registry import Registry
 
 FlatStage = Mapping[str, Any]
@@ -77,6 +77,12 @@ class AxisParameters:
         if not isinstance(entry, bool) and entry not in (0, 1):
             raise InputError(name, quoted(str(entry)), "true or false", f"{name} = true")
         return bool(entry)
+
+    def refuse_negative(self, names: Iterable[str]) -> None:
+        """Raise InputError for the first of some gains that is below 0."""
+        for name in names:
+            if (gain := self.number(name, 0.0)) < 0:
+                raise InputError(name, f"{gain:g}", "a gain of 0 or more", f"{name} = 10")
 
     def is_set(self, name: str) -> bool:
         """Tell whether a parameter exists and is neither 0 nor infinite."""
@@ -172,7 +178,7 @@ class DriveFormat:
     firmware: ClassVar[str]
     source: ClassVar[str]
     suffix: ClassVar[str]
-    pattern: ClassVar[str] = ""
+    pattern: ClassVar[str]
     """Expression for what a text of this kind contains."""
 
     rows: ClassVar[tuple[ParameterRow, ...]] = ()
@@ -217,6 +223,11 @@ class DriveFormat:
         held = [row for row in self.rows if row.key not in optional or f"controller.{row.key}" in flat]
         return {row.name: flat.get(f"controller.{row.key}", 0.0) / units.of(row) for row in held}
 
+    def velocity_loop(self, ask: Ask, kind: AxisKind, meaning: str = "") -> None:
+        """Ask for the gain of the drive's velocity loop, where a file has the loop above it alone."""
+        usual = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
+        ask("controller.kp", meaning or usual, GAIN_FIELD.on(kind).written_example)
+
     def as_stage(
         self, ask: Ask, axis: AxisParameters, kind: AxisKind, left: Iterable[str], **tables: Mapping[str, Any]
     ) -> AsStage:
@@ -224,7 +235,7 @@ class DriveFormat:
 
         `left` says what a stage does not take over, beside the parameters in `lost`.
         """
-        ask.of_the_machine(kind, moved="motion" in tables)
+        ask.of_the_machine(kind, moved=bool(tables.get("motion")))
         if kind != LINEAR:
             tables["axis"] = {"kind": kind.name}
         lost = [f"{name} = {axis.number(name):g}{what}" for name, what in self.lost.items() if axis.is_set(name)]
@@ -251,9 +262,7 @@ class PidDrive(DriveFormat):
     def stage(self, axis: AxisParameters, ask: Ask) -> AsStage:
         """Turn an axis and the answers into a stage. Raises InputError for unusable numbers."""
         units = self.units(ask, axis, {})
-        for row in self.rows[:3]:
-            if axis.number(row.name, 0.0) < 0:
-                raise InputError(row.name, f"{axis.number(row.name):g}", "a gain of 0 or more", f"{row.name} = 10")
+        axis.refuse_negative(row.name for row in self.rows[:3])
         table = {"kind": "pid", "derivative_on": "measurement", **self.keys(axis, units)}
         if not table.keys() & {"kp", "ki"}:
             raise InputError(self.rows[0].name, "no gain greater than 0", "a loop that controls the position", "10")
@@ -296,40 +305,20 @@ class CascadeDrive(DriveFormat):
             raise lacks(f'kind = "{flat["controller.kind"]}", or an integral of the position', self.structure)
 
 
-def of_the_velocity_loop(ask: Ask, kind: AxisKind, meaning: str = "") -> None:
-    """Ask for the gain of the drive's velocity loop, where a file has the loop above it alone."""
-    usual = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
-    ask("controller.kp", meaning or usual, Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example)
-
-
-def turn_of(ask: Ask, flat: FlatStage, meaning: str, example: str) -> tuple[AxisKind, float]:
-    """Return the kind of axis, and how far a turn of the motor moves the load [m or rad].
-
-    A stage, unless it is empty, tells its kind, and the travel if it has a transmission.
-    """
-    if not flat:
-        return ask.of_kind(TRAVEL, meaning, example, TRAVELS)
-    kind, told = axis_of(flat), travel_of(flat)
-    if told is not None and TRAVEL not in ask:
-        return kind, told
-    return kind, ask(TRAVEL, meaning, TRAVELS[kind].written_example, TRAVELS[kind])
-
-
 def torque(kind: AxisKind, travel: float) -> DriveUnits:
     """Return the units of a drive that counts in N m and turns, each of which moves the load by `travel` [m or rad]."""
     return DriveUnits(kind, 2 * pi / travel, travel)
 
 
-def beyond_is_whole(ask: Ask, band: str) -> bool:
-    """Tell whether an error beyond the parameter `band` of a deadband counts whole, as the user answers."""
-    what = f"what is left of an error beyond {band}: reduced, by what is lost within, or whole"
-    return ask("error_beyond_deadband", what, "reduced", ("reduced", "whole")) == "whole"
-
-
 def deadband(ask: Ask, axis: AxisParameters, band: str, units: DriveUnits) -> dict[str, Any]:
-    """Return the keys of [controller] for a deadband whose half width is the parameter `band`."""
+    """Return the keys of [controller] for a deadband whose half width is the parameter `band`.
+
+    What is left of an error beyond it is asked for.
+    """
     width = si(axis.number(band) * units.length, units.kind.unit("m"))
-    return {"error_deadband": width, **({"error_deadband_exit": width} if beyond_is_whole(ask, band) else {})}
+    what = f"what is left of an error beyond {band}: reduced, by what is lost within, or whole"
+    whole = ask("error_beyond_deadband", what, "reduced", ("reduced", "whole")) == "whole"
+    return {"error_deadband": width, **({"error_deadband_exit": width} if whole else {})}
 
 
 def deadband_back(flat: FlatStage) -> tuple[float, frozenset[str]] | None:
@@ -350,16 +339,34 @@ TOLD = ("machine_unit", "force_per_output", "length_per_unit", "velocity_per_out
 export needs them."""
 
 
+def axes_with(gain: str, settings: Iterable[tuple[str, str, Any]], otherwise: InputError) -> tuple[AxisParameters, ...]:
+    """Return the axes that have a `gain` among their settings (axis, name and value), of which the last ones count.
+
+    Raises the InputError `otherwise` without one.
+    """
+    values: dict[str, dict[str, Any]] = {}
+    for axis, name, value in settings:
+        values.setdefault(axis, {})[name] = value
+    ordered = sorted(values, key=lambda axis: (len(axis), axis))
+    if found := tuple(AxisParameters(axis, values[axis]) for axis in ordered if gain in values[axis]):
+        return found
+    raise otherwise
+
+
 def si(value: float, unit: str) -> str:
     """Write a number in SI with its unit, in the form of a stage file."""
     return f"{value:.15g} {unit}"
 
 
-def there_and_back(fastest: float, acceleration: float, unit: float, kind: AxisKind) -> dict[str, str]:
+def there_and_back(axis: AxisParameters, limits: tuple[str, str], unit: float, kind: AxisKind) -> dict[str, str]:
     """Return the table [motion] of a move there and back that uses all of a drive's speed and acceleration.
 
-    `fastest` and `acceleration` are in the drive's unit per second or square second; its `unit` is in [m] or [rad].
+    `limits` are their names; they are in the drive's `unit` [m or rad] per second and square second. The table is empty
+    if the drive does not limit both.
     """
+    if not all(map(axis.is_set, limits)):
+        return {}
+    fastest, acceleration = map(axis.number, limits)
     back = max(5.0, 4 * fastest / acceleration)
     return {
         "kind": "there_and_back",

@@ -17,14 +17,13 @@ from friso.drives.drive import (
     DriveUnits,
     FlatStage,
     Parameters,
+    axes_with,
     deadband,
     deadband_back,
     lacks,
-    of_the_velocity_loop,
     root_of,
     si,
     torque,
-    turn_of,
 )
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, positive, quoted
@@ -57,21 +56,17 @@ class Acs(CascadeDrive):
 
     def axes(self, text: str) -> tuple[AxisParameters, ...]:
         """Return the axes whose gains the program sets. Raises InputError without one."""
-        values: dict[str, dict[str, Any]] = {}
         name = r"(?<![\w.])([A-Z][A-Z0-9_]{2,20})"
         variable = rf"{name}[ \t]*\([ \t]*(\d{{1,3}})[ \t]*\)[ \t]*=(?!=)[ \t]*([^\s;!]{{1,60}})"
-        for line in text.splitlines():
-            for name, axis, value in re.findall(variable, line.partition("!")[0]):
-                values.setdefault(axis, {})[name] = value
-        every = tuple(AxisParameters(one, values[one]) for one in sorted(values, key=int) if "SLPKP" in values[one])
-        if not every:
-            raise InputError("", "no gain of a position loop", "the variables of a servo axis", "SLPKP(0)=140")
-        return every
+        lines = (line.partition("!")[0] for line in text.splitlines())
+        settings = [(axis, name, value) for line in lines for name, axis, value in re.findall(variable, line)]
+        missing = InputError("", "no gain of a position loop", "the variables of a servo axis", "SLPKP(0)=140")
+        return axes_with("SLPKP", settings, missing)
 
     def stage(self, axis: AxisParameters, ask: Ask) -> AsStage:
         """Turn an axis and the answers into a stage. Raises InputError for unusable numbers."""
         meaning = f"force per velocity error that SLVKP = {axis.number('SLVKP'):g} makes"
-        of_the_velocity_loop(ask, LINEAR, meaning)
+        self.velocity_loop(ask, LINEAR, meaning)
         if axis.is_set("SLVKI"):
             time = f"integral time that SLVKI = {axis.number('SLVKI'):g} makes"
             ask("controller.velocity_integral_time", time, '"5 ms"')
@@ -173,7 +168,7 @@ class Twincat(CascadeDrive):
         held = ", ".join(f"{name} = {value}" for name, value in axis.values.items() if name.startswith("PID."))
         ask("controller.kv", f"factor Kv of the position control{held and f' (the file has {held})'}", '"20 1/s"')
         meaning = "gain of the drive's velocity loop; its integral time: controller.velocity_integral_time"
-        of_the_velocity_loop(ask, ask.kind(LENGTH), meaning)
+        self.velocity_loop(ask, ask.kind(LENGTH), meaning)
         ask(POSITION_TIME, "cycle of the NC task", '"2 ms"')
         ask(SAMPLE_TIME, "period of the drive's velocity loop, of which that is a multiple", '"125 us"')
         kind, unit = self._length(ask)
@@ -278,7 +273,7 @@ class Ecmc(CascadeDrive):
     def _turn(self, ask: Ask, flat: FlatStage) -> DriveUnits:
         """Return N m and turns of the motor."""
         what = "what one turn of the motor moves"
-        return torque(*turn_of(ask, flat, what if flat else f"{what}; an angle on a rotary axis", '"10 mm"'))
+        return torque(*ask.turn(what if flat else f"{what}; an angle on a rotary axis", '"10 mm"', flat))
 
     def _length(self, ask: Ask) -> tuple[AxisKind, float]:
         """Return the kind of axis, and the length of a position of 1 [m or rad]."""
@@ -298,7 +293,7 @@ class Ecmc(CascadeDrive):
 
     def _axis(self, axis: AxisParameters, ask: Ask, kind: AxisKind) -> tuple[dict[str, Any], list[str]]:
         """Return keys of [controller] for the position loop, and what is left out."""
-        of_the_velocity_loop(ask, kind)
+        self.velocity_loop(ask, kind)
         kp, ki = axis.number("controller.Kp"), axis.number("controller.Ki", 0.0)
         if axis.is_set(name := "controller.Kd"):
             raise InputError(name, f"{axis.number(name):g}", "0: friso's cascade has no derivative", "Kd: 0")

@@ -19,7 +19,7 @@ from math import isclose
 from typing import Any, ClassVar
 
 from friso.axis import LINEAR, ROTARY, AxisKind, axis_of
-from friso.drives.ask import FORCE, FORCE_FIELD, Ask
+from friso.drives.ask import FORCE, FORCE_FIELD, GAIN_FIELD, Ask
 from friso.drives.drive import (
     POSITION_TIME,
     SAMPLE_TIME,
@@ -31,7 +31,6 @@ from friso.drives.drive import (
     FlatStage,
     Parameters,
     lacks,
-    of_the_velocity_loop,
     rows,
     si,
     there_and_back,
@@ -252,7 +251,7 @@ class Linuxcnc(DriveFormat):
         if stepped and not any(name.startswith("ENCODER") for name in axis.values):
             actual = "a stepper: its steps are counted, not its position"
             raise InputError("", actual, "a servo axis, whose loop can hunt")
-        kind, limits = _kind(axis), ("MAX_VELOCITY", "MAX_ACCELERATION")
+        kind = _kind(axis)
         name = self._unit(axis, ask, kind)
         unit, in_velocity = UNITS[kind][name], self._in_velocity(axis, ask)
         drive = {UNIT: next(one for one, size in UNITS[kind].items() if size == unit)}
@@ -264,11 +263,9 @@ class Linuxcnc(DriveFormat):
         table, left = (self._velocity if in_velocity else self._torque)(axis, ask, kind, unit)
         if in_velocity and VELOCITY not in ask:
             drive[VELOCITY] = si(unit, kind.unit("m/s"))
-        tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": drive}
-        if all(map(axis.is_set, limits)):
-            fastest, acceleration = map(axis.number, limits)
-            tables["motion"] = there_and_back(fastest, acceleration, unit, kind)
-        return self.as_stage(ask, axis, kind, [*self._left_out(axis), *left, TARGET], **tables)
+        motion = there_and_back(axis, ("MAX_VELOCITY", "MAX_ACCELERATION"), unit, kind)
+        left = [*self._left_out(axis), *left, TARGET]
+        return self.as_stage(ask, axis, kind, left, controller=table, drive=drive, motion=motion)
 
     def _left_out(self, axis: AxisParameters) -> list[str]:
         """Say what is left out, beside parameters that a stage has no key for."""
@@ -313,12 +310,10 @@ class Linuxcnc(DriveFormat):
         field = FORCE_FIELD.on(kind)
         meaning = "force that an output of 1 makes (torque mode)"
         if not axis.is_set("D"):
-            gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
+            gain = GAIN_FIELD.on(kind).written_example
             meaning += f"; in velocity mode, instead, --set controller.kp={gain} of the drive's velocity loop"
         drive_units = DriveUnits(kind, ask(FORCE, meaning, field.written_example, field), unit)
-        for name in ("P", "I", "D"):
-            if axis.number(name, 0.0) < 0:
-                raise InputError(name, f"{axis.number(name):g}", "a gain of 0 or more", f"{name} = 10")
+        axis.refuse_negative("PID")
         always = ("kp", "ki", "kd", *(("acceleration_feedforward",) if axis.number("FF2", 0.0) else ()))
         table = {"kind": "pid", "derivative_on": "measurement", **self.keys(axis, drive_units, always)}
         gain = drive_units.force / unit
@@ -343,7 +338,7 @@ class Linuxcnc(DriveFormat):
         if unity and VELOCITY not in ask:
             force = FORCE_FIELD.on(kind).written_example
             meaning += f" (FF1 is about 1: velocity mode; in torque mode, instead, --set {FORCE}={force})"
-        of_the_velocity_loop(ask, kind, meaning)
+        self.velocity_loop(ask, kind, meaning)
         ask(SAMPLE_TIME, "period of that loop, of which the servo thread's is a multiple", '"125 us"')
         if not unity or VELOCITY in ask:
             meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
 from math import inf, isclose, pi
 from typing import Any
 
@@ -30,7 +29,6 @@ from friso.drives.drive import (
     si,
     there_and_back,
     torque,
-    turn_of,
 )
 from friso.drives.settings import drive_settings
 from friso.errors import InputError
@@ -326,7 +324,7 @@ class Odrive(CascadeDrive):
         """Return N m and turns of the motor."""
         what = "what one turn of the motor moves"
         more = "" if flat else '; an angle on a rotary axis, "360 deg" without a gear'
-        return torque(*turn_of(ask, flat, f"{what}{more}", '"10 mm"'))
+        return torque(*ask.turn(f"{what}{more}", '"10 mm"', flat))
 
     def _line(self, ask: Ask) -> bool:
         """Tell whether gains fall on a line to their least ratio, as the user answers; else they are clipped at it."""
@@ -366,11 +364,9 @@ class Odrive(CascadeDrive):
         drive = {"sample_time": si(1 / SAMPLE_RATE, "s")}
         if axis.is_set(name := f"{MOTOR}.current_control_bandwidth"):
             drive["current_bandwidth"] = si(axis.number(name) / (2 * pi), "Hz")
-        tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": drive}
-        if all(map(axis.is_set, LIMITS_OF_MOVES)):
-            fastest, acceleration = map(axis.number, LIMITS_OF_MOVES)
-            tables["motion"] = there_and_back(fastest, acceleration, units.length, units.kind)
-        return self.as_stage(ask, axis, units.kind, _left_out(axis, mode, limit < inf), **tables)
+        motion = there_and_back(axis, LIMITS_OF_MOVES, units.length, units.kind)
+        left = _left_out(axis, mode, limit < inf)
+        return self.as_stage(ask, axis, units.kind, left, controller=table, drive=drive, motion=motion)
 
     def _schedule(self, axis: AxisParameters, ask: Ask, units: DriveUnits) -> dict[str, Any]:
         """Return the schedule of gains over the error; empty without one.

@@ -15,13 +15,13 @@ from friso.drives.drive import (
     FlatStage,
     Parameters,
     PidDrive,
+    axes_with,
     deadband,
     deadband_back,
     lacks,
     root_of,
     rows,
     torque,
-    turn_of,
 )
 from friso.errors import InputError
 from friso.quantities import quoted
@@ -107,7 +107,7 @@ class Moteus(PidDrive):
     def units(self, ask: Ask, axis: AxisParameters | None, flat: FlatStage) -> DriveUnits:
         """Return N m and revolutions of the output."""
         what = 'what one revolution of the output moves; an angle on a rotary axis, "360 deg" without more gears'
-        return torque(*turn_of(ask, flat, what, '"360 deg"'))
+        return torque(*ask.turn(what, '"360 deg"', flat))
 
     def further(self, axis: AxisParameters, ask: Ask, units: DriveUnits) -> tuple[dict[str, Any], list[str]]:
         """Say what is left out."""
@@ -142,15 +142,11 @@ class Kflop(PidDrive):
 
     def axes(self, text: str) -> tuple[AxisParameters, ...]:
         """Return the axes whose gains a program sets, by their last settings. Raises InputError without one."""
-        values: dict[str, dict[str, Any]] = {}
         plain = re.sub(r"//[^\n]*|/\*(?s:.*?)(?:\*/|\Z)", "", text)
-        setting = r"ch([0-7])[ \t]*->[ \t]*([\w.\[\]]{1,40})[ \t]*=(?!=)[ \t]*+([^;\n]{0,100});"
-        for number, name, value in re.findall(setting, plain):
-            values.setdefault(f"ch{number}", {})[name] = value.strip()
-        found = tuple(AxisParameters(name, values[name]) for name in sorted(values) if "P" in values[name])
-        if not found:
-            raise InputError("", "no statement that sets a gain", "the initialisation of an axis", "ch0->P=2.0;")
-        return found
+        setting = r"(ch[0-7])[ \t]*->[ \t]*([\w.\[\]]{1,40})[ \t]*=(?!=)[ \t]*+([^;\n]{0,100});"
+        settings = [(axis, name, value.strip()) for axis, name, value in re.findall(setting, plain)]
+        missing = InputError("", "no statement that sets a gain", "the initialisation of an axis", "ch0->P=2.0;")
+        return axes_with("P", settings, missing)
 
     def units(self, ask: Ask, axis: AxisParameters | None, flat: FlatStage) -> DriveUnits:
         """Return counts and outputs. Raises InputError for an axis without a servo loop of the program's own."""
