@@ -223,10 +223,10 @@ class DriveFormat:
         held = [row for row in self.rows if row.key not in optional or f"controller.{row.key}" in flat]
         return {row.name: flat.get(f"controller.{row.key}", 0.0) / units.of(row) for row in held}
 
-    def velocity_loop(self, ask: Ask, kind: AxisKind, meaning: str = "") -> None:
+    def velocity_loop(self, ask: Ask, kind: AxisKind, meaning: str = "", more: str = "") -> None:
         """Ask for the gain of the drive's velocity loop, where a file has the loop above it alone."""
         usual = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
-        ask("controller.kp", meaning or usual, GAIN_FIELD.on(kind).written_example)
+        ask("controller.kp", f"{meaning or usual}{more}", GAIN_FIELD.on(kind).written_example)
 
     def as_stage(
         self, ask: Ask, axis: AxisParameters, kind: AxisKind, left: Iterable[str], **tables: Mapping[str, Any]

@@ -96,7 +96,8 @@ class Acs(CascadeDrive):
         windows = [name for name in self.of_dead_zone.values() if f"controller.{name}" in flat]
         others = ("controller.windows_in_position_loop", "controller.error_deadband_gain")
         if len(windows) != 1 or any(other in flat for other in others):
-            return ""  # an error deadband without a memory reduces the error instead of dropping it
+            return ""
+        # an error deadband without a memory reduces the error instead of dropping it
         return windows[0] if settings_of(flat).remembers(windows[0]) else ""
 
     def parameters(self, flat: FlatStage, ask: Ask) -> Parameters:

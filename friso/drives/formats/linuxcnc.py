@@ -334,13 +334,11 @@ class Linuxcnc(DriveFormat):
         that is not positive.
         """
         field, unity, size = VELOCITY_FIELD.on(kind), _unity(axis), unit
-        meaning = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
-        if unity and VELOCITY not in ask:
-            force = FORCE_FIELD.on(kind).written_example
-            meaning += f" (FF1 is about 1: velocity mode; in torque mode, instead, --set {FORCE}={force})"
-        self.velocity_loop(ask, kind, meaning)
+        torque = f"in torque mode, instead, --set {FORCE}={FORCE_FIELD.on(kind).written_example}"
+        assumed = unity and VELOCITY not in ask
+        self.velocity_loop(ask, kind, more=f" (FF1 is about 1: velocity mode; {torque})" if assumed else "")
         ask(SAMPLE_TIME, "period of that loop, of which the servo thread's is a multiple", '"125 us"')
-        if not unity or VELOCITY in ask:
+        if not assumed:
             meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
             size = ask(VELOCITY, meaning, field.written_example, field)
         if axis.is_set("D"):
@@ -363,8 +361,8 @@ class Linuxcnc(DriveFormat):
         }
         left = [f"{name} = {axis.number(name):g}, {what}" for name, what in further.items() if axis.is_set(name)]
         if VELOCITY not in ask:
-            assumed = f"one machine unit per second is assumed ({VELOCITY})"
-            left.append(f"the scale of the output, since FF1 is about 1: {assumed}")
+            scale_of_output = "the scale of the output, since FF1 is about 1"
+            left.append(f"{scale_of_output}: one machine unit per second is assumed ({VELOCITY})")
         return table, left
 
     def parameters(self, flat: FlatStage, ask: Ask) -> Parameters:
