@@ -10,9 +10,8 @@ import pytest
 
 import friso
 from friso.axis import KINDS
-from friso.drives.conversions import conversions
-from friso.drives.gains import gains_of
-from friso.drives.questions import UserAnswers
+from friso.drives.ask import Ask
+from friso.drives.gains import conversions, gains_of
 from friso.hunting import hunting as hunting_of
 from friso.stage import Stage
 from friso.studies.axes import SweptAxis, read_axis
@@ -106,7 +105,7 @@ def test_what_export_prints_in_amperes_may_stand_in_the_file(tables: dict[str, A
 
 def test_no_unit_of_a_rotary_axis_stands_for_load_and_motor_at_once() -> None:
     stage = Stage(**ROTARY)
-    for row in conversions(stage.flat(), UserAnswers({"travel_per_turn": "36 deg"}), stage.axis_kind.exerts):
+    for row in conversions(stage.flat(), Ask({"travel_per_turn": "36 deg"}), stage.axis_kind.exerts):
         units = [unit for _, unit in row.values]
         assert len(units) == len({*units}), row.name
 

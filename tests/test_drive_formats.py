@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from patience import grows_with_the_square
 
 import friso
-from friso.drives.format import FORMATS
+from friso.drives.ask import Ask
+from friso.drives.drive import FORMATS
 from friso.drives.gains import gains_of
-from friso.drives.questions import UserAnswers
 from friso.drives.read import stage_from
 from friso.errors import InputError
 
@@ -198,9 +198,31 @@ def test_settings_that_a_drive_cannot_hold_are_named(
     stage = stage_from(written(tmp_path, kind), None, ANSWERS[kind]).stage
     stage = stage.replace({f"controller.{key}": value for key, value in keys.items()})
     units = {key: value for key, value in ANSWERS[kind].items() if "." not in key and key not in ONLY_THERE}
-    asked = {question.key for question in FORMATS[kind].questions_back(stage.flat(), UserAnswers({}))}
+    ask = Ask({})
+    FORMATS[kind].parameters(stage.flat(), ask)
+    asked = {question.key for question in ask.open}
     answers = {key: value for key, value in (units | BACK.get(kind, {})).items() if key in asked}
     assert f"controller.{lost}" in gains_of(stage, answers, kind).not_held
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("a.prg", "SLPKP(0)=140\nSLVKP(0)=65\n"), ("a.yaml", "controller:\n  Kp: 12\n")]
+)
+def test_a_length_in_degrees_makes_a_rotary_axis_without_a_window_too(tmp_path: Path, name: str, text: str) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    answers = {**JOINT, **CYCLES, "length_per_unit": "1 deg", "controller.kp": "5 N*m*s/rad"}
+    assert stage_from(path, None, answers).stage.flat()["axis.kind"] == "rotary"
+
+
+def test_gains_per_cycle_of_a_stage_without_a_drive_need_the_cycle(tmp_path: Path) -> None:
+    stage = stage_from(written(tmp_path, "ecmc"), None, ANSWERS["ecmc"]).stage
+    answers = {"length_per_unit": "1 mm", **BACK["ecmc"]}
+    with pytest.raises(InputError, match=r"--set drive\.sample_time="):
+        gains_of(stage.replace({"drive": None}), answers, "ecmc")
+    back = gains_of(stage.replace({"drive": {"sample_time": "2 ms"}}), answers, "ecmc").parameters
+    assert back is not None
+    assert back["Ki"] == pytest.approx(2 * 0.05)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ GUIDE = ROOT / "CONTRIBUTING.md"
 
 KNOW_CONTROLLERS = (
     *("equations/controllers/", "drives/formats/", "stage/stage.py", "stage/controllers.py", "templates/"),
-    *("identification/state_space_controller.py", "drives/pid_units.py", "drives/program.py"),
+    *("identification/state_space_controller.py", "drives/drive.py", "drives/program.py"),
 )
 """Where keys of a controller may be named: its own files (one that reads logs stands beside their readers), the schema
 of the stage file, its template, and drives' parameter files and code, which are friso's controllers."""

@@ -14,10 +14,9 @@ import sympy as sp
 from inside import friso_inside
 
 import friso
-from friso.drives.conversions import conversions
-from friso.drives.format import FORMATS
-from friso.drives.gains import gains_of
-from friso.drives.questions import UserAnswers
+from friso.drives.ask import Ask
+from friso.drives.drive import FORMATS
+from friso.drives.gains import conversions, gains_of
 from friso.drives.read import stage_from
 from friso.equations.blocks import Loop
 from friso.equations.component import state
@@ -407,10 +406,7 @@ def test_a_token_that_is_not_understood_is_quoted_before_anything_is_asked(tmp_p
 def test_gains_in_the_units_of_drives() -> None:
     stage = friso.load(EXAMPLES / "twincat_cascade.toml")
     labels = {"travel_per_turn": "10 mm", "motor_constant": "0.5 N*m/A"}
-    rows = {
-        row.symbol: {unit: value for value, unit in row.values}
-        for row in conversions(stage.flat(), UserAnswers(labels))
-    }
+    rows = {row.symbol: {unit: value for value, unit in row.values} for row in conversions(stage.flat(), Ask(labels))}
     lever = 10e-3 / (2 * np.pi)
     assert rows["kv"]["(m/min)/mm"] == pytest.approx(1.5)
     assert rows["Tn"]["ms"] == pytest.approx(40.0)
@@ -422,7 +418,7 @@ def test_gains_in_the_units_of_drives() -> None:
 def test_a_pid_as_a_cascade_is_the_same_controller() -> None:
     gains = {"controller.kp": "500 N/mm", "controller.ki": "4.4e6 N/(m*s)"}
     stage = friso.load(EXAMPLES / "ball_screw_axis.toml").replace(gains)
-    rows = {row.symbol: row.values[0][0] for row in conversions(stage.flat(), UserAnswers({}))}
+    rows = {row.symbol: row.values[0][0] for row in conversions(stage.flat(), Ask({}))}
     kd, kv, time = rows["kd"], rows["kv"], rows["Tn"]
     assert kd * (kv + 1 / time) == pytest.approx(rows["kp"])
     assert kd * kv / time == pytest.approx(rows["ki"])
@@ -445,9 +441,13 @@ def test_a_controller_of_one_s_own_is_none_of_a_drive(to: str) -> None:
     stage = friso.load(EXAMPLES / "thesis_drive.toml").replace(
         {"controller": {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg"}}
     )
-    asked = FORMATS[to].questions_back(stage.flat(), UserAnswers({}))
+    ask = Ask({})
     with pytest.raises(InputError, match='kind = "pi-d"'):
-        gains_of(stage, {question.key: question.example.strip('"') for question in asked}, to)
+        FORMATS[to].parameters(stage.flat(), ask)
+    examples = {question.key: question.example.strip('"') for question in ask.open}
+    answers = {key: float(text) if text.isdigit() else text for key, text in examples.items()}
+    with pytest.raises(InputError, match='kind = "pi-d"'):
+        gains_of(stage, answers, to)
 
 
 def test_what_is_left_out_is_told(tmp_path: Path) -> None:

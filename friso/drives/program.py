@@ -51,9 +51,9 @@ MEANINGS: Mapping[sp.Symbol, tuple[str, str]] = {
 """Unit and meaning of each input, on a linear axis."""
 
 
-def identifier(name: str) -> str:
-    """Return a name of an equation as an identifier: dots and dashes become single underscores."""
-    return re.sub(r"[\W_]+", "_", name)
+def identifier(name: Any) -> str:
+    """Return a symbol of an equation, or its name, as an identifier: dots and dashes become single underscores."""
+    return re.sub(r"[\W_]+", "_", str(name))
 
 
 class floored(sp.Function):

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, ParameterFormat
-from friso.drives.questions import UserAnswers, moving_mass, refuse_open
+from friso.drives.ask import Ask, moving_mass
+from friso.drives.drive import FORMATS, TOLD, AsStage, AxisParameters, DriveFormat
 from friso.drives.settings import drive_settings
 from friso.errors import InputError, one_line, shortened
 from friso.platform.files import flaw_of
@@ -31,7 +31,7 @@ class StageOfAxis:
 
     stage: Stage
     path: Path
-    kind: ParameterFormat
+    kind: DriveFormat
     axis: str
     left_out: tuple[str, ...]
 
@@ -52,12 +52,10 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
     kind, axes = read(path)
     chosen = _chosen(axes, axis, path)
     try:
-        answers = UserAnswers(user_answers)
-        asked = kind.questions(chosen, answers)
-        # raises for unusable numbers before anything is asked
-        of_axis = kind.stage(chosen, answers.with_examples(asked) if asked else answers)
-        refuse_open(asked, f"{path}, {chosen.name}")
-        answers.refuse_unwanted()
+        ask = Ask(user_answers)
+        of_axis = kind.stage(chosen, ask)  # raises for unusable numbers before anything is asked
+        ask.refuse_open(f"{path}, {chosen.name}")
+        ask.refuse_unwanted()
         stage = _with_answers(of_axis, kind, chosen, path, user_answers)
     except InputError as error:
         raise error if error.origin else error.found_in(f"{path}, {chosen.name}") from None
@@ -73,7 +71,7 @@ def _silent_anti_windup(controller: Mapping[str, Any]) -> list[str]:
     return ["what the integral does at the limit of the force: it is taken to rest there (controller.anti_windup)"]
 
 
-def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
+def read(path: Path) -> tuple[DriveFormat, tuple[AxisParameters, ...]]:
     """Return the kind of a parameter file, and its axes that have gains.
 
     Raises InputError for a file of no known kind, or one that its kind cannot read.
@@ -83,7 +81,7 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
     text = text_of(path, expected, "friso init stage.toml --from machine.ini", latin=True)
     for name in FORMATS:
         kind = FORMATS[name]
-        if kind.recognises(path.name, text):
+        if kind.recognises(text):
             try:
                 return kind, kind.axes(kind.whole(text, lambda name: _beside(path, name)))
             except InputError as error:
@@ -138,7 +136,7 @@ def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> A
 
 
 def _with_answers(
-    of_axis: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, user_answers: Mapping[str, Any]
+    of_axis: AsStage, kind: DriveFormat, axis: AxisParameters, path: Path, user_answers: Mapping[str, Any]
 ) -> Stage:
     """Build the stage from the tables of an axis, with the user's answers laid over them.
 

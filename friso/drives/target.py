@@ -5,15 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
-from friso.drives.carried_out import single_difference
+from friso.drives.languages import commented, single_difference
 from friso.drives.machine import MachineRun
 from friso.drives.program import MEANINGS, LinearController, Program, identifier
 from friso.drives.settings import settings
-from friso.errors import InputError
+from friso.errors import InputError, markdown
 from friso.quantities import quoted
 from friso.registry import Registry
 
@@ -42,6 +43,23 @@ class Vector:
         """Return the vector as CSV; the first row below the heading is the start."""
         rows = [",".join(map(repr, row)) for row in self.table]
         return "\n".join([",".join([*self.inputs, "output"]), *rows, ""])
+
+
+@cache
+def _templates() -> Any:
+    """Return the templates, in which texts of XML are escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    templates = Environment(
+        loader=PackageLoader("friso.drives"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=lambda name: name is not None and name.endswith(".xml"),
+    )
+    templates.filters |= {"commented": commented, "identifier": identifier, "markdown": markdown}
+    templates.globals["zip"] = partial(zip, strict=True)
+    return templates
 
 
 @dataclass(frozen=True)
@@ -95,10 +113,23 @@ class Parcel:
         return {str(one): f"[{self.units[str(one)]}] {MEANINGS[one][1]}" for one in self.program.inputs}
 
     @property
-    def parameters(self) -> dict[str, tuple[float, str]]:
-        """Return value and unit of each parameter, by its identifier."""
+    def parameters(self) -> list[tuple[str, str, float, str]]:
+        """Return identifier, key, value and unit of each parameter."""
         values = self.program.parameters.items()
-        return {identifier(str(one)): (value, self.units.get(str(one)) or "1") for one, value in values}
+        return [(identifier(one), str(one), value, self.units.get(str(one)) or "1") for one, value in values]
+
+    @property
+    def checked(self) -> list[str]:
+        """Return the names of what has to be finite at a sample: what follows from it, and what it reads."""
+        following = [f"next_{identifier(one)}" for one in self.program.memories]
+        return [*following, "command", *(one for one in self.inputs if one in self.program.read)]
+
+    def rendered(self, template: str, **values: Any) -> str:
+        """Return the text of a template, which has the fields of this parcel and further `values` by name."""
+        program = self.program
+        own = {name: getattr(self, name) for name in ("name", "header", "program", "unit", "units", "inputs")}
+        own |= {"parcel": self, "begins": (*program.prepared, *program.begins)}
+        return _templates().get_template(template).render(own | values)
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ class Choices:
     def of_registry(cls, title: str, *places: str) -> Choices:
         """Return a list of what registries hold, with one line on each.
 
-        `places` are the registries' modules and their names in them, such as "friso.drives.format:FORMATS".
+        `places` are the registries' modules and their names in them, such as "friso.drives.drive:FORMATS".
         """
 
         def rows() -> list[tuple[str, str]]:

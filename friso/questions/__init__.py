@@ -69,7 +69,7 @@ TABLE = {
             "The controller in C: friso export examples/twincat_cascade.toml --to c --out axis",
             choices=Choices.of_registry(
                 "What --to may be; drives also for friso init --from",
-                "friso.drives.format:FORMATS",
+                "friso.drives.drive:FORMATS",
                 "friso.drives.target:TARGETS",
             ),
         ),

@@ -651,7 +651,7 @@ class ControllerSection(AgainstFriction):
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
         """Draw the path from the error to the demanded force on a `canvas` of text characters.
 
-        By default it is a box (`friso.drives.diagram.Canvas`).
+        By default it is a box (`friso.drives.gains.Canvas`).
         """
         canvas.box(flat[KIND])
 

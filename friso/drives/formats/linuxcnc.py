@@ -16,21 +16,25 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from math import isclose
+from typing import Any, ClassVar
 
-from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.format import (
+from friso.axis import LINEAR, ROTARY, AxisKind, axis_of
+from friso.drives.ask import FORCE, FORCE_FIELD, GAIN_FIELD, Ask
+from friso.drives.drive import (
+    POSITION_TIME,
+    SAMPLE_TIME,
     AsStage,
     AxisParameters,
     Beside,
+    DriveFormat,
+    DriveUnits,
     FlatStage,
-    ParameterFormat,
     Parameters,
     lacks,
+    rows,
     si,
     there_and_back,
 )
-from friso.drives.pid_units import FORCE, FORCE_FIELD
-from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
 
@@ -45,18 +49,9 @@ TARGET = "error-previous-target, with which the error is taken from the command 
 
 LENGTHS = {"mm": 1e-3, "metric": 1e-3, "inch": 0.0254, "in": 0.0254, "imperial": 0.0254, "m": 1.0, "cm": 1e-2}
 ANGLES = {"deg": 0.017453292519943295, "degree": 0.017453292519943295, "rad": 1.0, "radian": 1.0}
+UNITS = {LINEAR: LENGTHS, ROTARY: ANGLES}
 """Machine units of linear axes in metres (`LENGTHS`), and of rotary axes in radians (`ANGLES`)."""
 
-ROTARY = KINDS["rotary"]
-NOT_CARRIED = {
-    "FF0": "FF0 = {:g}, a force in proportion to the commanded position",
-    "FF3": "FF3 = {:g}, of the commanded jerk",
-    "BIAS": "BIAS = {:g}, a constant output: friso assumes that it balances a constant load",
-    "MAX_ERROR": "MAX_ERROR = {:g}, beyond which the error counts no further",
-    "MAX_ERROR_D": "MAX_ERROR_D = {:g}, the limit of the error's derivative",
-    "BACKLASH": "BACKLASH = {:g}, by which LinuxCNC compensates a play: the play itself is transmission.backlash",
-    "OUTPUT_OFFSET": "OUTPUT_OFFSET = {:g}, what is taken from the output of pid",
-}
 OUTPUT_SCALE = "OUTPUT_SCALE"
 """Name of the divisor of the `pid` output in a HAL file; with it an output of 1 is not 1 V of an amplifier."""
 
@@ -95,64 +90,6 @@ REPEATED = "#REPEATED"
 """Key of `AxisParameters.machine` for repeated names.
 
 No variable has this name, since # begins a comment."""
-
-_FEEDFORWARD, _LIMITS = ("viscous_feedforward", "acceleration_feedforward"), ("force_limit", "integral_limit")
-HELD = frozenset(("kp", "ki", "kd", *_FEEDFORWARD, *_LIMITS, "error_deadband"))
-HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforward", "error_deadband"))
-"""Names in [controller] that the parameters hold. The velocity loop belongs to the drive."""
-
-
-def recognises(name: str, text: str) -> bool:
-    """Tell whether the file has a section of a LinuxCNC joint, axis or machine."""
-    return re.search(rf"^[ \t]*\[(?:{_AXIS}|EMC|EMCMOT|TRAJ)\]", text, re.MULTILINE) is not None
-
-
-def whole(text: str, beside: Beside) -> str:
-    """Replace each #INCLUDE line by the text of the file that it names, as read by `beside`.
-
-    Only files in the folder of the INI file are taken in. Included files cannot include others.
-    """
-
-    def taken_in(line: re.Match[str]) -> str:
-        """Return the text that replaces an #INCLUDE line."""
-        included = beside(line[1])
-        return line[0] if included is None else _INCLUDE.sub("", included)
-
-    return _INCLUDE.sub(taken_in, text, count=MOST_INCLUDED)
-
-
-def axes(text: str) -> tuple[AxisParameters, ...]:
-    """Return the joints (LinuxCNC 2.8 and later) or axes that have a gain P.
-
-    Raises InputError if there is none, or if the text is no INI file.
-    """
-    sections = _sections(text)
-    included = _INCLUDE.findall(text)[:3]
-    machine = {
-        "unit": sections.get("TRAJ", {}).get("LINEAR_UNITS"),
-        "angle": sections.get("TRAJ", {}).get("ANGULAR_UNITS"),
-        "SERVO_PERIOD": sections.get("EMCMOT", {}).get("SERVO_PERIOD"),
-        INCLUDED: ", ".join(included) or None,
-    }
-    with_gains = [
-        AxisParameters(
-            f"[{name}]",
-            {key: value for key, value in values.items() if key != REPEATED},
-            {key: value for key, value in {**machine, REPEATED: values.get(REPEATED)}.items() if value is not None},
-        )
-        for name, values in sections.items()
-        if re.fullmatch(_AXIS, name) and "P" in values
-    ]
-    joints = [axis for axis in with_gains if axis.name.startswith("[JOINT")]
-    if not with_gains:
-        expected = "an axis whose loop LinuxCNC closes"
-        if included:
-            expected += f"; what #INCLUDE names ({machine[INCLUDED]}) is not in the folder of the file"
-        raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", expected, "P = 50")
-    letters = re.sub(r"\s", "", sections.get("TRAJ", {}).get("COORDINATES", "")).upper()
-    named = [replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains]
-    counts = Counter(letters)
-    return tuple(replace(axis, letter=_letter(axis.name, letters, counts)) for axis in named)
 
 
 def _letter(name: str, letters: str, counts: Mapping[str, int]) -> str:
@@ -200,170 +137,6 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
     return sections
 
 
-def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """List what the file leaves open: the machine, its unit, and what an output of 1 does.
-
-    Raises InputError for a stepper without an encoder, which has no loop that could hunt.
-    """
-    stepped = any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values)
-    if stepped and not any(name.startswith("ENCODER") for name in axis.values):
-        raise InputError("", "a stepper: its steps are counted, not its position", "a servo axis, whose loop can hunt")
-    kind = _kind(axis)
-    asked: list[OpenQuestion] = []
-    if _unit_of(axis) is None and UNIT not in answers:
-        example = '"mm"' if kind == LINEAR else '"deg"'
-        meaning = "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS, or the axis has other UNITS"
-        asked.append(OpenQuestion(UNIT, meaning, example))
-    in_velocity = _in_velocity(axis, answers)
-    if "SERVO_PERIOD" not in axis.machine:
-        thread = "drive.position_sample_time" if in_velocity else "drive.sample_time"
-        asked += [] if thread in answers else [OpenQuestion(thread, "period of the servo thread", '"1 ms"')]
-    if in_velocity:
-        asked += _of_the_velocity_loop(axis, answers, kind)
-    elif FORCE not in answers:
-        meaning = "force that an output of 1 makes (torque mode)"
-        if not axis.is_set("D"):
-            gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
-            meaning += f"; in velocity mode, instead, --set controller.kp={gain} of the drive's velocity loop"
-        asked.append(OpenQuestion(FORCE, meaning, FORCE_FIELD.on(kind).written_example))
-    moved = axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY")
-    return (*asked, *of_the_machine(answers, kind, moved))
-
-
-def _in_velocity(axis: AxisParameters, answers: UserAnswers) -> bool:
-    """Tell whether the output of `pid` is a velocity and not a force.
-
-    An answer of the user decides: a gain of the drive's loop, or a force per output. Otherwise the output counts as a
-    velocity if FF1 is about 1 and D is 0.
-    """
-    if FORCE in answers or VELOCITY in answers or "controller.kp" in answers:
-        return FORCE not in answers
-    return _unity(axis) and not axis.is_set("D")
-
-
-def _of_the_velocity_loop(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> list[OpenQuestion]:
-    """List questions about the drive's velocity loop, of which an INI file says nothing.
-
-    They ask for its gain and its sample time, and for the scale of the output unless FF1 is about 1.
-    """
-    gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
-    meaning = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
-    if _unity(axis) and VELOCITY not in answers:
-        force = FORCE_FIELD.on(kind).written_example
-        meaning += f" (FF1 is about 1: velocity mode; in torque mode, instead, --set {FORCE}={force})"
-    asked = [
-        OpenQuestion("controller.kp", meaning, gain),
-        OpenQuestion("drive.sample_time", "period of that loop, of which the servo thread's is a multiple", '"125 us"'),
-    ]
-    if not _unity(axis):
-        meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
-        asked.append(OpenQuestion(VELOCITY, meaning, VELOCITY_FIELD.on(kind).written_example))
-    return [question for question in asked if question.key not in answers]
-
-
-def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
-    """Build controller, drive and move of an axis.
-
-    Raises InputError for what friso cannot describe.
-
-    Parameters without a place in a stage are listed in sentences.
-    """
-    kind = _kind(axis)
-    unit = _metres(axis, answers, kind)
-    left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.is_set(key)]
-    if axis.is_set(OUTPUT_SCALE) and axis.number(OUTPUT_SCALE) != 1:
-        left.append(f"OUTPUT_SCALE = {axis.number(OUTPUT_SCALE):g}: an output of 1 is that of pid, before this scale")
-    if strange := [name for name in axis.values if not DOCUMENTED.fullmatch(name)]:
-        left.append(f"{', '.join(strange)}: names that LinuxCNC's manual does not have")
-    if REPEATED in axis.machine:
-        left.append(f"the later values of {axis.machine[REPEATED]}, which stand more than once: the first counts")
-    if INCLUDED in axis.machine:
-        left.append(f"what #INCLUDE names and is not in the folder of the file: {axis.machine[INCLUDED]}")
-    in_torque = not _in_velocity(axis, answers)
-    controller, more = (_torque if in_torque else _velocity)(axis, answers, kind, unit)
-    if axis.is_set("DEADBAND"):
-        controller["error_deadband"] = si(axis.number("DEADBAND") * unit, kind.unit("m"))
-    drive = {UNIT: next(name for name, size in (LENGTHS if kind == LINEAR else ANGLES).items() if size == unit)}
-    if not in_torque and VELOCITY not in answers:
-        drive[VELOCITY] = si(unit, kind.unit("m/s"))
-    if "SERVO_PERIOD" in axis.machine:
-        drive["sample_time" if in_torque else "position_sample_time"] = si(axis.number("SERVO_PERIOD") * 1e-9, "s")
-    tables: dict[str, Mapping[str, object]] = {"controller": controller, "drive": drive}
-    if kind != LINEAR:
-        tables["axis"] = {"kind": kind.name}
-    if axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY"):
-        limits = axis.number("MAX_VELOCITY"), axis.number("MAX_ACCELERATION")
-        tables["motion"] = there_and_back(*limits, unit, kind)
-    return AsStage(tables, (*left, *more, TARGET))
-
-
-def _torque(
-    axis: AxisParameters, answers: UserAnswers, kind: AxisKind, unit: float
-) -> tuple[dict[str, object], list[str]]:
-    """Build the table [controller] of a PID loop whose output is a force.
-
-    `unit` is the machine unit [m or rad].
-
-    Raises InputError for a negative gain.
-    """
-    scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
-    gain = {name: axis.number(name, 0.0) * scale for name in ("P", "I", "D", "FF1", "FF2")}
-    for name in ("P", "I", "D"):
-        if gain[name] < 0:
-            raise InputError(name, f"{axis.number(name):g}", "a gain of 0 or more", f"{name} = 10")
-    table: dict[str, object] = {
-        "kind": "pid",
-        "kp": si(gain["P"], kind.unit("N/m")),
-        "ki": si(gain["I"], kind.unit("N/(m*s)")),
-        "kd": si(gain["D"], kind.unit("N*s/m")),
-        "derivative_on": "measurement",
-    }
-    if ahead := gain["FF1"] + gain["D"]:  # D acts on the reference too
-        table["viscous_feedforward"] = si(ahead, kind.unit("N*s/m"))
-    if gain["FF2"]:
-        table["acceleration_feedforward"] = si(gain["FF2"], kind.unit("kg"))
-    if axis.is_set("MAX_OUTPUT"):
-        table |= {"force_limit": si(axis.number("MAX_OUTPUT") * scale * unit, kind.unit("N")), "anti_windup": "clamp"}
-    if axis.is_set("MAX_ERROR_I") and gain["I"]:
-        table["integral_limit"] = si(axis.number("MAX_ERROR_I") * unit * gain["I"], kind.unit("N"))
-    return table, []
-
-
-def _velocity(
-    axis: AxisParameters, answers: UserAnswers, kind: AxisKind, unit: float
-) -> tuple[dict[str, object], list[str]]:
-    """Build the table [controller] of a cascade whose outer loop commands a velocity.
-
-    `unit` is the machine unit [m or rad]. Raises InputError for a D, which has no place in a cascade, and for a P that
-    is not positive.
-    """
-    if axis.is_set("D"):
-        expected = f"D = 0 with an output that is a velocity; or {FORCE}, with one that is a force"
-        raise InputError("D", f"{axis.number('D'):g}", expected, f'--set {FORCE}="20 N"')
-    p, i = axis.number("P"), axis.number("I", 0.0)
-    if p <= 0:
-        raise InputError("P", f"{p:g}", "a gain greater than 0", "P = 50")
-    scale = answers.value(VELOCITY, VELOCITY_FIELD.on(kind)) / unit if VELOCITY in answers else 1.0
-    table: dict[str, object] = {"kind": "cascade", "kv": si(p * scale, "1/s")}
-    if i:
-        table["position_integral_time"] = si(p / i, "s")
-    if axis.is_set("FF1"):
-        table["velocity_feedforward"] = axis.number("FF1") * scale
-    left = [
-        f"{name} = {axis.number(name):g}, {what}"
-        for name, what in {
-            "FF2": "a velocity in proportion to the commanded acceleration",
-            "MAX_OUTPUT": "the largest velocity commanded",
-            "MAX_ERROR_I": "the limit of the error's integral",
-        }.items()
-        if axis.is_set(name)
-    ]
-    if VELOCITY not in answers:
-        scale_of_output = "the scale of the output, since FF1 is about 1"
-        left.append(f"{scale_of_output}: one machine unit per second is assumed ({VELOCITY})")
-    return table, left
-
-
 def _unity(axis: AxisParameters) -> bool:
     """Tell whether FF1 is about 1, which means that the output is in machine units per second."""
     return UNITY_RANGE[0] <= axis.number("FF1", 0.0) <= UNITY_RANGE[1]
@@ -401,97 +174,232 @@ def _unit_named(name: str, kind: AxisKind) -> str:
     return next((unit for unit, listed in units.items() if isclose(listed, size, rel_tol=1e-4)), name)
 
 
-def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float:
-    """Return the size of the machine unit [m or rad]. Raises InputError for an unknown unit."""
-    units = LENGTHS if kind == LINEAR else ANGLES
-    name = answers.choice(UNIT, tuple(units)) if UNIT in answers else _unit_of(axis)
-    if name not in units:
-        raise InputError(UNIT, quoted(str(name)[:40]), f"one of {', '.join(units)}", f'--set {UNIT}="mm"')
-    return units[name]
+class Linuxcnc(DriveFormat):
+    """A joint whose loop the component `pid` closes, with a force or a velocity as its output."""
 
-
-def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """List what is needed to write parameters: the machine unit, and what an output of 1 does.
-
-    An output of 1 is a velocity for a cascade, and a force for any other controller.
-    """
-    kind = axis_of(flat)
-    asked = [OpenQuestion(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
-    if flat["controller.kind"] == "cascade":
-        example = VELOCITY_FIELD.on(kind).written_example
-        asked.append(OpenQuestion(VELOCITY, "velocity that an output of 1 makes", example))
-    else:
-        asked.append(OpenQuestion(FORCE, "force that an output of 1 makes", FORCE_FIELD.on(kind).written_example))
-    return tuple(question for question in asked if question.key not in answers)
-
-
-def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
-    """Compute the parameters of the `pid` component from a stage.
-
-    Raises InputError for a controller that the component cannot represent.
-    """
-    kind = axis_of(flat)
-    units = LENGTHS if kind == LINEAR else ANGLES
-    unit = units[answers.choice(UNIT, tuple(units))]
-    if flat["controller.kind"] not in ("pid", "cascade"):
-        expected = 'kind = "pid" or kind = "cascade", which this component can be'
-        raise lacks(f'kind = "{flat["controller.kind"]}"', expected)
-    get = lambda name, default=0.0: float(flat.get(f"controller.{name}", default))  # noqa: E731
-    if flat["controller.kind"] == "cascade":
-        return _of_cascade(flat, unit, answers.value(VELOCITY, VELOCITY_FIELD.on(kind)) / unit)
-    if "controller.crossover" in flat:
-        expected = "gains: this component has no low-pass before its terms"
-        raise lacks("van Dijk's rules", expected, 'kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"')
-    if get("tau") > 0:
-        raise lacks("a filter of the derivative", "no filter (tau = 0), which this component has not")
-    scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
-    on_error = flat["controller.derivative_on"] == "error"
-    settings = {
-        "P": get("kp") / scale,
-        "I": get("ki") / scale,
-        "D": get("kd") / scale,
-        "FF0": 0.0,
-        "FF1": (get("viscous_feedforward") - (0.0 if on_error else get("kd"))) / scale,
-        "FF2": get("acceleration_feedforward") / scale,
-        "BIAS": 0.0,
-        "DEADBAND": get("error_deadband") / unit,
-        "MAX_OUTPUT": get("force_limit") / (scale * unit),
+    title, suffix = "LinuxCNC INI file", ".ini"
+    firmware, source = "LinuxCNC's component pid with the pin command-deriv", "src/hal/components/pid.c"
+    pattern = rf"^[ \t]*\[(?:{_AXIS}|EMC|EMCMOT|TRAJ)\]"
+    line = "{} = {:.12g}\n"
+    rows = rows(
+        **{"kp": "P", "ki": "I", "kd": "D", "acceleration_feedforward": "FF2"},
+        **{"error_deadband": "DEADBAND", "force_limit": "MAX_OUTPUT"},
+    )
+    lost: ClassVar[Mapping[str, str]] = {
+        "FF0": ", a force in proportion to the commanded position",
+        "FF3": ", of the commanded jerk",
+        "BIAS": ", a constant output: friso assumes that it balances a constant load",
+        "MAX_ERROR": ", beyond which the error counts no further",
+        "MAX_ERROR_D": ", the limit of the error's derivative",
+        "BACKLASH": ", by which LinuxCNC compensates a play: the play itself is transmission.backlash",
+        "OUTPUT_OFFSET": ", what is taken from the output of pid",
     }
-    if "controller.integral_limit" in flat and get("ki"):
-        settings["MAX_ERROR_I"] = get("integral_limit") / (get("ki") * unit)
-    return Parameters(settings, HELD)
 
+    def whole(self, text: str, beside: Beside) -> str:
+        """Replace each #INCLUDE line by the text of the file that it names, as read by `beside`.
 
-def _of_cascade(flat: FlatStage, unit: float, scale: float) -> Parameters:
-    """Compute the parameters of a cascade's outer loop, whose output commands a velocity.
+        Only files in the folder of the INI file are taken in. Included files cannot include others.
+        """
 
-    `unit` is the machine unit [m or rad]. An output of 1 stands for `scale` machine units per second.
-    """
-    kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
-    ahead = flat["controller.velocity_feedforward"] / scale
-    kv /= scale
-    settings = {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0}
-    settings["DEADBAND"] = flat.get("controller.error_deadband", 0.0) / unit
-    return Parameters(settings, HELD_OF_CASCADE)
+        def taken_in(line: re.Match[str]) -> str:
+            """Return the text that replaces an #INCLUDE line."""
+            included = beside(line[1])
+            return line[0] if included is None else _INCLUDE.sub("", included)
 
+        return _INCLUDE.sub(taken_in, text, count=MOST_INCLUDED)
 
-def text(settings: Mapping[str, float]) -> str:
-    """Write parameters as the lines of a joint's section."""
-    lines = [f"{name} = {value:.12g}" for name, value in settings.items()]
-    return "\n".join(["[JOINT_0]", *lines, ""])
+    def axes(self, text: str) -> tuple[AxisParameters, ...]:
+        """Return the joints (LinuxCNC 2.8 and later) or axes that have a gain P.
 
+        Raises InputError if there is none, or if the text is no INI file.
+        """
+        sections = _sections(text)
+        included = _INCLUDE.findall(text)[:3]
+        machine = {
+            "unit": sections.get("TRAJ", {}).get("LINEAR_UNITS"),
+            "angle": sections.get("TRAJ", {}).get("ANGULAR_UNITS"),
+            "SERVO_PERIOD": sections.get("EMCMOT", {}).get("SERVO_PERIOD"),
+            INCLUDED: ", ".join(included) or None,
+        }
+        with_gains = [
+            AxisParameters(
+                f"[{name}]",
+                {key: value for key, value in values.items() if key != REPEATED},
+                {key: value for key, value in {**machine, REPEATED: values.get(REPEATED)}.items() if value is not None},
+            )
+            for name, values in sections.items()
+            if re.fullmatch(_AXIS, name) and "P" in values
+        ]
+        joints = [axis for axis in with_gains if axis.name.startswith("[JOINT")]
+        if not with_gains:
+            expected = "an axis whose loop LinuxCNC closes"
+            if included:
+                expected += f"; what #INCLUDE names ({machine[INCLUDED]}) is not in the folder of the file"
+            raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", expected, "P = 50")
+        letters = re.sub(r"\s", "", sections.get("TRAJ", {}).get("COORDINATES", "")).upper()
+        named = [replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains]
+        counts = Counter(letters)
+        return tuple(replace(axis, letter=_letter(axis.name, letters, counts)) for axis in named)
 
-FORMAT = ParameterFormat(
-    title="LinuxCNC INI file",
-    firmware="LinuxCNC's component pid with the pin command-deriv",
-    source="src/hal/components/pid.c",
-    recognises=recognises,
-    axes=axes,
-    questions=questions,
-    stage=stage,
-    questions_back=questions_back,
-    parameters=parameters,
-    text=text,
-    suffix=".ini",
-    whole=whole,
-)
+    def stage(self, axis: AxisParameters, ask: Ask) -> AsStage:
+        """Turn an axis and the answers into a stage.
+
+        Raises InputError for what friso cannot describe, and for a stepper without an encoder, which has no loop that
+        could hunt.
+        """
+        stepped = any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values)
+        if stepped and not any(name.startswith("ENCODER") for name in axis.values):
+            actual = "a stepper: its steps are counted, not its position"
+            raise InputError("", actual, "a servo axis, whose loop can hunt")
+        kind = _kind(axis)
+        name = self._unit(axis, ask, kind)
+        unit, in_velocity = UNITS[kind][name], self._in_velocity(axis, ask)
+        drive = {UNIT: next(one for one, size in UNITS[kind].items() if size == unit)}
+        thread = POSITION_TIME if in_velocity else SAMPLE_TIME
+        if "SERVO_PERIOD" in axis.machine:
+            drive[thread.removeprefix("drive.")] = si(axis.number("SERVO_PERIOD") * 1e-9, "s")
+        else:
+            ask(thread, "period of the servo thread", '"1 ms"')
+        table, left = (self._velocity if in_velocity else self._torque)(axis, ask, kind, unit)
+        if in_velocity and VELOCITY not in ask:
+            drive[VELOCITY] = si(unit, kind.unit("m/s"))
+        motion = there_and_back(axis, ("MAX_VELOCITY", "MAX_ACCELERATION"), unit, kind)
+        left = [*self._left_out(axis), *left, TARGET]
+        return self.as_stage(ask, axis, kind, left, controller=table, drive=drive, motion=motion)
+
+    def _left_out(self, axis: AxisParameters) -> list[str]:
+        """Say what is left out, beside parameters that a stage has no key for."""
+        left = []
+        if axis.is_set(OUTPUT_SCALE) and axis.number(OUTPUT_SCALE) != 1:
+            scale = f"OUTPUT_SCALE = {axis.number(OUTPUT_SCALE):g}"
+            left.append(f"{scale}: an output of 1 is that of pid, before this scale")
+        if strange := [name for name in axis.values if not DOCUMENTED.fullmatch(name)]:
+            left.append(f"{', '.join(strange)}: names that LinuxCNC's manual does not have")
+        if REPEATED in axis.machine:
+            later = f"the later values of {axis.machine[REPEATED]}"
+            left.append(f"{later}, which stand more than once: the first counts")
+        if INCLUDED in axis.machine:
+            left.append(f"what #INCLUDE names and is not in the folder of the file: {axis.machine[INCLUDED]}")
+        return left
+
+    def _unit(self, axis: AxisParameters, ask: Ask, kind: AxisKind) -> str:
+        """Return the name of the machine unit. Raises InputError for an unknown one."""
+        units, told = UNITS[kind], _unit_of(axis)
+        if told is None or UNIT in ask:
+            meaning = "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS, or the axis has other UNITS"
+            return ask(UNIT, meaning, '"mm"' if kind == LINEAR else '"deg"', (*units,))
+        if told not in units:
+            raise InputError(UNIT, quoted(told[:40]), f"one of {', '.join(units)}", f'--set {UNIT}="mm"')
+        return told
+
+    def _in_velocity(self, axis: AxisParameters, ask: Ask) -> bool:
+        """Tell whether the output of `pid` is a velocity and not a force.
+
+        An answer of the user decides: a gain of the drive's loop, or a force per output. Otherwise the output counts as
+        a velocity if FF1 is about 1 and D is 0.
+        """
+        if FORCE in ask:
+            return False
+        return VELOCITY in ask or "controller.kp" in ask or (_unity(axis) and not axis.is_set("D"))
+
+    def _torque(self, axis: AxisParameters, ask: Ask, kind: AxisKind, unit: float) -> tuple[dict[str, Any], list[str]]:
+        """Return the table [controller] of a PID loop whose output is a force, and what is left out.
+
+        `unit` is the machine unit [m or rad]. Raises InputError for a negative gain.
+        """
+        field = FORCE_FIELD.on(kind)
+        meaning = "force that an output of 1 makes (torque mode)"
+        if not axis.is_set("D"):
+            gain = GAIN_FIELD.on(kind).written_example
+            meaning += f"; in velocity mode, instead, --set controller.kp={gain} of the drive's velocity loop"
+        drive_units = DriveUnits(kind, ask(FORCE, meaning, field.written_example, field), unit)
+        axis.refuse_negative("PID")
+        always = ("kp", "ki", "kd", *(("acceleration_feedforward",) if axis.number("FF2", 0.0) else ()))
+        table = {"kind": "pid", "derivative_on": "measurement", **self.keys(axis, drive_units, always)}
+        gain = drive_units.force / unit
+        if ahead := (axis.number("FF1", 0.0) + axis.number("D", 0.0)) * gain:  # D acts on the reference too
+            table["viscous_feedforward"] = si(ahead, kind.unit("N*s/m"))
+        if "force_limit" in table:
+            table["anti_windup"] = "clamp"
+        if axis.is_set("MAX_ERROR_I") and (ki := axis.number("I", 0.0)):
+            table["integral_limit"] = si(axis.number("MAX_ERROR_I") * unit * ki * gain, kind.unit("N"))
+        return table, []
+
+    def _velocity(
+        self, axis: AxisParameters, ask: Ask, kind: AxisKind, unit: float
+    ) -> tuple[dict[str, Any], list[str]]:
+        """Return the table [controller] of a cascade whose outer loop commands a velocity, and what is left out.
+
+        `unit` is the machine unit [m or rad]. Raises InputError for a D, which has no place in a cascade, and for a P
+        that is not positive.
+        """
+        field, unity, size = VELOCITY_FIELD.on(kind), _unity(axis), unit
+        torque = f"in torque mode, instead, --set {FORCE}={FORCE_FIELD.on(kind).written_example}"
+        assumed = unity and VELOCITY not in ask
+        self.velocity_loop(ask, kind, more=f" (FF1 is about 1: velocity mode; {torque})" if assumed else "")
+        ask(SAMPLE_TIME, "period of that loop, of which the servo thread's is a multiple", '"125 us"')
+        if not assumed:
+            meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
+            size = ask(VELOCITY, meaning, field.written_example, field)
+        if axis.is_set("D"):
+            expected = f"D = 0 with an output that is a velocity; or {FORCE}, with one that is a force"
+            raise InputError("D", f"{axis.number('D'):g}", expected, f'--set {FORCE}="20 N"')
+        p, i, scale = axis.number("P"), axis.number("I", 0.0), size / unit
+        if p <= 0:
+            raise InputError("P", f"{p:g}", "a gain greater than 0", "P = 50")
+        table: dict[str, Any] = {"kind": "cascade", "kv": si(p * scale, "1/s")}
+        if i:
+            table["position_integral_time"] = si(p / i, "s")
+        if axis.is_set("FF1"):
+            table["velocity_feedforward"] = axis.number("FF1") * scale
+        if axis.is_set("DEADBAND"):
+            table["error_deadband"] = si(axis.number("DEADBAND") * unit, kind.unit("m"))
+        further = {
+            "FF2": "a velocity in proportion to the commanded acceleration",
+            "MAX_OUTPUT": "the largest velocity commanded",
+            "MAX_ERROR_I": "the limit of the error's integral",
+        }
+        left = [f"{name} = {axis.number(name):g}, {what}" for name, what in further.items() if axis.is_set(name)]
+        if VELOCITY not in ask:
+            scale_of_output = "the scale of the output, since FF1 is about 1"
+            left.append(f"{scale_of_output}: one machine unit per second is assumed ({VELOCITY})")
+        return table, left
+
+    def parameters(self, flat: FlatStage, ask: Ask) -> Parameters:
+        """Compute the parameters of the `pid` component. Raises InputError for a controller that it cannot be."""
+        kind, controller = axis_of(flat), flat["controller.kind"]
+        usual = '"mm"' if kind == LINEAR else '"deg"'
+        unit = UNITS[kind][ask(UNIT, "unit of the machine", usual, (*UNITS[kind],))]
+        what, key, field = (
+            ("velocity", VELOCITY, VELOCITY_FIELD) if controller == "cascade" else ("force", FORCE, FORCE_FIELD)
+        )
+        example = field.on(kind).written_example
+        size = ask(key, f"{what} that an output of 1 makes", example, field.on(kind))
+        if controller not in ("pid", "cascade"):
+            raise lacks(f'kind = "{controller}"', 'kind = "pid" or kind = "cascade", which this component can be')
+        get = lambda name: float(flat.get(f"controller.{name}", 0.0))  # noqa: E731
+        if controller == "cascade":
+            kv, time = get("kv") / (size / unit), get("position_integral_time")
+            settings = {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0}
+            settings |= {"FF1": get("velocity_feedforward") / (size / unit), "FF2": 0.0}
+            settings["DEADBAND"] = get("error_deadband") / unit
+            held = ("kv", "position_integral_time", "velocity_feedforward", "error_deadband")
+            return Parameters(settings, frozenset(held))  # the velocity loop belongs to the drive
+        if "controller.crossover" in flat:
+            expected = "gains: this component has no low-pass before its terms"
+            raise lacks("van Dijk's rules", expected, 'kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"')
+        if get("tau") > 0:
+            raise lacks("a filter of the derivative", "no filter (tau = 0), which this component has not")
+        of = self.values(flat, DriveUnits(kind, size, unit))
+        ahead = get("viscous_feedforward") - (0.0 if flat["controller.derivative_on"] == "error" else get("kd"))
+        settings = {name: of[name] for name in ("P", "I", "D")}
+        settings |= {"FF0": 0.0, "FF1": ahead / (size / unit), "FF2": of["FF2"], "BIAS": 0.0}
+        settings |= {"DEADBAND": of["DEADBAND"], "MAX_OUTPUT": of["MAX_OUTPUT"]}
+        if "controller.integral_limit" in flat and get("ki"):
+            settings["MAX_ERROR_I"] = get("integral_limit") / (get("ki") * unit)
+        held = (*(row.key for row in self.rows), "viscous_feedforward", "integral_limit")
+        return Parameters(settings, frozenset(held))
+
+    def text(self, settings: Mapping[str, float]) -> str:
+        """Write parameters as the lines of a joint's section."""
+        return f"[JOINT_0]\n{super().text(settings)}"

@@ -12,24 +12,24 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
 from math import inf, isclose, pi
 from typing import Any
 
-from friso.axis import LINEAR, AxisKind
-from friso.drives.arithmetic import number_in
-from friso.drives.conversions import TRAVEL, TRAVELS, kind_of_turn, open_turn, open_turn_back, travel_back
-from friso.drives.format import (
+from friso.drives.ask import Ask
+from friso.drives.drive import (
     AsStage,
     AxisParameters,
+    CascadeDrive,
+    DriveUnits,
     FlatStage,
-    ParameterFormat,
+    ParameterRow,
     Parameters,
     lacks,
+    number_in,
     si,
     there_and_back,
+    torque,
 )
-from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.drives.settings import drive_settings
 from friso.errors import InputError
 from friso.quantities import quoted
@@ -38,19 +38,12 @@ from friso.stage.section import element_keys, row_keys
 
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
 LIMITS_OF_MOVES = f"{MOVE}.vel_limit", f"{MOVE}.accel_limit"
-GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
-TURN = "what one turn of the motor moves"
 SAMPLE_RATE = 8000.0
 """Samples of the controller per second, in ODrive 3."""
 
+INERTIA = f"{CONFIG}.inertia"
 SCHEDULED = f"{CONFIG}.enable_gain_scheduling"
 SCHEDULE_WIDTH, LEAST_RATIO = f"{CONFIG}.gain_scheduling_width", f"{CONFIG}.gain_scheduling_min_ratio"
-GAIN_SCHEDULE, CLIPPED, LINE = "gain_schedule", "clipped", "line"
-"""Key of the user's answer on how gains fall to their least ratio, and the two answers."""
-
-SCHEDULE = ("schedule_error", "schedule_factor")
-"""Keys of [controller] that hold a schedule of gains."""
-
 CONTROL_MODES = ("VOLTAGE_CONTROL", "TORQUE_CONTROL", "VELOCITY_CONTROL", "POSITION_CONTROL")
 POSITION_CONTROL = CONTROL_MODES.index("POSITION_CONTROL")
 """Value of control_mode for position control, an index of `CONTROL_MODES`."""
@@ -80,6 +73,7 @@ SYMBOLS = {
 MOST_KEYS, LONGEST_KEY = 100_000, 200
 
 _OTHERS = """
+pos_gain vel_gain vel_integrator_gain
 control_mode input_mode vel_limit vel_limit_tolerance vel_ramp_rate torque_ramp_rate circular_setpoints
 circular_setpoint_range steps_per_circular_range homing_speed inertia axis_to_mirror mirror_ratio
 torque_mirror_ratio load_encoder_axis input_filter_bandwidth enable_vel_limit enable_current_mode_vel_limit
@@ -88,15 +82,8 @@ enable_overspeed_error absolute_setpoints
 vel_integrator_limit mechanical_power_bandwidth electrical_power_bandwidth spinout_mechanical_power_threshold
 spinout_electrical_power_threshold anticogging
 """
-KNOWN = frozenset((*_OTHERS.split(), *GAINS))
+KNOWN = frozenset(_OTHERS.split())
 """Names in controller.config of the supported firmwares."""
-
-HELD = frozenset({"kv", "kp", "velocity_integral_time", "force_limit", "integral_limit"})
-"""Names in [controller] that the parameters hold."""
-
-FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
-"""Names in [controller] that parameters hold if the drive's own trajectories are fed forward."""
-
 
 _LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)((?:(?!//)[^#])*+)(?:[#/].*)?")
 """Pattern of a line for odrivetool that sets a parameter; a comment after it is ignored."""
@@ -140,44 +127,6 @@ TURNS_EXPECTED = "firmware whose gains are in turns and N m: 0.5.1 to 0.6"
 IN_TURNS_INSTEAD = (
     f"vel_gain and vel_integrator_gain times {IN_TURNS} and cpr, vel_limit through cpr (ODrive's migration guide)"
 )
-
-GAINS_IN, TURNS, COUNTS = "gains_in", "turns", "counts"
-"""Key and choices of the user's answer about the firmware, if the file does not reveal it."""
-
-_RECOGNISED = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.axis[0-9]{1,3}\.[\w.]{1,180}[ \t]*=(?!=)", re.MULTILINE)
-
-
-def recognises(name: str, text: str) -> bool:
-    """Tell whether the file is JSON with the gains of an axis, or has lines for odrivetool."""
-    in_json = text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text
-    return in_json or bool(_RECOGNISED.search(text))
-
-
-def axes(text: str) -> tuple[AxisParameters, ...]:
-    """Return the axes that have gains.
-
-    Raises InputError for a text that is neither JSON nor lines for odrivetool. Firmware with other units or names is
-    refused, too.
-    """
-    in_lines = not text.lstrip().startswith("{")
-    held: dict[tuple[str, str], dict[str, Any]] = {}
-    for key, value in (_settings(text) if in_lines else _entries(text)).items():
-        if place := _OF_AXIS.fullmatch(key):
-            held.setdefault((place[1] or "", place[2]), {})[MOVED.get(place[3], place[3])] = value
-    several = len({drive for drive, _ in held}) > 1
-    axes = tuple(
-        AxisParameters(f"{drive}.{name}" if several else name, held[drive, name])
-        for drive, name in sorted(held)
-        if f"{CONFIG}.pos_gain" in held[drive, name]
-    )
-    if not axes:
-        raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
-    for axis in axes:
-        _refuse_other_firmware(axis)
-        if IN_TURNS not in axis.values and not in_lines:
-            actual = f"{axis.name} without a {IN_TURNS}, which firmware from 0.5.1 on has"
-            raise InputError("", actual, TURNS_EXPECTED)
-    return axes
 
 
 def _settings(text: str) -> dict[str, Any]:
@@ -259,51 +208,6 @@ def _entries(text: str) -> dict[str, Any]:
     return values
 
 
-def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """List what the file leaves open: the machine, and how far a turn of the motor moves it.
-
-    Raises InputError for an axis that does not control a position.
-    """
-    mode = _mode(axis, "control_mode", POSITION_CONTROL)
-    if mode != POSITION_CONTROL:
-        raise InputError(f"{CONFIG}.control_mode", f"{mode:g}", "3, control in position", '"control_mode": 3')
-    asked = []
-    if IN_TURNS not in axis.values and not _sign_of(axis, NEW):
-        if GAINS_IN not in answers:
-            what = "that gains are in turns and N m, as firmware 0.5 has them; up to 0.4 they are in counts and A"
-            asked.append(OpenQuestion(GAINS_IN, what, TURNS))
-        elif answers.choice(GAINS_IN, (TURNS, COUNTS)) == COUNTS:
-            raise _in_counts(GAINS_IN, COUNTS)
-    asked += open_turn(answers, f'{TURN}; an angle on a rotary axis, "360 deg" without a gear', '"10 mm"')
-    if axis.flag(SCHEDULED) and axis.is_set(SCHEDULE_WIDTH) and axis.is_set(LEAST_RATIO):
-        asked += _open_schedule(answers)
-    moved = all(map(axis.is_set, LIMITS_OF_MOVES))
-    return (*asked, *of_the_machine(answers, kind_of_turn(answers), moved))
-
-
-def _open_schedule(answers: UserAnswers) -> list[OpenQuestion]:
-    """Ask how gains fall to their least ratio unless it is answered."""
-    what = f"gains within the width: {CLIPPED}, as the error down to min_ratio, or {LINE}, to min_ratio at no error"
-    return [] if GAIN_SCHEDULE in answers else [OpenQuestion(GAIN_SCHEDULE, what, CLIPPED)]
-
-
-def _scheduled(axis: AxisParameters, answers: UserAnswers, unit: float, kind: AxisKind) -> dict[str, Any]:
-    """Return the schedule of gains over the error; empty without one.
-
-    `unit` is how far a turn moves the load [m or rad]. Raises InputError for a least ratio that is not below 1.
-    """
-    if not axis.flag(SCHEDULED) or not axis.is_set(SCHEDULE_WIDTH):
-        return {}
-    width, least = axis.number(SCHEDULE_WIDTH) * unit, axis.number(LEAST_RATIO, 0.0)
-    if width <= 0 or not 0 <= least < 1:
-        actual = f"{axis.number(SCHEDULE_WIDTH):g} turns and a least ratio of {least:g}"
-        raise InputError(SCHEDULE_WIDTH, actual, "a width above 0, and a ratio from 0 to below 1", "0.01")
-    line = least > 0 and answers.choice(GAIN_SCHEDULE, (CLIPPED, LINE)) == LINE
-    least = least or drive_settings.least_gain_ratio
-    places = [si(0.0 if line else least * width, kind.unit("m")), si(width, kind.unit("m"))]
-    return {"schedule_error": places, "schedule_factor": [least, 1.0]}
-
-
 def _mode(axis: AxisParameters, name: str, default: float) -> float:
     """Return the number of a mode `name`, which the file may also give by a symbol.
 
@@ -312,67 +216,12 @@ def _mode(axis: AxisParameters, name: str, default: float) -> float:
     return axis.number(f"{CONFIG}.{name}", default, SYMBOLS[name])
 
 
-def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
-    """Build controller, drive and move of an axis.
-
-    Raises InputError for what friso cannot describe.
-
-    Settings without a place in a stage are listed in sentences.
-    """
-    kind, travel = answers.kind_of(TRAVEL, TRAVELS)
-    force = 2 * pi / travel  # [N] for a torque of 1 N m
-    number = lambda name, default=None: axis.number(f"{CONFIG}.{name}", default)  # noqa: E731
-    kp, ki = number("vel_gain"), number("vel_integrator_gain")
-    for name in ("pos_gain", "vel_gain"):
-        if number(name) <= 0:
-            raise InputError(f"{CONFIG}.{name}", f"{number(name):g}", "a gain greater than 0", f'"{name}": 20.0')
-    mode = _mode(axis, "input_mode", PASSTHROUGH)
-    table: dict[str, Any] = {
-        "kind": "cascade",
-        "kv": si(number("pos_gain"), "1/s"),
-        "kp": si(kp * force / travel, kind.unit("N*s/m")),
-    }
-    if ki > 0:
-        table["velocity_integral_time"] = si(kp / ki, "s")
-    if mode in AHEAD:
-        table["velocity_feedforward"] = 1.0
-        if inertia := number("inertia", 0.0):
-            table["acceleration_feedforward"] = si(inertia * force / travel, kind.unit("kg"))
-    torque = min(_torque_limit(axis), inf)
-    if torque < inf:
-        table |= {"force_limit": si(torque * force, kind.unit("N")), "anti_windup": "clamp"}
-    if axis.is_set(f"{CONFIG}.vel_integrator_limit") and ki > 0:
-        table["integral_limit"] = si(number("vel_integrator_limit") * force, kind.unit("N"))
-    bandwidth = axis.number(f"{ENCODER}.bandwidth", 1000.0) / (2 * pi)
-    table |= _scheduled(axis, answers, travel, kind)
-    low_pass = {"kind": "low_pass", "path": "feedback", "order": 2, "damping_ratio": 1.0}
-    table["filters"] = [{**low_pass, "frequency": si(bandwidth, "Hz")}]
-    drive = {"sample_time": si(1 / SAMPLE_RATE, "s")}
-    if axis.is_set(f"{MOTOR}.current_control_bandwidth"):
-        drive["current_bandwidth"] = si(axis.number(f"{MOTOR}.current_control_bandwidth") / (2 * pi), "Hz")
-    tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": drive, **_motion(axis, kind, travel)}
-    if kind != LINEAR:
-        tables["axis"] = {"kind": kind.name}
-    return AsStage(tables, _left_out(axis, mode, torque < inf))
-
-
 def _torque_limit(axis: AxisParameters) -> float:
     """Return the largest torque of the motor [N m], from its torque and current limits."""
-    torque = axis.number(f"{MOTOR}.torque_lim") if axis.is_set(f"{MOTOR}.torque_lim") else inf
+    largest = axis.number(f"{MOTOR}.torque_lim") if axis.is_set(f"{MOTOR}.torque_lim") else inf
     if not axis.is_set(f"{MOTOR}.current_lim"):
-        return torque
-    return min(axis.number(f"{MOTOR}.current_lim") * axis.number(IN_TURNS), torque)
-
-
-def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Mapping[str, Any]]:
-    """Build the move that the drive's own trajectory generator makes; empty without one.
-
-    `travel` is how far one turn moves the load [m or rad].
-    """
-    if not all(map(axis.is_set, LIMITS_OF_MOVES)):
-        return {}
-    fastest, acceleration = map(axis.number, LIMITS_OF_MOVES)
-    return {"motion": there_and_back(fastest, acceleration, travel, kind)}
+        return largest
+    return min(axis.number(f"{MOTOR}.current_lim") * axis.number(IN_TURNS), largest)
 
 
 def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:
@@ -416,69 +265,6 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     return tuple(left)
 
 
-def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """Ask how far a turn moves the load, and how gains are scheduled; () if answers or the stage tell."""
-    schedule = _open_schedule(answers) if "controller.schedule_error.1" in flat else []
-    return (*open_turn_back(flat, answers, TURN), *schedule)
-
-
-def _schedule_back(flat: FlatStage, answers: UserAnswers, unit: float) -> dict[str, float]:
-    """Return the parameters of a schedule of gains; empty if the drive cannot hold that of the stage.
-
-    `unit` is how far a turn moves the load [m or rad].
-    """
-    if "controller.schedule_error.1" not in flat:
-        return {}
-    line = answers.choice(GAIN_SCHEDULE, (CLIPPED, LINE)) == LINE
-    places, factors = (
-        [flat[at] for at in element_keys(flat, f"controller.schedule_{of}")] for of in ("error", "factor")
-    )
-    begins = 0.0 if line else factors[0] * places[-1]
-    if len(places) != 2 or factors[1] != 1 or not isclose(places[0], begins, rel_tol=1e-6):
-        return {}
-    return {SCHEDULED: 1.0, SCHEDULE_WIDTH: places[1] / unit, LEAST_RATIO: factors[0]}
-
-
-def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
-    """Compute the parameters of an ODrive axis from a stage.
-
-    Raises InputError for a controller other than a position loop with P over a velocity loop with P or PI.
-    """
-    name = "controller."
-    if flat["controller.kind"] != "cascade":
-        raise lacks(f'kind = "{flat["controller.kind"]}"', "a cascade, the only structure that this drive has")
-    if f"{name}position_integral_time" in flat:
-        raise lacks("an integral in the position loop", "a proportional position loop")
-    if flat[f"{name}proportional_on"] != "error":
-        raise lacks('proportional_on = "measurement"', 'proportional_on = "error"')
-    travel = travel_back(flat, answers)
-    force = 2 * pi / travel
-    kp, time = flat[f"{name}kp"] * travel / force, flat.get(f"{name}velocity_integral_time")
-    ahead = flat[f"{name}velocity_feedforward"] == 1.0
-    held = HELD | FED_FORWARD if ahead else HELD
-    settings = {
-        f"{CONFIG}.input_mode": TRAJECTORY if ahead else PASSTHROUGH,
-        f"{CONFIG}.pos_gain": flat[f"{name}kv"],
-        f"{CONFIG}.vel_gain": kp,
-        f"{CONFIG}.vel_integrator_gain": kp / time if time else 0.0,
-    }
-    if ahead:
-        settings[f"{CONFIG}.inertia"] = flat[f"{name}acceleration_feedforward"] * travel / force
-    if f"{name}integral_limit" in flat:
-        settings[f"{CONFIG}.vel_integrator_limit"] = flat[f"{name}integral_limit"] / force
-    if f"{name}force_limit" in flat:
-        settings[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
-    if (bandwidth := flat.get("drive.current_bandwidth")) is not None:
-        settings[f"{MOTOR}.current_control_bandwidth"] = 2 * pi * bandwidth
-    if schedule := _schedule_back(flat, answers, travel):
-        settings |= schedule
-        held |= {f"{name}.{number}" for name in SCHEDULE for number in (1, 2)}
-    if place := _loop_of_velocity(flat):
-        settings[f"{ENCODER}.bandwidth"] = 2 * pi * flat[f"{place}.frequency"]
-        held |= {place.removeprefix(name)}
-    return Parameters(settings, held)
-
-
 def _loop_of_velocity(flat: FlatStage) -> str:
     """Return the velocity filter that a phase-locked loop can stand for; "" without one."""
     places = [place for place in row_keys(flat, FILTERS_KEY) if flat[f"{place}.path"] == FEEDBACK]
@@ -488,21 +274,157 @@ def _loop_of_velocity(flat: FlatStage) -> str:
     return place if flat[f"{place}.order"] == 2 and flat[f"{place}.damping_ratio"] == 1.0 else ""
 
 
-def text(settings: Mapping[str, float]) -> str:
-    """Write parameters as lines for odrivetool."""
-    return "".join(f"odrv0.axis0.{name} = {value:.12g}\n" for name, value in settings.items())
+class Odrive(CascadeDrive):
+    """Turns and N m, 8000 times a second, in position control."""
 
+    title, suffix = "ODrive configuration (odrivetool backup-config)", ".txt"
+    firmware, source = "ODrive 0.5.1 to 0.6", "Firmware/MotorControl/controller.cpp and encoder.cpp"
+    pattern = r"^[ \t]*odrv[0-9]{1,3}\.axis[0-9]{1,3}\.[\w.]{1,180}[ \t]*=(?!=)"
+    rows = (
+        ParameterRow(f"{CONFIG}.pos_gain", "kv", "1/s", (0, 0, -1)),
+        ParameterRow(f"{CONFIG}.vel_gain", "kp", "N*s/m", (1, -1, 1)),
+        ParameterRow(f"{CONFIG}.vel_integrator_limit", "integral_limit", "N", (1, 0, 0)),
+        ParameterRow(f"{MOTOR}.torque_lim", "force_limit", "N", (1, 0, 0)),
+    )
+    line = "odrv0.axis0.{} = {:.12g}\n"
 
-FORMAT = ParameterFormat(
-    title="ODrive configuration (odrivetool backup-config)",
-    firmware="ODrive 0.5.1 to 0.6",
-    source="Firmware/MotorControl/controller.cpp and encoder.cpp",
-    recognises=recognises,
-    axes=axes,
-    questions=questions,
-    stage=stage,
-    questions_back=questions_back,
-    parameters=parameters,
-    text=text,
-    suffix=".txt",
-)
+    def recognises(self, text: str) -> bool:
+        """Tell whether the file is JSON with the gains of an axis, or has lines for odrivetool."""
+        in_json = text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text
+        return in_json or super().recognises(text)
+
+    def axes(self, text: str) -> tuple[AxisParameters, ...]:
+        """Return the axes that have gains.
+
+        Raises InputError for a text that is neither JSON nor lines for odrivetool, and for firmware with other units or
+        names.
+        """
+        in_lines = not text.lstrip().startswith("{")
+        held: dict[tuple[str, str], dict[str, Any]] = {}
+        for key, value in (_settings(text) if in_lines else _entries(text)).items():
+            if place := _OF_AXIS.fullmatch(key):
+                held.setdefault((place[1] or "", place[2]), {})[MOVED.get(place[3], place[3])] = value
+        several = len({drive for drive, _ in held}) > 1
+        axes = tuple(
+            AxisParameters(f"{drive}.{name}" if several else name, held[drive, name])
+            for drive, name in sorted(held)
+            if f"{CONFIG}.pos_gain" in held[drive, name]
+        )
+        if not axes:
+            raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
+        for axis in axes:
+            _refuse_other_firmware(axis)
+            if IN_TURNS not in axis.values and not in_lines:
+                actual = f"{axis.name} without a {IN_TURNS}, which firmware from 0.5.1 on has"
+                raise InputError("", actual, TURNS_EXPECTED)
+        return axes
+
+    def _turn(self, ask: Ask, flat: FlatStage) -> DriveUnits:
+        """Return N m and turns of the motor."""
+        what = "what one turn of the motor moves"
+        more = "" if flat else '; an angle on a rotary axis, "360 deg" without a gear'
+        return torque(*ask.turn(f"{what}{more}", '"10 mm"', flat))
+
+    def _line(self, ask: Ask) -> bool:
+        """Tell whether gains fall on a line to their least ratio, as the user answers; else they are clipped at it."""
+        what = "gains within the width: clipped, as the error down to min_ratio, or line, to min_ratio at no error"
+        return ask("gain_schedule", what, "clipped", ("clipped", "line")) == "line"
+
+    def stage(self, axis: AxisParameters, ask: Ask) -> AsStage:
+        """Turn an axis and the answers into a stage. Raises InputError for what friso cannot describe."""
+        control = _mode(axis, "control_mode", POSITION_CONTROL)
+        if control != POSITION_CONTROL:
+            raise InputError(f"{CONFIG}.control_mode", f"{control:g}", "3, control in position", '"control_mode": 3')
+        if IN_TURNS not in axis.values and not _sign_of(axis, NEW):
+            what = "that gains are in turns and N m, as firmware 0.5 has them; up to 0.4 they are in counts and A"
+            if ask("gains_in", what, "turns", ("turns", "counts")) == "counts":
+                raise _in_counts("gains_in", "counts")
+        units = self._turn(ask, {})
+        schedule = self._schedule(axis, ask, units)
+        for row in self.rows[:2]:
+            if (gain := axis.number(row.name)) <= 0:
+                name = row.name.rpartition(".")[2]
+                raise InputError(row.name, f"{gain:g}", "a gain greater than 0", f'"{name}": 20.0')
+        table: dict[str, Any] = {"kind": "cascade", **self.keys(axis, units), **schedule}
+        if (ki := axis.number(f"{CONFIG}.vel_integrator_gain")) > 0:
+            table["velocity_integral_time"] = si(axis.number(f"{CONFIG}.vel_gain") / ki, "s")
+        else:
+            table.pop("integral_limit", None)
+        mode = _mode(axis, "input_mode", PASSTHROUGH)
+        if mode in AHEAD:
+            table["velocity_feedforward"] = 1.0
+            if inertia := axis.number(INERTIA, 0.0):
+                table["acceleration_feedforward"] = si(inertia * units.force / units.length, units.kind.unit("kg"))
+        if (limit := _torque_limit(axis)) < inf:
+            table |= {"force_limit": si(limit * units.force, units.kind.unit("N")), "anti_windup": "clamp"}
+        low_pass = {"kind": "low_pass", "path": "feedback", "order": 2, "damping_ratio": 1.0}
+        bandwidth = axis.number(f"{ENCODER}.bandwidth", 1000.0) / (2 * pi)
+        table["filters"] = [{**low_pass, "frequency": si(bandwidth, "Hz")}]
+        drive = {"sample_time": si(1 / SAMPLE_RATE, "s")}
+        if axis.is_set(name := f"{MOTOR}.current_control_bandwidth"):
+            drive["current_bandwidth"] = si(axis.number(name) / (2 * pi), "Hz")
+        motion = there_and_back(axis, LIMITS_OF_MOVES, units.length, units.kind)
+        left = _left_out(axis, mode, limit < inf)
+        return self.as_stage(ask, axis, units.kind, left, controller=table, drive=drive, motion=motion)
+
+    def _schedule(self, axis: AxisParameters, ask: Ask, units: DriveUnits) -> dict[str, Any]:
+        """Return the schedule of gains over the error; empty without one.
+
+        Raises InputError for a least ratio that is not below 1.
+        """
+        if not axis.flag(SCHEDULED) or not axis.is_set(SCHEDULE_WIDTH):
+            return {}
+        line = axis.is_set(LEAST_RATIO) and self._line(ask)
+        turns, least = axis.number(SCHEDULE_WIDTH), axis.number(LEAST_RATIO, 0.0)
+        if turns <= 0 or not 0 <= least < 1:
+            actual = f"{turns:g} turns and a least ratio of {least:g}"
+            raise InputError(SCHEDULE_WIDTH, actual, "a width above 0, and a ratio from 0 to below 1", "0.01")
+        least = least or drive_settings.least_gain_ratio
+        width, unit = turns * units.length, units.kind.unit("m")
+        places = [si(0.0 if line else least * width, unit), si(width, unit)]
+        return {"schedule_error": places, "schedule_factor": [least, 1.0]}
+
+    def _schedule_back(self, flat: FlatStage, line: bool, units: DriveUnits) -> dict[str, float]:
+        """Return the parameters of a stage's schedule of gains; empty if the drive cannot hold it."""
+        places, factors = (
+            [flat[at] for at in element_keys(flat, f"controller.schedule_{of}")] for of in ("error", "factor")
+        )
+        begins = 0.0 if line else factors[0] * places[-1]
+        if len(places) != 2 or factors[1] != 1 or not isclose(places[0], begins, rel_tol=1e-6):
+            return {}
+        return {SCHEDULED: 1.0, SCHEDULE_WIDTH: places[1] / units.length, LEAST_RATIO: factors[0]}
+
+    def parameters(self, flat: FlatStage, ask: Ask) -> Parameters:
+        """Compute the parameters of an axis.
+
+        Raises InputError for a controller other than a position loop with P over a velocity loop with P or PI.
+        """
+        units, scheduled = self._turn(ask, flat), "controller.schedule_error.1" in flat
+        line = scheduled and self._line(ask)
+        if flat["controller.kind"] != "cascade":
+            raise lacks(f'kind = "{flat["controller.kind"]}"', "a cascade, the only structure that this drive has")
+        if "controller.position_integral_time" in flat:
+            raise lacks("an integral in the position loop", "a proportional position loop")
+        if flat["controller.proportional_on"] != "error":
+            raise lacks('proportional_on = "measurement"', 'proportional_on = "error"')
+        ahead = flat["controller.velocity_feedforward"] == 1.0
+        values = self.values(flat, units, optional=("integral_limit", "force_limit"))
+        time = flat.get("controller.velocity_integral_time")
+        kp = values[f"{CONFIG}.vel_gain"]
+        held = {"kv", "kp", "velocity_integral_time", "force_limit", "integral_limit"}
+        held |= {"velocity_feedforward", "acceleration_feedforward"} if ahead else set()
+        settings = {f"{CONFIG}.input_mode": float(TRAJECTORY if ahead else PASSTHROUGH)}
+        settings |= dict.fromkeys((row.name for row in self.rows[:2]), 0.0)
+        settings[f"{CONFIG}.vel_integrator_gain"] = kp / time if time else 0.0
+        if ahead:
+            settings[INERTIA] = flat["controller.acceleration_feedforward"] * units.length / units.force
+        settings |= values
+        if (bandwidth := flat.get("drive.current_bandwidth")) is not None:
+            settings[f"{MOTOR}.current_control_bandwidth"] = 2 * pi * bandwidth
+        if scheduled and (schedule := self._schedule_back(flat, line, units)):
+            settings |= schedule
+            held |= {f"schedule_{of}.{number}" for of in ("error", "factor") for number in (1, 2)}
+        if place := _loop_of_velocity(flat):
+            settings[f"{ENCODER}.bandwidth"] = 2 * pi * flat[f"{place}.frequency"]
+            held.add(place.removeprefix("controller."))
+        return Parameters(settings, frozenset(held))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,55 +13,18 @@ from friso.drives.languages import PYTHON
 from friso.drives.program import OUTPUT, LinearController, identifier
 from friso.drives.settings import settings
 from friso.drives.target import CodeTarget, Parcel
-from friso.errors import markdown
 
 _WORDS = """False None True and as assert async await break class continue def del elif else except finally for from
 global if import in is lambda nonlocal not or pass raise return try while with yield abs sqrt floor exp
 pow output"""
 
-_TEST = '''\
-"""Run the equations of NAME.json over NAME_vector.csv, and compare the outputs with friso's."""
-
-import csv
-import json
-from math import exp, floor, isfinite, sqrt
-from pathlib import Path
-
-HERE = Path(__file__).parent
-MODEL = json.loads((HERE / "NAME.json").read_text())
-with open(HERE / "NAME_vector.csv", newline="") as file:
-    START, *SAMPLES = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
-
-
-def ready(part):
-    """Compile the equations of a part: for each a name, and cases of a condition and a value."""
-    equations = [(one["name"], [(case["if"], case["value"]) for case in one["cases"]]) for one in MODEL[part]]
-    return [(name, [[compile(text, name, "eval") for text in case] for case in cases]) for name, cases in equations]
-
-
-def after(equations, values):
-    """Add to the values what the equations assign, one after another."""
-    for name, cases in equations:
-        values[name] = next(eval(value, FUNCTIONS, values) for holds, value in cases if eval(holds, FUNCTIONS, values))
-    return values
-
-
-FUNCTIONS = {"abs": abs, "exp": exp, "floor": floor, "sqrt": sqrt}
-PREPARE, BEGIN, SAMPLE, FOLLOWING = map(ready, ("prepare", "begin", "sample", "following"))
-begun = after(PREPARE + BEGIN, {**{p["name"]: p["value"] for p in MODEL["parameters"]}, **START})
-kept = {name: begun[name] for name in (*MODEL["constants"], *MODEL["memories"])}
-output, worst = START["output"], 0.0
-for sample in SAMPLES:
-    inputs = {name: sample[name] for name in MODEL["inputs"]}
-    values = after(SAMPLE, {**kept, **inputs})
-    following = after(FOLLOWING, dict(values))
-    if all(map(isfinite, (values["output"], *(following["next_" + name] for name in MODEL["memories"])))):
-        kept |= {name: following["next_" + name] for name in MODEL["memories"]}
-        output = values["output"]
-    worst = max(worst, abs(output - sample["output"]))
-print(f"{len(SAMPLES)} samples, largest difference {worst:.3g}")
-raise SystemExit(worst > MODEL["tolerance"])
-'''
+TITLES = {
+    "prepare": "Constants",
+    "begin": "Beginning",
+    "sample": "Each sample",
+    "following": "Kept for the next sample",
+}
+"""Headings of the parts of the equations."""
 
 
 def _equation(name: str, value: Any) -> dict[str, Any]:
@@ -82,35 +45,32 @@ def _equation(name: str, value: Any) -> dict[str, Any]:
 def _parts(parcel: Parcel) -> dict[str, list[tuple[str, Any]]]:
     """Return all equations by part: preparation, beginning, sample and what follows it."""
     program = parcel.program
-    kept = [identifier(str(one)) for one in program.memories]
+    kept = [identifier(one) for one in program.memories]
     return {
-        "prepare": [(identifier(str(symbol)), value) for symbol, value in program.prepared],
+        "prepare": [(identifier(symbol), value) for symbol, value in program.prepared],
         "begin": [
-            *((identifier(str(symbol)), value) for symbol, value in program.begins),
+            *((identifier(symbol), value) for symbol, value in program.begins),
             *zip(kept, program.started, strict=True),
         ],
         "sample": [
-            *((identifier(str(symbol)), value) for symbol, value in program.steps),
+            *((identifier(symbol), value) for symbol, value in program.steps),
             (str(OUTPUT), program.command),
         ],
         "following": [(f"next_{name}", value) for name, value in zip(kept, program.updates, strict=True)],
     }
 
 
-def _document(parcel: Parcel) -> dict[str, Any]:
-    """Return the controller as plain tables and numbers."""
+def _document(parcel: Parcel, rows: Mapping[str, Any], sections: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Return the controller as plain tables and numbers: equations in `rows` by part, and sections by input."""
     program, linear = parcel.program, parcel.linear
-    rows = {part: [_equation(name, value) for name, value in pairs] for part, pairs in _parts(parcel).items()}
     return {
         "about": [*parcel.header],
         "sample_time_s": program.period,
         "inputs": parcel.meanings,
         "output_unit": parcel.unit,
-        "parameters": [
-            {"name": name, "value": value, "unit": unit} for name, (value, unit) in parcel.parameters.items()
-        ],
-        "constants": [identifier(str(one)) for one in program.sampled_constants],
-        "memories": [identifier(str(one)) for one in program.memories],
+        "parameters": [{"name": name, "value": value, "unit": unit} for name, _, value, unit in parcel.parameters],
+        "constants": [identifier(one) for one in program.sampled_constants],
+        "memories": [identifier(one) for one in program.memories],
         **rows,
         "state_space": {
             "inputs": [*linear.inputs],
@@ -120,7 +80,7 @@ def _document(parcel: Parcel) -> dict[str, Any]:
                 for matrices in linear.samples
             ],
         },
-        "biquads": {name: sections.tolist() for name, sections in biquads(linear).items()},
+        "biquads": {name: one.tolist() for name, one in sections.items()},
         "tolerance": parcel.tolerance,
     }
 
@@ -182,84 +142,28 @@ def _of_sections(sections: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.prod(upper / lower, axis=1)
 
 
-def _table(heading: list[str], rows: list[list[str]]) -> list[str]:
-    """Return a table in Markdown, of cells in Markdown."""
-    lines = [heading, ["---"] * len(heading), *rows]
-    return ["", *(f"| {' | '.join(line)} |" for line in lines), ""]
-
-
-def _codes(names: Iterable[str]) -> str:
-    """Return names as code in Markdown."""
-    return ", ".join(f"`{name}`" for name in names)
-
-
-def _equations(pairs: list[tuple[str, Any]], written: Callable[[Any], str]) -> list[list[str]]:
-    """Return rows of a table of equations: name, value, and when it holds."""
-    rows = []
-    for name, value in pairs:
-        for k, case in enumerate(_equation(name, value)["cases"]):
-            rows.append(
-                [f"`{name}`" if k == 0 else "", f"`{case['value']}`", "" if case["if"] == "True" else f"`{case['if']}`"]
-            )
-    return rows
-
-
-def _markdown(parcel: Parcel) -> str:
-    """Return the controller as tables for people."""
-    linear, parts = parcel.linear, _parts(parcel)
-    heading = ["Name", "Value", "If (the first row that holds)"]
-    lines = [f"# {parcel.name}: difference equations", "", *(markdown(line) + "  " for line in parcel.header)]
-    lines += ["", f"Every {parcel.program.period!r} s. The output is in {markdown(parcel.unit)}."]
-    lines += _table(
-        ["Input", "Meaning"], [[f"`{name}`", markdown(meaning)] for name, meaning in parcel.meanings.items()]
-    )
-    parameters = [[f"`{name}`", repr(value), markdown(unit)] for name, (value, unit) in parcel.parameters.items()]
-    lines += _table(["Parameter", "Value", "Unit"], parameters)
-    titles = {
-        "prepare": "Constants",
-        "begin": "Beginning",
-        "sample": "Each sample",
-        "following": "Kept for the next sample",
-    }
-    for part, title in titles.items():
-        lines += [f"## {title}", *_table(heading, _equations(parts[part], str))]
-    lines += ["## State space", "", "Without limits and settings against friction: x' = a x + b u, y = c x + d u."]
-    lines += ["", f"States: {_codes(linear.states)}.  ", f"Inputs: {_codes(linear.inputs)}."]
-    for k, matrices in enumerate(linear.samples):
-        lines += ["", *([f"Sample {k} of {len(linear.samples)}:", ""] if len(linear.samples) > 1 else []), "```"]
-        lines += [f"{letter} = {matrix.tolist()}" for letter, matrix in zip("abcd", matrices, strict=True)] + ["```"]
-    lines += ["", "## Biquads"]
-    for name, sections in biquads(linear).items():
-        lines += ["", f"From `{name}` to the output:"]
-        lines += _table(["b0", "b1", "b2", "a0", "a1", "a2"], [[repr(one) for one in row] for row in sections.tolist()])
-    left = len(linear.samples) > 1
-    lines += ["", "Loops at several rates have none."] if left else []
-    return "\n".join([*lines, ""])
-
-
-def _latex(parcel: Parcel) -> str:
-    """Return the equations of a sample in LaTeX, for amsmath."""
+def _in_latex(parts: Mapping[str, list[tuple[str, Any]]]) -> list[tuple[str, str]]:
+    """Return name and value of the equations of a sample in LaTeX."""
 
     def plain(name: str) -> str:
         return r"\mathrm{" + name.replace("_", r"\_") + "}"
 
-    pairs = [pair for part in ("prepare", "sample", "following") for pair in _parts(parcel)[part]]
-    rows = []
-    for name, value in pairs:
-        names = {symbol: plain(identifier(str(symbol))) for symbol in value.free_symbols}
-        rows.append(f"{plain(name)} &= {sp.latex(value, symbol_names=names)}")
-    about = [f"% {line}".rstrip() for line in parcel.header]
-    return "\n".join([*about, r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}", ""])
+    pairs = [pair for part in ("prepare", "sample", "following") for pair in parts[part]]
+    named = [{symbol: plain(identifier(symbol)) for symbol in value.free_symbols} for _, value in pairs]
+    latex = [sp.latex(value, symbol_names=names) for (_, value), names in zip(pairs, named, strict=True)]
+    return [(plain(name), text) for (name, _), text in zip(pairs, latex, strict=True)]
 
 
 def _files(parcel: Parcel) -> Mapping[str, str]:
     """Return equations in three forms, test and vector by name."""
-    name = parcel.name
+    name, parts, sections = parcel.name, _parts(parcel), biquads(parcel.linear)
+    rows = {part: [_equation(*pair) for pair in pairs] for part, pairs in parts.items()}
+    titled = [(title, rows[part]) for part, title in TITLES.items()]
     return {
-        f"{name}.json": json.dumps(_document(parcel), indent=1) + "\n",
-        f"{name}.md": _markdown(parcel),
-        f"{name}.tex": _latex(parcel),
-        f"{name}_test.py": _TEST.replace("NAME", name),
+        f"{name}.json": json.dumps(_document(parcel, rows, sections), indent=1) + "\n",
+        f"{name}.md": parcel.rendered("equations.md", titled=titled, biquads=sections),
+        f"{name}.tex": parcel.rendered("equations.tex", equations=_in_latex(parts)),
+        f"{name}_test.py": parcel.rendered("equations_test.py.jinja"),
         f"{name}_vector.csv": parcel.vector.text(),
     }
 

@@ -22,7 +22,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from friso.drives.gains import DRIVE_OUTPUT
-from friso.drives.languages import commented
 from friso.drives.program import MEANINGS, MOTOR_POSITION, POSITION, identifier
 from friso.drives.target import CodeTarget, Parcel
 from friso.drives.targets.c import TARGET as C
@@ -176,20 +175,6 @@ def _machine(parcel: Parcel, own: Sequence[FmuVariable], at: Mapping[str, str], 
     )
 
 
-@cache
-def _templates() -> Any:
-    """Return the templates, in which texts of XML are escaped."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("friso.drives"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=lambda name: name is not None and name.endswith(".xml"),
-    )
-
-
 def _powers(unit: str) -> dict[str, int]:
     """Return the powers of the base units of the standard in a unit."""
     _, root, _ = by_pint(unit)
@@ -201,9 +186,7 @@ def _archive(parcel: Parcel, model: FmuModel, version: str) -> bytes:
     code = {name: text for name, text in C.files(parcel).items() if name.endswith((".c", ".h")) and "_test" not in name}
     named = {one.unit for one in model.variables if one.unit != "1" and DRIVE_OUTPUT not in one.unit}
     values = {
-        "name": parcel.name,
         "model": model.name,
-        "header": "\n".join(commented([*parcel.header])),
         "about": " ".join([*parcel.header[:1], f"This is {model.about}."]),
         "tool": f"friso {VERSION}",
         "period": repr(parcel.program.period),
@@ -214,17 +197,17 @@ def _archive(parcel: Parcel, model: FmuModel, version: str) -> bytes:
         "units": {unit: _powers(unit) for unit in sorted(named)},
         "token": "",
     }
-    identity = "".join([model.name, version, *code.values(), _templates().get_template("model.h").render(values)])
+    identity = "".join([model.name, version, *code.values(), parcel.rendered("model.h", **values)])
     values["token"] = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, identity)}}}"
     interface = f"fmi{version}.c"
-    code |= {f"{model.name}_fmu.h": _templates().get_template("model.h").render(values)}
-    code |= {interface: _templates().get_template(interface).render(values)}
+    code |= {f"{model.name}_fmu.h": parcel.rendered("model.h", **values)}
+    code |= {interface: parcel.rendered(interface, **values)}
     values["compiled"] = [name for name in code if name.endswith(".c")]
-    description = _templates().get_template(f"fmi{version}.xml").render(values)
+    description = parcel.rendered(f"fmi{version}.xml", **values)
     files: dict[str, str | bytes] = {"modelDescription.xml": description}
     files |= {f"sources/{name}": text for name, text in code.items()}
     if version == "3":
-        files["sources/buildDescription.xml"] = _templates().get_template("build.xml").render(values)
+        files["sources/buildDescription.xml"] = parcel.rendered("build.xml", **values)
     if (folder := _folder(version)) and (binary := _binary(tuple(code.items()))):
         files[f"binaries/{folder}/{model.name}.{SUFFIXES[sys.platform]}"] = binary
     content = BytesIO()
@@ -287,14 +270,7 @@ def _files(parcel: Parcel) -> Mapping[str, Any]:
         for model in _models(parcel)
         for version in "23"
     }
-    values = {
-        "name": name,
-        "header": parcel.header,
-        "period": repr(parcel.program.period),
-        "bound": repr(parcel.tolerance),
-        "machine": parcel.machine and repr(parcel.machine.tolerance),
-    }
-    return {**archives, **dict(vectors), f"{name}_test.py": _templates().get_template("test.py.jinja").render(values)}
+    return {**archives, **dict(vectors), f"{name}_test.py": parcel.rendered("fmu_test.py.jinja")}
 
 
 TARGET = CodeTarget("FMI", _files, C.own_names | RESERVED, holds_machine=True, remark=_remark)

@@ -1,4 +1,4 @@
-{{ header }}
+{% include "about" %}
 /* The interface of FMI 2.0 for co-simulation; its types are those of the platform "default". */
 #include "{{ model }}_fmu.h"
 

@@ -1,4 +1,4 @@
-{{ header }}
+{% include "about" %}
 /* The interface of FMI 3.0 for co-simulation. */
 #include "{{ model }}_fmu.h"
 #include <stdbool.h>

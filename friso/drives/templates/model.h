@@ -1,4 +1,4 @@
-{{ header }}
+{% include "about" %}
 #include "{{ name }}.h"
 {% if machine %}
 #include "{{ name }}_machine.h"

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from friso.drives.carried_out import carried_out
 from friso.drives.gains import output_of
+from friso.drives.languages import carried_out
 from friso.drives.machine import machine_of, machine_run
 from friso.drives.program import (
     ACCELERATION,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.axis import speak_of
-from friso.drives.format import FORMATS
+from friso.drives.drive import FORMATS
 from friso.drives.gains import gains_of
 from friso.drives.target import TARGETS
 from friso.errors import InputError
