@@ -85,10 +85,9 @@ class Tracer:
     """Tracer of one cycle along a line of stages, from place 0 to the `farthest`.
 
     `family` gives the stages by place. `sign` is -1 for a cycle closed over half a period, 1 for a whole one; `swings`
-    counts its swings in that time (None: the fewest possible). Steps are `pace` times as long as for drawing a curve,
-    and at least `shortest`; the first has the length `first`. The cycle is followed while its multiplier is below
-    `steepest`. `hundredth` gives, at a place, the length of line over which the key changes by one per cent. Cycles are
-    closed to the relative tolerance `rtol`, or a wider one if they may chatter.
+    counts its swings in that time (None: the fewest possible). Steps are `pace` times as long as for drawing a curve.
+    `hundredth` gives, at a place, the length of line over which the key changes by one per cent. Cycles are closed to
+    the relative tolerance `rtol`, or a wider one if they may chatter.
     """
 
     def __init__(
@@ -99,22 +98,17 @@ class Tracer:
         farthest: float = 1.0,
         swings: int | None = None,
         pace: float = 1.0,
-        shortest: float | None = None,
         hundredth: Callable[[float], float] = lambda _: HUNDREDTH,
-        steepest: float | None = None,
-        first: float | None = None,
     ) -> None:
         self.family, self.sign, self.farthest, self.swings = family, sign, farthest, swings
         beginning = family(np.zeros(1, np.int64), np.zeros(1))
         self.rtol, self.chatters = beginning.searching_rtol(rtol), beginning.chatters
         self.first, self.longest, self.smooth = (
-            first or pace * continuation_settings.first_branch_step,
+            pace * continuation_settings.first_branch_step,
             pace * continuation_settings.longest_branch_step,
             pace * continuation_settings.multiplier_change_per_step,
         )
         self.hundredth = hundredth
-        self.shortest = continuation_settings.shortest_branch_step if shortest is None else shortest
-        self.steepest = continuation_settings.steepest_multiplier if steepest is None else steepest
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -229,7 +223,7 @@ class Tracer:
             ):
                 step /= 3  # and along the direction estimated from the points
                 points[-1] = replace(last, jacobians=None)  # the old Jacobian may have misled the search
-                if step < self.shortest:
+                if step < continuation_settings.shortest_branch_step:
                     return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
             coarse = (
@@ -285,8 +279,8 @@ class Tracer:
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         if point.cycle.amplitude[0] < continuation_settings.vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
-        if abs(point.multiplier) > self.steepest:
-            return f"the cycle repels {self.steepest:g}-fold and more per return"
+        if abs(point.multiplier) > (steepest := continuation_settings.steepest_multiplier):
+            return f"the cycle repels {steepest:g}-fold and more per return"
         return ""
 
     def branch(self, start: Point) -> Branch:

@@ -95,18 +95,6 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
     return _special_point(tracer, kind, points[nearest], direction, _slope(kind, points))
 
 
-def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
-    """Return the last stable cycle on a branch before a special point between two neighbours.
-
-    The cycle lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
-    closed.
-    """
-    points = _enclosed(tracer, first, second, kind, precise)
-    if points is None:
-        return None
-    return points[max(place for place, point in points.items() if abs(point.multiplier) < 1)]
-
-
 def towards(first: Point, second: Point) -> np.ndarray:
     """Return the direction from one point of a branch to another, of length one."""
     direction = second.vector - first.vector
