@@ -105,14 +105,8 @@ class BasinSettings(Settings):
 class EdgeSettings(Settings):
     """Settings of the search for the edge of hunting in bandwidth, friction and joint."""
 
-    edge_pace: float = setting(3.0, "")
-    """Step along a branch that leads to an edge, relative to that of a drawn branch."""
-
     longest_edge_step: float = setting(0.12, "log of the parameter")
     """Longest step between orbits that are closed on the way to an edge. Over more, Newton's method mostly fails."""
-
-    shortest_edge_step: float = setting(5e-4, "log of bandwidth")
-    """Shortest step in bandwidth. An orbit that needs shorter ones is dropped, and simulations go on."""
 
     flip_search_step: float = setting(1e-4, "log of bandwidth")
     """Precision of a flip in bandwidth; the edge is shown with four digits."""
