@@ -52,7 +52,7 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so() -> None:
     assert edge.factor < edge.quiet < 1.02 * edge.factor
     assert margin.below is not None
     assert margin.above is not None
-    assert (margin.below.kind, margin.above.kind) == ("fold", "flip")
+    assert (margin.below.kind, margin.above.kind) == ("lost", "flip")
     assert margin.below.inside < 1 < margin.above.inside
 
 

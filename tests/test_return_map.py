@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beyond_flip import CREEPING
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -202,6 +203,14 @@ def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
 def test_a_swing_beside_a_cycle_that_repels_is_not_taken_for_it(crossover: str) -> None:
     """It is 2.5 % larger, and of 32 starts 13 end in it, at 1e-7 and 1e-9 (number 72 of seed 1301)."""
     stage = draw(1301, 72).replace({"controller.crossover": crossover})
+    assert what_attracts(Ensemble.held(stage.flat(), 1)).attracts[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("crossover", [12.975, 12.98, 12.985, 12.99])
+def test_a_cycle_on_a_narrow_piece_of_the_map_attracts(crossover: float) -> None:
+    """The piece ends 0.5 % below the cycle and 1 % above it, and no start of a survey lands on it."""
+    stage = CREEPING.replace({"controller.crossover": f"{crossover} Hz", "friction.static": "28.6 N"})
     assert what_attracts(Ensemble.held(stage.flat(), 1)).attracts[0]
 
 

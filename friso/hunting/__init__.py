@@ -9,7 +9,6 @@ from friso.hunting.attractors import Target
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt, moves_that_hunt, pushes_that_hunt
 from friso.hunting.boundary import (
-    CLOSED,
     END_OF_RANGE,
     Bifurcation,
     Branch,
@@ -20,9 +19,7 @@ from friso.hunting.boundary import (
     Plane,
     Point,
     Space,
-    Spot,
     diagram,
-    edge_curves,
     plane,
 )
 from friso.hunting.cases import LONG_RUN_RTOL, Case, Solver, check, check_given, needed_kernels
@@ -49,7 +46,7 @@ from friso.hunting.many_stages import (
 )
 from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions, rests_off
-from friso.hunting.path import AttractionEnd, BandwidthWindow
+from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS
 from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, lasting_swings
@@ -58,7 +55,6 @@ from friso.hunting.tracking import Dwell, Tracking, dwells, dwells_of_trace, tra
 from friso.hunting.verdict import CheckPart, Judgement
 
 __all__ = [
-    "CLOSED",
     "CYCLE_RTOL",
     "DITHERS",
     "END_OF_RANGE",
@@ -87,6 +83,7 @@ __all__ = [
     "Kick",
     "LocatedPoint",
     "LoopState",
+    "LossKind",
     "LowerGains",
     "Margin",
     "Motions",
@@ -100,7 +97,6 @@ __all__ = [
     "ReturnMapSettings",
     "Solver",
     "Space",
-    "Spot",
     "StageAttractors",
     "StickSlipSpeeds",
     "Swing",
@@ -116,7 +112,6 @@ __all__ = [
     "displacements_that_hunt",
     "dwells",
     "dwells_of_trace",
-    "edge_curves",
     "find_attractors",
     "find_cycles",
     "find_margin",

@@ -13,16 +13,12 @@ import numpy as np
 
 from friso.engine.allowance import Exhausted
 from friso.hunting.attractors import Attractors, attractors
-from friso.hunting.attractors.survey import Swinging, of_cycles
-from friso.hunting.continuation.branch import END_OF_RANGE, REACHED, Point, Tracer
-from friso.hunting.continuation.locate import Bifurcation, changes, last_inside
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import CYCLE_RTOL, described, kept
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.hunting import surely_surveyed
-from friso.hunting.cycle.shooting import close
+from friso.hunting.orbit_line import OrbitLine
 from friso.hunting.path import AttractionEnd, LossKind, ParameterPath
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import bends, has_a_map, what_attracts
+from friso.hunting.what_attracts import bends, has_a_map, sketched, what_attracts
 
 
 @dataclass
@@ -75,14 +71,18 @@ class EdgeSearch:
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 return self._bracketed(place)
-            end, last, place.kind = self.followed(place.at, orbit)
-            distances = _followed_from([_orbit_distance(last, orbit)])
+            line = OrbitLine.of(self.path, self._ahead(place.at), place.at, orbit)
+            found = line.end(place.outside, self.farthest)
+            if found is None:
+                raise Beyond
+            end, place.kind = found
+            distances = _followed_from([line.distance(end)])
             place.at = end
             next_to, farther = self._just_beyond(end)
             beyond, survey = self._proved(next_to, farther, distances)
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:
-                if again := self._stable_again(end, next_to, last):
+                if again := tuple(line.close_at(float(np.log(next_to)))):
                     if next_to == self.farthest:
                         raise Beyond
                     place.at, place.motions, place.outside = next_to, again, self._still_ahead(next_to, place.outside)
@@ -97,14 +97,15 @@ class EdgeSearch:
     def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
         """Look for attractors just beyond an orbit's end, at `next_to`, and at `farther` factors.
 
-        Returns the searched factors and their attractors. Without a return map, factors farther off are searched only
-        if a simulation shows an attractor. Runs start from `distances` [m], too.
+        Factors farther off are searched only where a sketch of their map shows an attractor, or a simulation without a
+        map. Returns the searched factors and their attractors. Runs start from `distances` [m], too.
         """
-        if farther.size and not has_a_map(self.path.stages(farther)):
+        decided = True
+        if farther.size and has_a_map(self.path.stages(farther)):
+            farther = farther[sketched(self.path.stages(farther))[0]]
+        elif farther.size:
             seen = attractors(self.path.stages(farther), cycles=False)
             decided, farther = bool(seen.decided[~seen.attracts].all()), farther[seen.attracts]
-        else:
-            decided = True
         beyond = np.append(next_to, farther)
         survey = self._told(beyond, distances)
         return beyond, survey if decided else replace(survey, decided=survey.decided & survey.attracts)
@@ -171,24 +172,6 @@ class EdgeSearch:
         survey = what_attracts(stages, distances=begun)
         return replace(survey, decided=survey.decided & (survey.attracts | surely_surveyed(stages, survey)))
 
-    def _stable_again(self, end: float, beyond: float, last: Point) -> tuple[Swinging, ...]:
-        """Follow an orbit past its `end` to a factor `beyond`; return it as a motion if it is stable there again.
-
-        `last` is the orbit at its end. After a flip an orbit may repel for a narrow range only, and then attract from a
-        basin narrower than the steps of a return map.
-        """
-        at, stages = last.cycle.orbits, self.path.stages(np.array([beyond]))
-        if stages.chatters:
-            return ()
-        states, times = at.states, at.times
-        for factor in np.geomspace(end, beyond, edge_settings.past_end_steps + 1)[1:]:
-            there = self.path.stages(np.array([factor]))
-            before, at = at, close(there, states, times, at.sign, CYCLE_RTOL, at.swings)
-            if not (at.closed & kept(there, at, before.states[:, stages.sticking]))[0]:
-                return ()
-            states, times = 2 * at.states - before.states, 2 * at.times - before.times
-        return tuple(of_cycles(np.zeros(1, np.int64), described(stages, at, CYCLE_RTOL), stages.sticking))
-
     def _ahead(self, at: float) -> float:
         """Return the direction of the search from the factor `at`: 1 up, -1 down."""
         return 1.0 if self.farthest >= at else -1.0
@@ -197,64 +180,6 @@ class EdgeSearch:
         """Return `outside`, a factor without attractor, or one farther ahead if `at` has passed it."""
         ahead = self._ahead(at)
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * edge_settings.reach_log))
-
-    @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-    def followed(self, at: float, orbit: Swinging) -> tuple[float, Point, LossKind]:
-        """Follow a closed orbit from a factor to the last factor at which it is stable.
-
-        Returns this factor, the orbit there, and how its stability ends. Raises Beyond if the orbit is stable up to the
-        end of the search.
-        """
-        ahead, cycles = self._ahead(at), orbit.cycles
-        assert cycles is not None
-
-        def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-            """Return the stages at places: logarithms of the factor over that at the start."""
-            return self.path.stages(at * np.exp(ahead * places))
-
-        length = abs(float(np.log(self.farthest / at)))
-        chatters = self.path.stages(np.ones(1)).chatters
-        shortest, flip = (
-            (edge_settings.chattering_edge_step, edge_settings.chattering_edge_step)
-            if chatters
-            else (edge_settings.shortest_edge_step, edge_settings.flip_search_step)
-        )
-        tracer = Tracer(
-            family,
-            cycles.sign,
-            farthest=length,
-            swings=cycles.swings,
-            pace=edge_settings.edge_pace,
-            shortest=shortest,
-            first=edge_settings.first_edge_step,
-        )
-        start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
-        farthest = start
-
-        def over(_: Point, point: Point) -> bool:
-            """Tell whether the orbit has lost stability or turned back; else store the farthest point."""
-            nonlocal farthest
-            ended = not abs(point.multiplier) < 1 or point.place <= farthest.place
-            farthest = farthest if ended else point
-            return ended
-
-        points, reason = tracer.walk(start, 1.0, over)
-        if points and not abs(points[-1].multiplier) < 1 and reason in (REACHED, END_OF_RANGE):
-            first, second = ([start, *points])[-2:]
-            kind = _kind(first, second)
-            last = last_inside(
-                tracer, first, second, kind, max(flip, edge_settings.fold_search_step) if kind == "fold" else flip
-            )
-            farthest = max(farthest, last or first, key=lambda point: point.place)
-            return float(at * np.exp(ahead * farthest.place)), farthest, kind
-        if tracer.reaches(points, reason):
-            raise Beyond
-        return float(at * np.exp(ahead * farthest.place)), farthest, "lost"
-
-
-def _orbit_distance(point: Point, orbit: Swinging) -> float:
-    """Return the distance [m] at which a stage sticks on an orbit, with the sign of its side."""
-    return float(np.copysign(np.exp(point.distance), orbit.distance))
 
 
 def _followed_from(distances: list[float]) -> np.ndarray:
@@ -265,9 +190,3 @@ def _followed_from(distances: list[float]) -> np.ndarray:
 def _nearer(ahead: float, one: float, other: float) -> float:
     """Return whichever of two factors comes first in the direction `ahead`: 1 up, -1 down."""
     return float(min(one, other) if ahead > 0 else max(one, other))
-
-
-def _kind(first: Point, second: Point) -> Bifurcation:
-    """Return how an orbit loses stability from one point to the next: flip, fold or torus."""
-    kinds = changes(first, second)
-    return kinds[0] if kinds else "torus"

@@ -105,20 +105,11 @@ class BasinSettings(Settings):
 class EdgeSettings(Settings):
     """Settings of the search for the edge of hunting in bandwidth, friction and joint."""
 
-    edge_pace: float = setting(3.0, "")
-    """Step along a branch that leads to an edge, relative to that of a drawn branch."""
-
-    first_edge_step: float = setting(0.03, "log of bandwidth")
-    """First step in bandwidth. A longer one may lead to another branch."""
-
-    shortest_edge_step: float = setting(5e-4, "log of bandwidth")
-    """Shortest step in bandwidth. An orbit that needs shorter ones is dropped, and simulations go on."""
+    longest_edge_step: float = setting(0.12, "log of the parameter")
+    """Longest step between orbits that are closed on the way to an edge. Over more, Newton's method mostly fails."""
 
     flip_search_step: float = setting(1e-4, "log of bandwidth")
     """Precision of a flip in bandwidth; the edge is shown with four digits."""
-
-    fold_search_step: float = setting(1e-3, "along the branch")
-    """Precision of a fold along the branch. The bandwidth changes with the square of this step."""
 
     chattering_edge_step: float = setting(2e-3, "log of bandwidth")
     """Step in bandwidth with a chattering limiter. Shorter steps follow the roughness of multipliers."""
@@ -137,10 +128,6 @@ class EdgeSettings(Settings):
     )
     """Starts from which a motion is followed to the next bandwidth. A motion moves by less than a tenth, and its basin
     may be narrow."""
-
-    past_end_steps: int = setting(4, "")
-    """Steps in which an orbit is followed from its end to that factor, in case it is stable again there. Each begins
-    where the last two orbits point; in fewer steps Newton's method finds another orbit."""
 
     most_orbits_followed: int = setting(8, "")
     """Most orbits followed one after the other. More than eight in a row were not met."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -18,16 +19,15 @@ from friso.equations.bandwidth import range_example
 from friso.equations.motion import rests
 from friso.errors import InputError
 from friso.hunting import (
-    CLOSED,
     CYCLE_RTOL,
     DITHERS,
-    END_OF_RANGE,
     Branch,
     Curve,
     Cycles,
     Diagram,
     KeyRange,
     LocatedPoint,
+    LossKind,
     Plane,
     Space,
     cannot_hunt,
@@ -53,8 +53,7 @@ def boundary(
 
     `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``. A range is logarithmic with ":log" behind
     it. With one axis the result is a `Diagram`: all branches of cycles over the range, with their flips, folds and
-    tori. With two it is a `Plane`: the curves on which flips, folds and tori lie. The motion of the stage file plays no
-    part.
+    tori. With two it is a `Plane`: the curves on which hunting ends. The motion of the stage file plays no part.
 
     `begins` is called once the input has been checked, and `progress` while cycles are followed. Raises InputError for
     a wrong range, tolerance or stage (one that cannot hunt).
@@ -125,9 +124,9 @@ UNKNOWN marks stages whose simulations failed or did not settle; INVALID marks s
 
 @dataclass(frozen=True)
 class Line:
-    """A branch of cycles over one key, or a curve in two keys: its n points in order.
+    """A branch of cycles over one key: its n points in order.
 
-    `at` [SI], shape (n, keys), has the values of the keys. `error`, of this shape, is their error [SI], NaN except at
+    `at` [SI], shape (n, 1), has the values of the key. `error`, of this shape, is their error [SI], NaN except at
     special points (flips, folds and tori). `kinds` has the kind of each special point, "" for an ordinary one.
     `amplitude` [m], `middle` [m], `period` [s] and `multiplier` of the cycles have the shape (n,). `ends` are texts on
     how the line ends on either side.
@@ -160,7 +159,7 @@ class Line:
 
 
 class _Row(NamedTuple):
-    """Point of a line: its keys and their error as fractions of the ranges, its cycle and kind."""
+    """Point of a line: its key and its error as fractions of the range, its cycle and kind."""
 
     at: np.ndarray
     error: np.ndarray
@@ -168,16 +167,10 @@ class _Row(NamedTuple):
     kind: str
 
 
-def lines(result: Diagram | Plane) -> tuple[Line, ...]:
-    """Return all branches of a diagram with their special points, or all curves of a plane."""
-    if isinstance(result, Diagram):
-        pairs = zip(result.branches, result.special, strict=True)
-        return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
-    rows = [
-        [_Row(spot.at, spot.error, spot.special.point.cycle, spot.special.kind) for spot in curve.spots]
-        for curve in result.curves
-    ]
-    return tuple(_line(result, *pair) for pair in zip(result.curves, rows, strict=True))
+def lines(result: Diagram) -> tuple[Line, ...]:
+    """Return all branches of a diagram with their special points."""
+    pairs = zip(result.branches, result.special, strict=True)
+    return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
 
 
 def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
@@ -211,11 +204,8 @@ def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
     return leg + before[leg] / (before[leg] + after[leg])
 
 
-def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
-    """Make a line from its rows: keys [SI], their errors, and the numbers of the cycles.
-
-    `traced` is the branch or curve from which the rows come.
-    """
+def _line(result: Diagram, traced: Branch, rows: list[_Row]) -> Line:
+    """Make a line from the rows of a branch: keys [SI], their errors, and the numbers of the cycles."""
     at = np.array([row.at for row in rows])
     values = _values(result.space, at)
     return Line(
@@ -374,80 +364,52 @@ def plane_edge(result: Plane) -> PlaneEdge | None:
     Along this key, hunting must end exactly once, on the same side for every value of the other key. Returns None
     otherwise, and if the verdict at a node is unknown.
     """
-    nodes = node_verdicts(result)
-    if any(verdict not in (ATTRACTS, REPELS) for _, _, verdict in nodes):
+    verdicts = np.full(result.nodes**2, np.nan)
+    verdicts[result.allowed[result.decided]] = result.attracts[result.decided]
+    if np.isnan(verdicts).any():
         return None
-    shape = result.nodes, result.nodes
-    attracts = np.reshape([verdict == ATTRACTS for _, _, verdict in nodes], shape)
-    values = [np.reshape([node[k] for node in nodes], shape) for k in (0, 1)]
+    attracts = verdicts.reshape(result.nodes, result.nodes) == 1
     for along in (0, 1):
         rows = np.moveaxis(attracts, along, 1)  # one row per value of the other key
         changes = np.diff(rows.astype(int), axis=1)
-        below = bool(rows[0, 0])
+        below, numbers = bool(rows[0, 0]), np.arange(result.nodes)
         if np.all(np.abs(changes).sum(axis=1) == 1) and np.all(rows[:, 0] == below):
-            first = np.abs(changes).argmax(axis=1)
-            places, across = (np.moveaxis(values[k], along, 1) for k in (along, 1 - along))
-            numbers = np.arange(result.nodes)
-            low, high = places[numbers, first].copy(), places[numbers, first + 1].copy()
-            for row, at in enumerate(across[:, 0].tolist()):
-                crossed = [place for place in _crossings(result, along, at) if low[row] <= place <= high[row]]
-                farther = [end for end in last_ends(result) if _lies_between(end, along, low[row], high[row], at)]
-                if farther:
-                    low[row], high[row] = sorted(farther[0][:, along].tolist())
-                elif crossed:
-                    low[row] = high[row] = max(crossed) if below else min(crossed)
-            return PlaneEdge(along, below, across[:, 0], low, high)
+            first = 2 * np.abs(changes).argmax(axis=1) + 1
+            i, j = (first, 2 * numbers) if along == 0 else (2 * numbers, first)
+            near, far = (_values(result.space, side[i, j]) for side in (result.near, result.far))
+            far = np.where((result.kinds[i, j] == "seen")[:, None], far, near)
+            low, high = np.sort([near[:, along], far[:, along]], axis=0)
+            return PlaneEdge(along, below, near[:, 1 - along], low, high)
     return None
 
 
-def last_ends(result: Plane) -> list[np.ndarray]:
-    """Return where hunting certainly ends beyond the curves: both ends of each bracket in key values [SI], (2, 2)."""
-    certain = [end for end in result.last_ends if end.certain]
-    return [_values(result.space, np.array([end.inside, end.outside])) for end in certain]
-
-
-def _lies_between(end: np.ndarray, along: int, low: float, high: float, value: float) -> bool:
-    """Tell whether a bracket, (2, 2), lies between `low` and `high` of key `along`, at a `value` of the other key."""
-    near = np.allclose(end[:, 1 - along], value, rtol=1e-9, atol=0.0)
-    return bool(near and np.all((end[:, along] >= low * (1 - 1e-9)) & (end[:, along] <= high * (1 + 1e-9))))
-
-
-def _crossings(result: Plane, along: int, value: float) -> list[float]:
-    """Return the values [SI] of key `along` at which curves pass a `value` of the other key."""
-    crossings = []
-    for line in lines(result):
-        at, other = line.at[:, along], line.at[:, 1 - along] - value
-        for k in np.flatnonzero(other[1:] * other[:-1] <= 0).tolist():
-            share = other[k] / (other[k] - other[k + 1]) if other[k] != other[k + 1] else 0.0
-            crossings.append(float(at[k] + share * (at[k + 1] - at[k])))
-    return crossings
-
-
 EndKind = Literal["range", "closed", "lost"]
-"""How a curve ends: at the end of the range, as a ring, or where its cycle was lost."""
+"""How a curve ends: at the end of the range, as a ring, or beside stages that are unknown or invalid."""
 
 
-class CurveEnd(NamedTuple):
-    """An end of the curve with the index `line`: both keys `at` it [SI], and the kind of end."""
+class PlaneCurve(NamedTuple):
+    """A curve in the plane of two keys on which hunting ends: its n points in order.
 
-    line: int
+    `at` [SI], shape (n, 2), are its values of both keys, with their `error` (n, 2); `kinds` say how hunting ends there,
+    and `ends` how the curve ends on either side.
+    """
+
     at: np.ndarray
-    kind: EndKind
+    error: np.ndarray
+    kinds: tuple[LossKind, ...]
+    ends: tuple[EndKind, EndKind]
 
 
-def curve_ends(result: Plane) -> list[CurveEnd]:
-    """List both ends of every curve of a plane, in the order of the curves."""
-    ends = []
-    for number, curve in enumerate(result.curves):
-        for spot, how in zip((curve.spots[0], curve.spots[-1]), curve.ends, strict=True):
-            kinds: dict[str, EndKind] = {END_OF_RANGE: "range", CLOSED: "closed"}
-            ends.append(CurveEnd(number, _values(result.space, spot.at[None])[0], kinds.get(how, "lost")))
-    return ends
+def curves(result: Plane) -> tuple[PlaneCurve, ...]:
+    """Return the curves of a plane, the longest first."""
+    return tuple(map(partial(_curve, result.space), result.curves))
 
 
-def lost_places(result: Plane) -> np.ndarray:
-    """Return keys [SI] where the verdict changes but no curve could be begun, (count, 2)."""
-    return _values(result.space, np.reshape(result.gaps, (-1, 2)))
+def _curve(space: Space, curve: Curve) -> PlaneCurve:
+    """Return a curve with values [SI] of the keys."""
+    at, far = _values(space, curve.points), _values(space, curve.outside)
+    ends: list[EndKind] = ["closed" if curve.ring else "range" if at_side else "lost" for at_side in curve.ends_at_side]
+    return PlaneCurve(at, np.abs(far - at), tuple(curve.kinds), (ends[0], ends[1]))
 
 
 def _verdicts(result: Diagram | Plane) -> list[str]:

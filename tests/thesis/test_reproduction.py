@@ -639,7 +639,7 @@ def test_limits_of_attraction_lie_on_the_curves() -> None:
     runs = made("system", lambda f, m: 3 * (f < 20) + 0 * m, points=14)
     axes = tuple(runs.dims)
     crossover, mass = (runs[name].values for name in axes)
-    curve = Edge("flip", np.array([18.0, 21.0]), mass[[0, -1]])
+    curve = Edge(np.array([18.0, 21.0]), mass[[0, -1]])
     attracts = crossover[:, None] < 18 + 3 * (mass - mass[0])[None, :] / np.ptp(mass)
     surveyed = Surveyed(runs, attracts, np.ones(attracts.shape, bool))
     for edges, precise in (((curve,), 0.02), ((), 1.5)):

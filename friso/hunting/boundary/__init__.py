@@ -1,14 +1,12 @@
 """Follow hunting cycles through one key or two to where they lose stability."""
 
-from friso.hunting.boundary.curve import CLOSED, Curve, Spot
 from friso.hunting.boundary.diagram import Diagram, diagram
-from friso.hunting.boundary.plane import Plane, edge_curves, plane
+from friso.hunting.boundary.plane import Curve, Plane, plane
 from friso.hunting.boundary.space import KeyRange, Space
 from friso.hunting.continuation.branch import END_OF_RANGE, Branch, Point
 from friso.hunting.continuation.locate import Bifurcation, LocatedPoint
 
 __all__ = [
-    "CLOSED",
     "END_OF_RANGE",
     "Bifurcation",
     "Branch",
@@ -19,8 +17,6 @@ __all__ = [
     "Plane",
     "Point",
     "Space",
-    "Spot",
     "diagram",
-    "edge_curves",
     "plane",
 ]

@@ -1,362 +1,255 @@
-"""Find all edges of hunting in the plane of two keys, from a grid of cycles."""
+"""Find the edge of hunting in the plane of two keys, from a grid of stages.
+
+Between neighbours of which only one hunts, its orbit is followed on the straight line to where it ceases to attract, or
+stages between them are surveyed. The edge is the contour of the grid through these places.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
-from itertools import count
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.attractors.survey import Swinging
-from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.space import Space
-from friso.hunting.continuation.branch import Point, Tracer
-from friso.hunting.continuation.locate import changes, located
 from friso.hunting.continuation.settings import continuation_settings
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families, symmetric_cycles, whole_cycles
-from friso.hunting.cycle.hunting import surely_surveyed
-from friso.hunting.edge_search import Beyond, EdgeSearch
+from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.loop import unstable_among
-from friso.hunting.path import ParameterPath
+from friso.hunting.orbit_line import OrbitLine
+from friso.hunting.path import LossKind, ParameterPath
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import what_attracts
+from friso.hunting.what_attracts import sketched, surveyed_roughly, what_attracts
 from friso.progress import Progress, Tally, silent
 
-CURVES = "following the edge of hunting"
-"""Progress message while curves are followed."""
+INVALID = -1.0
+"""State of a stage of the grid that is not valid."""
+
+EDGES = "following the edge of hunting"
+"""Progress message while the edge is located."""
 
 
 @dataclass(frozen=True)
-class Plane:
-    """Edges of hunting in the box of two keys.
+class Curve:
+    """A curve on which hunting ends, in the box of two keys: its n points in order.
 
-    - `curves`: the edges.
-    - `nodes`: stages along each side of the grid; `allowed`: numbers of the valid ones in C order, the first key along
-      the first side.
-    - `cycles`: hunting cycles of the allowed stages; `attracts`: whether they have an attractor; `decided`: whether
-      that is known.
-    - `unstable`: whether the loop is unstable regardless of friction.
-    - `gaps`: places, shape (2,), at which a change was seen but no curve could be begun.
-    - `last_ends`: where hunting ends farther out than the curves between two nodes, by another cycle or motion.
-    """
-
-    space: Space
-    curves: tuple[Curve, ...]
-    nodes: int
-    allowed: np.ndarray
-    cycles: Cycles
-    attracts: np.ndarray
-    decided: np.ndarray
-    unstable: np.ndarray
-    gaps: tuple[np.ndarray, ...]
-    last_ends: tuple[LastEnd, ...] = ()
-
-
-@dataclass(frozen=True)
-class LastEnd:
-    """Where hunting ends between two neighbours of the grid, beyond the curves that pass between them.
-
-    `inside` and `outside`, shape (2,), are coordinates in the box of the keys: something attracts at the first and
-    nothing at the second. The end is `certain` or not, as in `friso.hunting.path.AttractionEnd`.
+    Something attracts at the coordinates `inside` and nothing at `outside`, both (n, 2). Between them hunting ends by
+    the `kinds` of `friso.hunting.path.LossKind`. `ends_at_side` tells for either end whether it lies at a side of the
+    box, or beside a stage that is invalid or unknown. A `ring` has no end.
     """
 
     inside: np.ndarray
     outside: np.ndarray
-    certain: bool
+    kinds: np.ndarray
+    ends_at_side: tuple[bool, bool]
+    ring: bool
+
+    @property
+    def points(self) -> np.ndarray:
+        """Return the curve in the box of the keys, shape (n, 2): where orbits end, or half-way between stages."""
+        return np.where((self.kinds == "seen")[:, None], (self.inside + self.outside) / 2, self.inside)
 
 
 @dataclass(frozen=True)
-class _Grid:
-    """Grid of stages in the box of two keys: `nodes` along each side.
+class Plane:
+    """Edge of hunting in the box of two keys, from `nodes` stages along each side.
 
-    `points` are the coordinates of all, shape (points, 2), `allowed` the numbers of the valid ones, and `stages` these.
+    `allowed` are the numbers of the valid stages in C order, the first key along the first side. Of these, `attracts`
+    tells which have an attractor, `decided` for which that is known, and `unstable` whose loop is unstable regardless
+    of friction. `near` and `far`, shape (2 nodes - 1, 2 nodes - 1, 2), are the coordinates of all stages and the places
+    half-way between them; between neighbours of which one hunts, something attracts at `near` and nothing at `far`, and
+    hunting ends by the `kinds` (2 nodes - 1, 2 nodes - 1), "" elsewhere.
     """
 
+    space: Space
     nodes: int
-    points: np.ndarray
     allowed: np.ndarray
-    stages: Ensemble
+    attracts: np.ndarray
+    decided: np.ndarray
+    unstable: np.ndarray
+    near: np.ndarray
+    far: np.ndarray
+    kinds: np.ndarray
 
-    @classmethod
-    def of(cls, space: Space, nodes: int | None) -> _Grid:
-        nodes = continuation_settings.grid_stages if nodes is None else nodes
-        points = space.grid(nodes)
-        allowed = np.flatnonzero(space.allowed(points))
-        return cls(nodes, points, allowed, space.stages(points[allowed]))
+    @cached_property
+    def curves(self) -> tuple[Curve, ...]:
+        """Return the edge as curves, the longest first."""
+        from contourpy import contour_generator
 
-    def changes(self, inside: np.ndarray, outside: np.ndarray) -> list[tuple[int, int]]:
-        """Return pairs of neighbours on the grid, the first `inside` and the second `outside`.
+        levels = np.ma.masked_all((self.nodes, self.nodes))
+        levels.flat[self.allowed[self.decided]] = self.attracts[self.decided].astype(float)
+        contours = contour_generator(z=levels.T, line_type="Separate").lines(0.5)
+        lines = [np.round(2 * np.asarray(line)).astype(int) for line in contours]
+        lines = [line[self.kinds[*line.T] != ""] for line in lines]  # beside a masked stage it crosses a diagonal
+        return tuple(self._curve(line) for line in sorted(lines, key=len, reverse=True) if len(line) > 1)
 
-        Pairs are numbers of points; both arguments are booleans by valid stage.
-        """
-        return list(_changes(*(_on_grid(self.allowed[side], self.nodes) for side in (inside, outside))))
-
-
-@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def edge_curves(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None) -> tuple[Curve, ...]:
-    """Find the curves in the plane of two keys on which the hunting cycle stops attracting.
-
-    Changes are looked for between `nodes` x `nodes` stages. Orbits are closed to the relative tolerance `rtol`.
-    """
-    grid = _Grid.of(space, nodes)
-    find = symmetric_cycles if grid.stages.symmetric.all() else whole_cycles
-    cycles = find(grid.stages, grid.stages.searching_rtol(rtol))
-    return _followed(space, grid, [_losing(cycles)], rtol, silent)[0]
+    def _curve(self, line: np.ndarray) -> Curve:
+        """Return the curve through places of the mesh with the given indices, shape (n, 2)."""
+        i, j = line.T
+        first, last = (bool(np.any((end == 0) | (end == 2 * self.nodes - 2))) for end in (line[0], line[-1]))
+        ring = bool(np.array_equal(line[0], line[-1]))
+        return Curve(self.near[i, j], self.far[i, j], self.kinds[i, j], (first, last), ring)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
-    """Find all curves in the plane of two keys on which the hunting cycle stops attracting.
+    """Find the edge of hunting in the plane of two keys, between `nodes` x `nodes` stages.
 
-    Curves on which an asymmetric cycle appears that bounds its basin are found as well. Changes are looked for between
-    `nodes` x `nodes` stages. Orbits are closed to the relative tolerance `rtol`.
+    Orbits are closed to the relative tolerance `rtol`. Parts of the edge that pass between neighbours twice are not
+    seen.
     """
-    grid = _Grid.of(space, nodes)
-    points, stages = grid.points, grid.stages
-    sought = families(stages, stages.searching_rtol(rtol))
-    hunting, searches = sought[0], _searches(*sought)
-    curves, gaps = _followed(space, grid, searches, rtol, progress)
-    attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
-    undecided = np.flatnonzero(~attracts)  # stages with a stable cycle need no simulation
-    if undecided.size:
-        others = stages.take(undecided)
-        surveyed = what_attracts(others, rtol)
-        decided[undecided] = surely_surveyed(others, surveyed)
-        attracts[undecided] = surveyed.attracts & decided[undecided]
-    ends = grid.changes(decided & attracts, decided & ~attracts)
-    for a, b in ends:  # other attractors, too
-        middle = (points[a] + points[b]) / 2
-        known_gap = any(np.array_equal(middle, at) for at in gaps)
-        if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
-            gaps.append(middle)
-    last_ends = _last_ends(space, curves, [(points[a], points[b]) for a, b in ends], rtol)
+    nodes = continuation_settings.grid_stages if nodes is None else nodes
+    points = space.grid(nodes)
+    allowed = np.flatnonzero(space.allowed(points))
+    stages = space.stages(points[allowed])
     unstable = np.any([*unstable_among(stages).values()], axis=0)
-    columns = space, curves, grid.nodes, grid.allowed, hunting, attracts, decided, unstable
-    return Plane(*columns, tuple(gaps), last_ends)
+    surveyed = surveyed_roughly(stages)
+    state = np.full(nodes * nodes, INVALID)
+    state[allowed] = np.where(surveyed.decided, surveyed.attracts, np.nan)
+    search = _Search(space, points, state, rtol)
+    search.run(progress)
+    mesh = space.grid(2 * nodes - 1).reshape(2 * nodes - 1, 2 * nodes - 1, 2)
+    near, far, kinds = mesh.copy(), mesh.copy(), np.full(mesh.shape[:2], "", object)
+    for pair, (inside, outside, kind) in search.found.items():
+        place = tuple(np.sum(np.unravel_index(pair, (nodes, nodes)), axis=1))
+        near[place], far[place], kinds[place] = inside, outside, kind
+    attracts, decided = state[allowed] == 1, np.isfinite(state[allowed])
+    return Plane(space, nodes, allowed, attracts, decided, unstable, near, far, kinds)
 
 
-def _followed(
-    space: Space, grid: _Grid, searches: Sequence[CurveSearch], rtol: float, progress: Progress
-) -> tuple[tuple[Curve, ...], list[np.ndarray]]:
-    """Follow every curve that passes between neighbours of the grid, for each of the searches.
+Pair = tuple[int, int]
+"""Numbers of two neighbours of the grid, of which only the first hunts."""
 
-    Returns the curves, and the coordinates at which no curve could be begun.
+
+@dataclass
+class _Search:
+    """Search for the edge of hunting on the lines between neighbours of a grid.
+
+    `points` are the coordinates of the stages, (n, 2), and `hunts`, (n,), tells which hunt: 1, 0, NaN if that is not
+    known, or INVALID. `motions` are those of the stages that were searched thoroughly, `reached` others that an orbit
+    reached.
+    `found` holds between which places hunting ends, and how.
     """
-    changing = [(cycles, grid.changes(inside, outside)) for cycles, inside, outside in searches]
-    tally = Tally(progress, sum(len(pairs) for _, pairs in changing))
-    parts = side_by_side([partial(_sought, space, grid, *search, rtol, tally) for search in changing])
-    return tuple(curve for curves, _ in parts for curve in curves), [gap for _, gaps in parts for gap in gaps]
 
+    space: Space
+    points: np.ndarray
+    hunts: np.ndarray
+    rtol: float
+    motions: dict[int, tuple[Swinging, ...]] = field(default_factory=dict)
+    reached: set[int] = field(default_factory=set)
+    found: dict[Pair, tuple[np.ndarray, np.ndarray, LossKind]] = field(default_factory=dict)
 
-def _sought(
-    space: Space, grid: _Grid, cycles: Cycles, changing: Sequence[tuple[int, int]], rtol: float, tally: Tally
-) -> tuple[list[Curve], list[np.ndarray]]:
-    """Follow the edge of hunting between grid neighbours of which only the first has the cycle.
+    def run(self, progress: Progress) -> None:
+        """Locate the edge between all neighbours of which only one hunts."""
+        while pairs := [pair for pair in self._pairs() if pair not in self.found]:
+            if new := sorted({inner for inner, _ in pairs} - self.motions.keys()):
+                self._inspect(new)
+            else:
+                self._locate(pairs, progress)
 
-    Returns the curves, and the coordinates at which no curve could be begun. `changing` are pairs of neighbours; those
-    whose cycle is nearest to a change come first, because the curve found there may pass between others as well.
-    """
-    points, curves, gaps = grid.points, list[Curve](), list[np.ndarray]()
-    to_change = dict(zip(grid.allowed.tolist(), np.abs(np.abs(cycles.multiplier) - 1).tolist(), strict=True))
-    for a, b in sorted(changing, key=lambda pair: to_change[pair[0]]):
-        tally.add(1, CURVES)
-        if any(_crossed(curve, points[a], points[b]) for curve in curves):
-            continue
-        cycle = cycles.take(np.flatnonzero(grid.allowed == a))
-        spot, reached = _first(space, points[a], points[b], cycle, rtol)
-        if reached:  # the neighbour has the cycle too, but the search there missed it
-            continue
-        curve = spot and CurveTracer(space, spot.special.kind, cycle.sign, rtol).curve(spot)
-        if curve:
-            curves.append(curve)
-        else:
-            gaps.append((points[a] + points[b]) / 2)
-    return curves, gaps
+    def _pairs(self) -> Iterator[Pair]:
+        """Return the pairs of neighbours of which only the first surely hunts."""
+        nodes = round(len(self.points) ** 0.5)
+        numbers = np.arange(len(self.points)).reshape(nodes, nodes)
+        for one, other in ((numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])):
+            for inner, outer in ((one, other), (other, one)):
+                changes = (self.hunts[inner] == 1) & ((self.hunts[outer] == 0) | np.isnan(self.hunts[outer]))
+                yield from zip(inner[changes].tolist(), outer[changes].tolist(), strict=True)
 
+    def _inspect(self, numbers: list[int]) -> None:
+        """Search stages thoroughly that seem to hunt, by number."""
+        survey = what_attracts(self.space.stages(self.points[numbers]), self.rtol)
+        for k, number in enumerate(numbers):
+            self.motions[number] = survey.take(np.array([k])).motions
+            if not survey.attracts[k] and number not in self.reached:
+                self.hunts[number] = 0 if survey.decided[k] else np.nan
 
-CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
-"""Cycles, and which stages lie inside and outside of a curve on which they change, as booleans."""
+    def _locate(self, pairs: Sequence[Pair], progress: Progress) -> None:
+        """Locate the edge on the lines between pairs of neighbours, all at once.
 
+        Where an orbit reaches the second of them, that hunts as well. Where it ends just before, that does not: motions
+        take too long there for a survey to decide.
+        """
+        lines = [_Line.between(self.space, self.points[inner], self.points[outer]) for inner, outer in pairs]
+        tally = Tally(progress, len(pairs))
+        ends = side_by_side(
+            [partial(line.end, self.motions[inner], tally) for line, (inner, _) in zip(lines, pairs, strict=True)]
+        )
+        for end, (_, outer) in zip(ends, pairs, strict=True):
+            if end is None:
+                self.hunts[outer] = 1
+                self.reached.add(outer)
+        ended = [(line, pair, *end) for line, pair, end in zip(lines, pairs, ends, strict=True) if end]
+        inside, kinds = np.array([factor for *_, factor, _ in ended]), [kind for *_, kind in ended]
+        lines, farthest = [line for line, *_ in ended], np.array([line.farthest for line, *_ in ended])
+        nearest, *others = edge_settings.beyond_bandwidths
+        outside, begin = np.minimum(nearest * inside, farthest), inside.copy()
+        for factor in (nearest, *others):
+            goes_on = self._attract(lines, factor * inside, factor * inside < farthest, roughly=factor > nearest)
+            begin[goes_on] = factor * inside[goes_on]
+        seen = (begin > inside) | (np.array(kinds) == "seen")
+        inside, outside[seen] = begin, farthest[seen]
+        while (wide := seen & (outside > inside * (1 + edge_settings.edge_bracket_share))).any():
+            middle = np.sqrt(inside * outside)
+            attract = self._attract(lines, middle, wide)
+            inside[attract], outside[wide & ~attract] = middle[attract], middle[wide & ~attract]
+        for k, (line, pair, _, kind) in enumerate(ended):
+            if np.isnan(self.hunts[pair[1]]) and farthest[k] < inside[k] * others[0]:
+                self.hunts[pair[1]] = 0
+            self.found[pair] = line.at(inside[k]), line.at(outside[k]), "seen" if seen[k] else kind
 
-def _searches(hunting: Cycles, *pairs: Cycles) -> list[CurveSearch]:
-    """Return between which stages to search for curves, from their hunting cycles and asymmetric ones.
+    def _attract(
+        self, lines: Sequence[_Line], factors: np.ndarray, which: np.ndarray, roughly: bool = False
+    ) -> np.ndarray:
+        """Return on which of the lines something attracts at its factor, (lines,); only some are asked.
 
-    A search names stages inside and outside of a curve. In the first, the cycle attracts inside and not outside. If
-    there is a second, an attracting cycle lies between asymmetric ones inside, and has none beside it outside. A stage
-    that may have a cycle which was not closed is on neither side.
-    """
-    searches = [_losing(hunting)]
-    for pair in pairs:
-        beside_attracting = hunting.attracting & ~pair.uncertain
-        searches.append((pair, beside_attracting & pair.closed, beside_attracting & ~pair.closed))
-    return searches
-
-
-def _losing(hunting: Cycles) -> CurveSearch:
-    """Return the search for curves on which hunting cycles cease to attract."""
-    return hunting, hunting.attracting, ~hunting.attracting & ~hunting.uncertain
-
-
-def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
-    """Mark the nodes of the grid with these numbers, shape (nodes, nodes)."""
-    grid = np.zeros(nodes * nodes, bool)
-    grid[numbers] = True
-    return grid.reshape(nodes, nodes)
-
-
-def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Return pairs of grid neighbours, the first of them inside and the second outside.
-
-    `inside` and `outside`, shape (nodes, nodes), mark the nodes of the grid.
-    """
-    numbers = np.arange(inside.size).reshape(inside.shape)
-    pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
-    for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
-        changed = inside.flat[first] & outside.flat[second]
-        yield from zip(first[changed].tolist(), second[changed].tolist(), strict=True)
-
-
-def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
-    """Tell whether a curve passes close to the line between two neighbours of the grid.
-
-    `start` and `end` are their coordinates in the box.
-    """
-    points, mesh = curve.points, float(np.linalg.norm(end - start))
-    for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):
-        nearest = points[:-1] + leg_shares(points, at)[:, None] * np.diff(points, axis=0)
-        if np.linalg.norm(nearest - at, axis=1).min() < continuation_settings.explained_distance * mesh:
-            return True
-    return False
-
-
-def _last_ends(
-    space: Space, curves: Sequence[Curve], pairs: Sequence[tuple[np.ndarray, np.ndarray]], rtol: float
-) -> tuple[LastEnd, ...]:
-    """Find where hunting ends beyond the curves, on lines between neighbours of the grid.
-
-    `pairs` are the coordinates of neighbours of which something attracts the first alone. Just beyond the farthest
-    curve on each line, other attractors are looked for, on all lines at once; those found are followed to their end.
-    """
-    lines, begins = [], []
-    for start, end in pairs:
-        crossed = [share for curve in curves for share in _crossings(curve, start, end)]
-        if crossed:
-            line = _Line.between(space, start + max(crossed) * (end - start), end)
-            lines.append(line)
-            begins.append([factor for factor in edge_settings.beyond_bandwidths if factor < line.farthest])
-    owners = np.repeat(np.arange(len(lines)), [len(factors) for factors in begins])
-    if not owners.size:
-        return ()
-    factors = np.concatenate(begins)
-    places = np.array(
-        [lines[owner].at(factor) for owner, factor in zip(owners.tolist(), factors.tolist(), strict=True)]
-    )
-    survey = what_attracts(space.stages(places), rtol)
-    ends = []
-    for number, line in enumerate(lines):
-        found_at = np.flatnonzero((owners == number) & survey.attracts)
-        if found_at.size:
-            ends.append(line.end_of(float(factors[found_at[-1]]), survey.take(found_at[-1:]).motions))
-    return tuple(ends)
+        If that is to be told `roughly`, stages are searched only where a sketch of their map shows an attractor.
+        """
+        attract, numbers = np.zeros(len(lines), bool), np.flatnonzero(which)
+        places = np.array([lines[k].at(factors[k]) for k in numbers.tolist()]).reshape(-1, 2)
+        if roughly and numbers.size:
+            shown = sketched(self.space.stages(places))[0]
+            numbers, places = numbers[shown], places[shown]
+        if numbers.size:
+            attract[numbers] = what_attracts(self.space.stages(places), self.rtol).attracts
+        return attract
 
 
 @dataclass(frozen=True)
 class _Line:
-    """A line in the box of the keys from `start` to `end`, both (2,), as a path on which factors grow from 1.
+    """A line in the box of the keys from `start` along `way`, both (2,), as a path on which factors grow from 1.
 
-    A factor of 1.01 leads as far as one key changes by 1 %, over a length of `hundredth`.
+    A factor of 1.01 leads as far as the key that changes fastest changes by 1 %, the `farthest` factor to the end.
     """
 
     space: Space
     start: np.ndarray
-    end: np.ndarray
-    hundredth: float
+    way: np.ndarray
+    farthest: float
 
     @classmethod
     def between(cls, space: Space, start: np.ndarray, end: np.ndarray) -> _Line:
         """Make a line from its ends."""
-        direction = (end - start) / np.linalg.norm(end - start)
-        return cls(space, start, end, space.hundredth(start, direction)(0.0))
-
-    @property
-    def farthest(self) -> float:
-        """Return the factor at the end of the line."""
-        return float(np.exp(np.log(1.01) * np.linalg.norm(self.end - self.start) / self.hundredth))
+        length = float(np.linalg.norm(end - start))
+        hundredths = length / space.hundredth(start, (end - start) / length)(0.0)
+        return cls(space, start, end - start, float(1.01**hundredths))
 
     def at(self, factors: np.ndarray | float) -> np.ndarray:
         """Return the coordinates at factors, (..., 2)."""
-        share = np.log(factors) / np.log(self.farthest)
-        return self.start + np.multiply.outer(share, self.end - self.start)
+        return self.start + np.multiply.outer(np.log(factors) / np.log(self.farthest), self.way)
 
-    def end_of(self, factor: float, motions: tuple[Swinging, ...]) -> LastEnd:
-        """Follow `motions`, which attract at a factor, to the end of hunting on the line."""
-        farthest = self.farthest
+    def end(self, motions: tuple[Swinging, ...], tally: Tally) -> tuple[float, LossKind] | None:
+        """Follow a closed orbit from the start to the factor at which it ceases to attract, and tell how it does.
+
+        Returns None if it attracts up to the end. Without a closed orbit the first factor is told, as seen.
+        """
+        tally.add(1, EDGES)
+        orbit = next((motion for motion in motions if motion.cycles is not None), None)
+        if orbit is None:
+            return 1.0, "seen"
         path = ParameterPath(
-            lambda factors: self.space.stages(self.at(factors)),
-            np.array([1.0, farthest]),
-            0,
-            edge_settings.beyond_bandwidths,
+            lambda factors: self.space.stages(self.at(factors)), np.ones(1), 0, edge_settings.beyond_bandwidths
         )
-        try:
-            end = EdgeSearch(path, farthest).end(factor, motions, farthest)
-        except Beyond:
-            return LastEnd(self.at(factor), self.end, False)
-        return LastEnd(self.at(end.inside), self.at(min(end.outside, farthest)), end.certain)
-
-
-def _crossings(curve: Curve, start: np.ndarray, end: np.ndarray) -> list[float]:
-    """Return where a curve crosses the line between two neighbours of the grid, in shares of the line.
-
-    The curve is straight between its points. `start` and `end` are the coordinates of the neighbours in the box.
-    """
-    way = end - start
-    along, aside = (curve.points - start) @ way / (way @ way), (curve.points - start) @ (way[::-1] * [-1.0, 1.0])
-    passes = np.flatnonzero(aside[:-1] * aside[1:] <= 0)
-    with np.errstate(all="ignore"):
-        weights = np.nan_to_num(aside[passes] / (aside[passes] - aside[passes + 1]), nan=0.5)
-    shares = along[passes] + weights * (along[passes + 1] - along[passes])
-    return shares[(shares >= 0) & (shares < 1)].tolist()
-
-
-def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
-    """Follow a cycle towards a neighbouring stage, to where it loses stability or folds.
-
-    `start` and `end` are the coordinates of both stages in the box of the keys. Returns the point of change (None:
-    there is none, or it could not be located), and whether the cycle reaches the neighbour unchanged.
-    """
-    mesh = float(np.linalg.norm(end - start))
-    across = (end - start) / mesh
-    tracer = Tracer(
-        space.lines(start[None], across[None]),
-        cycle.sign,
-        rtol,
-        farthest=mesh,
-        pace=edge_settings.edge_pace,
-        hundredth=space.hundredth(start, across),
-    )
-    first = Point.of(space.stages(start[None]), 0.0, cycle)
-    steps = count(1)
-    points, reason = tracer.walk(
-        first,
-        1.0,
-        lambda last, point: bool(changes(last, point)) or next(steps) >= continuation_settings.most_points_between,
-    )
-    last, point = [first, first, *points][-2:]
-    if not (kinds := changes(last, point)):
-        return None, tracer.reaches(points, reason)
-    special = located(tracer, last, point, "fold" if "fold" in kinds else kinds[0])
-    return (Spot(start + special.point.place * across, special, across) if special else None), False
-
-
-def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return where on each leg of a path the point nearest to `at`, shape (2,), lies.
-
-    The legs are the straight pieces between the points of the path, (n, 2). The results, (n - 1,), run from 0 at the
-    start of a leg to 1 at its end.
-    """
-    legs = np.diff(path, axis=0)
-    return np.clip(((at - path[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
+        return OrbitLine.of(path, 1.0, 1.0, orbit).end(self.farthest, self.farthest)

@@ -24,9 +24,6 @@ from friso.hunting.settings import tolerance_settings
 END_OF_RANGE = "end of the range"
 """Reason for the end of a branch: it reached the end of the range."""
 
-REACHED = "it reached the end of the requested range"
-"""Reason for the end of a branch: the condition for ending the walk was met."""
-
 NO_FARTHER = "it could not be followed farther"
 """First words of the reason why a branch ends, if no cycle was found one step farther."""
 
@@ -82,13 +79,12 @@ class Branch:
 
 
 class Tracer:
-    """Tracer of one cycle along a line of stages, from place 0 to the `farthest`.
+    """Tracer of one cycle along a line of stages, from place 0 to 1.
 
     `family` gives the stages by place. `sign` is -1 for a cycle closed over half a period, 1 for a whole one; `swings`
-    counts its swings in that time (None: the fewest possible). Steps are `pace` times as long as for drawing a curve,
-    and at least `shortest`; the first has the length `first`. The cycle is followed while its multiplier is below
-    `steepest`. `hundredth` gives, at a place, the length of line over which the key changes by one per cent. Cycles are
-    closed to the relative tolerance `rtol`, or a wider one if they may chatter.
+    counts its swings in that time (None: the fewest possible).
+    `hundredth` gives, at a place, the length of line over which the key changes by one per cent. Cycles are closed to
+    the relative tolerance `rtol`, or a wider one if they may chatter.
     """
 
     def __init__(
@@ -96,25 +92,13 @@ class Tracer:
         family: Family,
         sign: float,
         rtol: float = CYCLE_RTOL,
-        farthest: float = 1.0,
         swings: int | None = None,
-        pace: float = 1.0,
-        shortest: float | None = None,
         hundredth: Callable[[float], float] = lambda _: HUNDREDTH,
-        steepest: float | None = None,
-        first: float | None = None,
     ) -> None:
-        self.family, self.sign, self.farthest, self.swings = family, sign, farthest, swings
+        self.family, self.sign, self.swings = family, sign, swings
         beginning = family(np.zeros(1, np.int64), np.zeros(1))
         self.rtol, self.chatters = beginning.searching_rtol(rtol), beginning.chatters
-        self.first, self.longest, self.smooth = (
-            first or pace * continuation_settings.first_branch_step,
-            pace * continuation_settings.longest_branch_step,
-            pace * continuation_settings.multiplier_change_per_step,
-        )
         self.hundredth = hundredth
-        self.shortest = continuation_settings.shortest_branch_step if shortest is None else shortest
-        self.steepest = continuation_settings.steepest_multiplier if steepest is None else steepest
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -176,49 +160,27 @@ class Tracer:
             points[k] = Point.of(stages.take(one), float(places[k]), cycles.take(one), jacobian)
         return points
 
-    def meet(
-        self, condition: Condition, guess: np.ndarray, direction: np.ndarray, states: np.ndarray, near: Point
-    ) -> Point | None:
-        """Find the cycle that meets a condition, from a `guess` in the space of place, log distance and log time.
-
-        `states`, shape (1, states), lie near the cycle. The search begins with the Jacobian of the cycle `near` it,
-        which meets the condition too. If that fails, it begins again from a closed cycle on the plane through the
-        guess, whose normal is the `direction`, (3,). Returns None if no cycle is found.
-        """
-        times = near.cycle.orbits.times * np.exp(guess[2] - near.time)
-        begin = replace(near.cycle.orbits, states=states, times=times)
-        point = self._points(
-            ConditionSearch(condition, self._on_line, begin, guess[:1], self.rtol, near.jacobians).closed()
-        )[0]
-        if point is None and (closed := self.solve(near, guess, direction, states)):
-            places = np.array([closed.place])
-            point = self._points(
-                ConditionSearch(condition, self._on_line, closed.cycle.orbits, places, self.rtol).closed()
-            )[0]
-        return point
-
     def shift(self, condition: Condition, point: Point) -> float:
         """Return how far the place of a cycle that meets a condition moves at a hundredth of the tolerance."""
         tight, place = self.rtol * tolerance_settings.check_rtol_factor, np.array([point.place])
-        again = ConditionSearch(condition, self._on_line, point.cycle.orbits, place, tight, point.jacobians)
+        again = ConditionSearch(condition, self._on_line, point.cycle.orbits, place, tight)
         return abs(float(again.moved()[0]))
 
-    def walk(
-        self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None
-    ) -> tuple[list[Point], str]:
-        """Follow the branch from a point to one side; return its further points, and why it ends.
+    def walk(self, start: Point, ahead: float) -> tuple[list[Point], str]:
+        """Follow the branch from a point to one side, 1 or -1; return its further points, and why it ends.
 
-        `ahead` is 1 or -1. The walk ends with the first point for which `until` holds, given the point before it and
-        the point itself. Without `until`, a branch of asymmetric cycles also ends where it meets the symmetric cycle.
+        A branch of asymmetric cycles also ends where it meets the symmetric cycle.
         """
-        points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
+        points, direction, step = [start], np.array([ahead, 0.0, 0.0]), continuation_settings.first_branch_step
         while len(points) <= continuation_settings.most_branch_steps:
             last = points[-1]
             target, states = continued(points[-3:], step, direction)
             point = self.solve(last, target, direction, states)
             moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
-            near = point is not None and 0 < length < (2 * step if len(points) > 1 else self.longest)
+            near = point is not None and 0 < length < (
+                2 * step if len(points) > 1 else continuation_settings.longest_branch_step
+            )
             ahead = float(moved @ direction) / length if near else 0.0
             if near and (ahead > 0 or len(points) == 1):
                 direction = moved / length
@@ -229,42 +191,32 @@ class Tracer:
             ):
                 step /= 3  # and along the direction estimated from the points
                 points[-1] = replace(last, jacobians=None)  # the old Jacobian may have misled the search
-                if step < self.shortest:
+                if step < continuation_settings.shortest_branch_step:
                     return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
             coarse = (
-                abs(point.multiplier - last.multiplier) > self.smooth
+                abs(point.multiplier - last.multiplier) > continuation_settings.multiplier_change_per_step
                 and abs(last.multiplier) < continuation_settings.steep_multiplier
             )
-            if coarse and step > self.first:
+            if coarse and step > continuation_settings.first_branch_step:
                 step /= 2
                 continue
-            if not 0 <= point.place <= self.farthest:
+            if not 0 <= point.place <= 1:
                 return [*points[1:], *self._at_the_end(last, point)], END_OF_RANGE
-            if until is None and self._is_mirrored(start, point):
+            if self._is_mirrored(start, point):
                 return points[1:], "it meets the symmetric cycle"
             points.append(point)
-            if until is not None and until(last, point):
-                return points[1:], REACHED
-            step = min(1.5 * step, self.longest)
+            step = min(1.5 * step, continuation_settings.longest_branch_step)
             if reason := self._stop(point):
                 return points[1:], reason
         return points[1:], "it was followed for as many steps as there may be"
-
-    def reaches(self, points: Sequence[Point], reason: str) -> bool:
-        """Tell whether a walk along a branch ended at the farthest place on the line of keys.
-
-        `points` and `reason` are what the walk returned. The result is false if it ended at the first place, or for
-        another reason.
-        """
-        return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
         """Return the cycle at the end of the range of places, as a list of one; empty if it fails.
 
         `last` is the last point inside the range, and `beyond` the first point outside.
         """
-        end = 0.0 if beyond.place < 0 else self.farthest
+        end = 0.0 if beyond.place < 0 else 1.0
         share = (end - last.place) / (beyond.place - last.place)
         terminal = self.solve(last, last.vector + share * (beyond.vector - last.vector), np.array([1.0, 0.0, 0.0]))
         return [terminal] if terminal else []
@@ -285,8 +237,8 @@ class Tracer:
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         if point.cycle.amplitude[0] < continuation_settings.vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
-        if abs(point.multiplier) > self.steepest:
-            return f"the cycle repels {self.steepest:g}-fold and more per return"
+        if abs(point.multiplier) > (steepest := continuation_settings.steepest_multiplier):
+            return f"the cycle repels {steepest:g}-fold and more per return"
         return ""
 
     def branch(self, start: Point) -> Branch:

@@ -29,17 +29,14 @@ ALONG_KEY = np.array([1.0, 0.0, 0.0])
 class LocatedPoint:
     """Point at which a branch loses or gains stability, by a flip, a fold or a torus (`kind`).
 
-    `direction` is the direction of the branch there. `error` is the error of the place, the position from 0 to 1 in the
-    key's range: the residual of the search plus the shift when computed at a hundredth of the tolerance. With a limiter
-    that chatters it is the error bound of a curve through orbits beside the point. `slope` is the change of the
-    multiplier along the direction, NaN where Newton's method did not need it.
+    `error` is the error of the place, the position from 0 to 1 in the key's range: the residual of the search plus the
+    shift when computed at a hundredth of the tolerance. With a limiter that chatters it is the error bound of a curve
+    through orbits beside the point.
     """
 
     kind: Bifurcation
     point: Point
-    direction: np.ndarray
     error: float
-    slope: float = np.nan
 
     def in_doubt(self, point: Point) -> bool:
         """Tell whether a cycle of the branch is so near this point that its stability is unknown.
@@ -93,18 +90,6 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
         return None
     nearest = min(points, key=lambda place: abs(distance_to(kind, points[place])))
     return _special_point(tracer, kind, points[nearest], direction, _slope(kind, points))
-
-
-def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
-    """Return the last stable cycle on a branch before a special point between two neighbours.
-
-    The cycle lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
-    closed.
-    """
-    points = _enclosed(tracer, first, second, kind, precise)
-    if points is None:
-        return None
-    return points[max(place for place, point in points.items() if abs(point.multiplier) < 1)]
 
 
 def towards(first: Point, second: Point) -> np.ndarray:
@@ -196,9 +181,9 @@ def _special_point(
         step = float(np.clip(step / slope, -most, most)) if slope else 0.0
         beside = _turning_point if kind == "fold" else _passed
         located = beside(tracer, kind, point, point.vector + step * direction, direction)
-        return located or LocatedPoint(kind, point, direction, np.inf, slope)
+        return located or LocatedPoint(kind, point, np.inf)
     point = replace(point, jacobians=None)  # its last row belongs to a plane, not to the special point
-    return LocatedPoint(kind, point, direction, tracer.shift(_at(kind), point), slope)
+    return LocatedPoint(kind, point, tracer.shift(_at(kind), point))
 
 
 def _passed(
@@ -218,7 +203,7 @@ def _passed(
         return None
     error = max(passed.reserve, abs(distance_to(kind, there) / passed.slope))
     within = error <= _reach(tracer, kind, passed.place)
-    return LocatedPoint(kind, there, direction, error, passed.slope * float(direction[0])) if within else None
+    return LocatedPoint(kind, there, error) if within else None
 
 
 def _turning_point(
@@ -242,7 +227,7 @@ def _turning_point(
     order = np.argsort(lengths)
     met = np.interp(-start / slope, lengths[order], places[order])
     error = max(at.reserve, 2 * abs(there.place - at.place), abs(float(met) - at.place))
-    return LocatedPoint(kind, there, direction, error, float(slope))
+    return LocatedPoint(kind, there, error)
 
 
 def _beside(tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray) -> list[Point]:
@@ -259,61 +244,6 @@ def _nearest(tracer: Tracer, orbits: Sequence[Point], target: np.ndarray, normal
     """Find the cycle on the plane through `target` with the `normal`, from the nearest of some orbits."""
     near = min(orbits, key=lambda point: float(np.linalg.norm(point.vector - target)))
     return tracer.solve(near, target, normal)
-
-
-def met(
-    tracer: Tracer,
-    near: LocatedPoint,
-    origin: np.ndarray,
-    direction: np.ndarray,
-    reach: float,
-    states: np.ndarray,
-) -> LocatedPoint | None:
-    """Find a special point on a line of keys, from the one `near` it.
-
-    Newton's method solves for the orbit and its multiplier together. `origin`, the guess, and `direction`, both (3,),
-    are in the space of place (0 to 1 along the line), log distance and log time. `states`, shape (1, states), lie near
-    the orbit. Returns None if there is no such point within `reach` of the origin along the direction.
-    """
-    point = tracer.meet(_at(near.kind), origin, direction, states, near.point)
-    if point is None or abs(float((point.vector - origin) @ direction)) > reach:
-        return None
-    return LocatedPoint(near.kind, point, direction, tracer.shift(_at(near.kind), point))
-
-
-def met_by_secants(
-    tracer: Tracer,
-    near: LocatedPoint,
-    origin: np.ndarray,
-    direction: np.ndarray,
-    reach: float,
-    states: np.ndarray,
-    slope: float,
-) -> LocatedPoint | None:
-    """Find a special point as `met` does, where a limiter chatters and multipliers scatter.
-
-    The secant method closes an orbit for every trial of the place, and ends where the scatter begins. `slope` is about
-    the change of the multiplier along the direction.
-    """
-    kind = near.kind
-    last_step = _last_step(tracer, kind, float(origin[0]))
-    places, points = [0.0], [tracer.solve(near.point, origin, direction, states)]
-    for _ in range(continuation_settings.special_point_tries):
-        if (latest := points[-1]) is None:
-            return None
-        if len(points) > 1:
-            slope = (distance_to(kind, latest) - distance_to(kind, points[-2])) / (places[-1] - places[-2])  # type: ignore[arg-type]
-        step, first = -distance_to(kind, latest) / slope if slope else np.inf, len(points) == 1
-        if abs(step) < last_step:
-            special = _special_point(tracer, kind, latest, direction, slope)
-            return special if np.isfinite(special.error) else None
-        if first and not last_step <= abs(step) <= reach:
-            step = max(continuation_settings.slope_step, last_step)
-        elif not abs(places[-1] + step) <= reach:
-            return None
-        places.append(places[-1] + step)
-        points.append(tracer.solve(latest, origin + places[-1] * direction, direction))
-    return None
 
 
 def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:

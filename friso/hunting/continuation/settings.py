@@ -48,34 +48,6 @@ class ContinuationSettings(Settings):
     least_cubic_values: int = setting(6, "")
     """Fewest values of a cubic whose scatter can be estimated."""
 
-    first_curve_step: float = setting(0.01, "ranges")
-    """First step along a curve. A longer one may lead to another curve."""
-
-    longest_curve_step: float = setting(0.05, "ranges")
-    """Longest step along a curve. Longer steps draw corners; shorter ones take more orbits."""
-
-    shortest_curve_step: float = setting(1e-3, "ranges")
-    """Shortest step along a curve, below which the curve is lost."""
-
-    second_point_distance: float = setting(1e-3, "ranges")
-    """Distance of a curve's second point, which gives its direction. Farther off it may lie on another curve."""
-
-    most_curve_steps: int = setting(400, "")
-    """Most steps along a curve, each of which is several orbits. A curve with more winds without end."""
-
-    curve_turn_per_step: float = setting(0.4, "rad")
-    """Largest turn of a curve per step. A sharper turn is a jump to another curve."""
-
-    aside_of_prediction: float = setting(0.7, "steps")
-    """Largest distance of a point to the side of its prediction. Farther off it belongs to another curve."""
-
-    grazing_sine: float = setting(0.2, "")
-    """Sine of the smallest angle between a line and the curve at which the multiplier's change across it can be used.
-    """
-
-    fold_search_depth: float = setting(0.5, "")
-    """Largest distance of a fold from its prediction, in logarithms of distance and time."""
-
     range_stages: int = setting(33, "")
     """Number of stages over the range from which branches start. Branches narrower than a step are missed; more stages
     take longer."""
@@ -108,13 +80,6 @@ class ContinuationSettings(Settings):
     grid_stages: int = setting(13, "")
     """Stages along each side of the grid of two keys. Curves between equal neighbours are missed; cost grows with the
     square."""
-
-    most_points_between: int = setting(60, "")
-    """Most points between two stages of the grid. A branch that winds longer rarely leads to a curve."""
-
-    explained_distance: float = setting(0.2, "steps of the grid")
-    """Distance within which a curve explains why two neighbours differ. If none is so near, another curve is looked
-    for."""
 
 
 continuation_settings = ContinuationSettings.live()

@@ -417,36 +417,18 @@ class _Following(_Shooting):
 class ConditionSearch(_Following):
     """Orbits on lines of keys, each followed to the place at which it meets a condition.
 
-    Newton's method solves for orbit, time and place together. It starts from approximate `orbits` and `places`, with
-    `jacobians` of orbits that meet the condition nearby, if known. Runs have the relative tolerance `rtol`. The last
-    row of a Jacobian has the derivatives of the condition along the branch of closed orbits. Across it, where orbits
-    are not closed, they are only learnt from the steps.
+    Newton's method solves for orbit, time and place together. It starts from approximate `orbits` and `places`. Runs
+    have the relative tolerance `rtol`. The last row of a Jacobian has the derivatives of the condition along the branch
+    of closed orbits. Across it, where orbits are not closed, they are only learnt from the steps.
     """
 
-    def __init__(
-        self,
-        condition: Condition,
-        family: Family,
-        orbits: Orbits,
-        places: np.ndarray,
-        rtol: float,
-        jacobians: np.ndarray | None = None,
-    ) -> None:
+    def __init__(self, condition: Condition, family: Family, orbits: Orbits, places: np.ndarray, rtol: float) -> None:
         super().__init__(family, orbits.states, orbits.times, orbits.sign, rtol, places)
-        self.condition, self.swings = condition, orbits.swings
+        self.condition = condition
         self.limit, self.finest = (
             tolerance_settings.closed_gap,
             tolerance_settings.gap_rtol_factor * tolerance_settings.closed_gap,
         )
-        if jacobians is not None:
-            self.jacobians = jacobians.copy()
-            self.inverses = [_inverse(jacobian) for jacobian in jacobians]
-            self.serves[:] = True
-
-    def closed(self) -> Followed:
-        """Return the orbits closed where they meet the condition, with their places and Jacobians."""
-        orbits = _iterated(self).orbits
-        return Followed(replace(orbits, swings=self.swings), self.best_places, self.best_jacobians)
 
     def moved(self) -> np.ndarray:
         """Return how far two Newton steps move the places, (count,), from orbits closed at another tolerance.

@@ -119,9 +119,12 @@ def _piece(places: np.ndarray, after: np.ndarray, begin: float, breaks: bool) ->
 
 
 def _merged(places: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the means of landings that are so near to each other that their slope is noise."""
-    first = [0]
-    while (end := int(places.searchsorted(places[first[-1]] + settings.merged_range_log, side="right"))) < len(places):
+    """Return the means of landings that are so near to each other that their slope is noise.
+
+    A narrow piece of the map keeps as many points as a cubic needs.
+    """
+    first, apart = [0], min(settings.merged_range_log, float(places[-1] - places[0]) / settings.fewest_fitted)
+    while (end := int(places.searchsorted(places[first[-1]] + apart, side="right"))) < len(places):
         first.append(end)
     number = np.diff([*first, len(places)])
     return np.add.reduceat(places, first) / number, np.add.reduceat(after, first) / number

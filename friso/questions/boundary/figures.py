@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from friso.hunting import Diagram, KeyRange, Plane
-from friso.questions.boundary.words import BASIN, MEANINGS, ShownKey, end_sentence
+from friso.questions.boundary.words import MEANINGS, ShownKey, end_sentence
 from friso.questions.map.words import QUIET, quantity
 from friso.questions.settings import boundary_figure_settings
 from friso.shown.drawing.figure import (
@@ -151,40 +151,15 @@ def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
 def _plane(traced: Plane) -> Figure:
     """Draw the curves on which hunting ends, and the verdicts at the nodes of the grid."""
     x, y = (_axis(swept, PLANE_MARGIN) for swept in traced.space.ranges)
-    curves = boundary.lines(traced)
-    basin = any(line.shape == "asymmetric" for line in curves)  # without one, the title names the edge
-    series = tuple(
-        Series(
-            line.at[:, 0],
-            line.at[:, 1],
-            {True: "edge of the basin", False: "edge of hunting" if basin else ""}[line.shape == "asymmetric"],
-            COLOURS[line.shape],
-            DASHES[line.kinds[0]],
-            2.2,
-        )
-        for line in curves
-    )
+    curves = boundary.curves(traced)
+    series = tuple(Series(curve.at[:, 0], curve.at[:, 1], "", INK, width=2.2) for curve in curves)
     across, up, verdicts = zip(*boundary.node_verdicts(traced), strict=True)
     codes = np.array([list(NODES).index(verdict) for verdict in verdicts], dtype=float)
     numbers = np.full(codes.shape, np.nan)
     nodes = Cloud(np.array(across), np.array(up), numbers, "", "", categories=tuple(NODES.values()), codes=codes)
-    kinds = dict.fromkeys(line.kinds[0] for line in curves)
-    meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
-    note = " ".join([*meanings, BASIN] if basin else meanings)
-    lost_ends = [end.at for end in boundary.curve_ends(traced) if end.kind == "lost"]
-    marks = (
-        *_marks([*boundary.lost_places(traced), *lost_ends], LOST, GREY, "cross"),
-        *_marks([end.mean(axis=0) for end in boundary.last_ends(traced)], "", VERMILLION, "circle"),
-    )
-    explained = {"circle": "Red: hunting ends here, by another swing."}
-    note = " ".join([note, *(explained[mark.symbol] for mark in marks if mark.symbol in explained)])
-    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, marks, clouds=(nodes,)),), note=note)
-
-
-def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, symbol: Symbol) -> tuple[Markers, ...]:
-    """Return marks at points in the plane of two keys [SI], shape (n, 2); nothing for no points."""
-    x, y = np.reshape(places, (-1, 2)).T
-    return (Markers(x, y, label, colour, symbol),) if x.size else ()
+    kinds = dict.fromkeys(kind for curve in curves for kind in curve.kinds if kind in MEANINGS)
+    note = " ".join(f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds)
+    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, clouds=(nodes,)),), note=note)
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:

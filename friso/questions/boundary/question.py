@@ -9,7 +9,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -176,27 +175,28 @@ def _figure(boundaries: BoundaryAnswer) -> Figure:
 def write_table(traced: Diagram | Plane, path: Path) -> None:
     """Write a CSV table with one row per point of a branch or curve.
 
-    Flips, folds and other special points also have a kind and an error.
+    Points of a curve, and flips, folds and other special points of a branch, also have a kind and an error.
     """
     import pandas as pd
 
     keys = [f"{swept.key} [{swept.unit}]" if swept.unit else swept.key for swept in traced.space.ranges]
-    header = ["line", "cycle", "kind", *keys, *(f"error of {key}" for key in keys)]
-    rows = [
-        row
-        for number, line in enumerate(lines(traced))
-        for row in zip(
-            repeat(number),
-            repeat(line.shape),
-            line.kinds,
-            *line.at.T,
-            *line.error.T,
-            line.amplitude,
-            line.period,
-            line.multiplier,
-        )
-    ]
-    table = pd.DataFrame(rows, columns=[*header, "amplitude [m]", "period [s]", "multiplier"])
+    errors, cycles = [f"error of {key}" for key in keys], ["amplitude [m]", "period [s]", "multiplier"]
+    if isinstance(traced, Diagram):
+        rows = [
+            (number, line.shape, *row)
+            for number, line in enumerate(lines(traced))
+            for row in zip(
+                line.kinds, *line.at.T, *line.error.T, line.amplitude, line.period, line.multiplier, strict=True
+            )
+        ]
+        table = pd.DataFrame(rows, columns=["line", "cycle", "kind", *keys, *errors, *cycles])
+    else:
+        rows = [
+            (number, *row)
+            for number, curve in enumerate(study.curves(traced))
+            for row in zip(curve.kinds, *curve.at.T, *curve.error.T, strict=True)
+        ]
+        table = pd.DataFrame(rows, columns=["line", "kind", *keys, *errors])
     table.to_csv(path, index=False)
 
 
@@ -251,27 +251,16 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     return {
         "x": entries(x, "key", "unit"),
         "y": entries(y, "key", "unit"),
-        "curves": [_curve(line, keys) for line in study.lines(traced)],
-        "ends": [
-            {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind}
-            for end in study.curve_ends(traced)
-        ],
-        "lost": _numbers(study.lost_places(traced), keys),
-        "beyond_curves": [
-            dict(zip(("hunts_at", "settles_at"), _numbers(end, keys), strict=True)) for end in study.last_ends(traced)
+        "curves": [
+            {
+                "points": _numbers(curve.at, keys),
+                "error": _numbers(curve.error, keys),
+                "kinds": list(curve.kinds),
+                "ends": list(curve.ends),
+            }
+            for curve in study.curves(traced)
         ],
         "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
-    }
-
-
-def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
-    """Return a curve in the plane of two keys, with the cycle along it."""
-    return {
-        "kind": line.kinds[0],
-        "cycle": line.shape,
-        "points": _numbers(line.at, keys),
-        "error": _numbers(line.error, keys),
-        **entries(line, "amplitude_m", "period_s", "ends"),
     }
 
 

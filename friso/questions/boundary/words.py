@@ -9,12 +9,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Plane, Space
+from friso.hunting import END_OF_RANGE, Diagram, KeyRange, LossKind, Plane, Space
 from friso.questions.map.words import friction_held
 from friso.shown.drawing.figure import Array
 from friso.shown.text import listed, pretty, swing_with_unit, with_unit
 from friso.studies import boundary
-from friso.studies.boundary import ATTRACTS, INVALID, REPELS, UNKNOWN, CycleShape, Line, PlaneEdge, StabilityChange
+from friso.studies.boundary import (
+    ATTRACTS,
+    INVALID,
+    REPELS,
+    UNKNOWN,
+    CycleShape,
+    Line,
+    PlaneCurve,
+    PlaneEdge,
+    StabilityChange,
+)
 
 VERDICTS = {
     ATTRACTS: "hunting is possible",
@@ -34,7 +44,6 @@ MEANINGS = {
     "torus": "it still exists, but motions spiral away from it",
 }
 """State of a cycle on the other side of a special point."""
-BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 
 PLAIN_ERROR = 1e-5
@@ -143,14 +152,13 @@ def _in_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Say where in the plane of two keys hunting is possible, and along which curves it begins or ends."""
     if edge := boundary.plane_edge(traced):
         return [_along_one(edge, keys)]
-    corners, curves = _hunting_corners(traced, keys), boundary.lines(traced)
+    corners, curves = _hunting_corners(traced, keys), boundary.curves(traced)
     if curves:
-        longest = max(range(len(curves)), key=lambda number: len(curves[number].at))
         more = len(curves) - 1
         rest = [f"There {'are' if more > 1 else 'is'} {more} more curve{'s' if more > 1 else ''}."] if more else []
-        return [corners, f"{_course(traced, longest, keys, END_DIGITS)}.", *(_beyond_curves(traced) or rest)]
-    if traced.gaps or UNKNOWN in [verdict for _, _, verdict in boundary.corner_verdicts(traced)]:
-        return [corners, "No curve could be followed."]
+        return [corners, f"{_course(curves[0], keys, END_DIGITS)}.", *rest]
+    if UNKNOWN in [verdict for _, _, verdict in boundary.corner_verdicts(traced)]:
+        return [corners]
     return [corners, _no_boundary(traced.space, keys)]
 
 
@@ -178,13 +186,6 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
     return f"{answer}{between}; {other}, none was found."
 
 
-def _beyond_curves(traced: Plane) -> list[str]:
-    """Say that hunting goes on beyond the curves, by another cycle or swing; empty if it does not."""
-    count = len(boundary.last_ends(traced))
-    places = f"{count} place{'s' if count > 1 else ''} where the grid was searched"
-    return [f"Beyond the curves another cycle or swing goes on hunting, at {places}."] if count else []
-
-
 def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
     """Say at which corners of the plane hunting is possible."""
     corners = boundary.corner_verdicts(traced)
@@ -196,28 +197,20 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
     return f"Of the corners of the plane, hunting is possible at {'; '.join(hunting)}{others}."
 
 
-def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Say from which point to which a curve of a plane runs, and how it ends there.
-
-    `number` is the index of the curve. Values have `digits` digits.
-    """
-    line, ends = (
-        boundary.lines(traced)[number],
-        [end for end in boundary.curve_ends(traced) if end.line == number],
-    )
-    name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
-    start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
-    first, last = (end.kind for end in ends)
+def _course(curve: PlaneCurve, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
+    """Say from which point to which a curve of a plane runs, and how it ends there; values have `digits` digits."""
+    start, stop = (_place(at.tolist(), keys, digits) for at in curve.at[[0, -1]])
+    first, last = curve.ends
     if first == "closed":
-        return f"{name} in a ring through {start}"
+        return f"The edge of hunting runs in a ring through {start}"
     if first == last:
-        return f"{name} from {start} to {stop}; at both, {ENDS[first]}"
-    return f"{name} from {start}, where {ENDS[first]}, to {stop}, where {ENDS[last]}"
+        return f"The edge of hunting runs from {start} to {stop}; at both, {ENDS[first]}"
+    return f"The edge of hunting runs from {start}, where {ENDS[first]}, to {stop}, where {ENDS[last]}"
 
 
 ENDS = {
     "range": "the range ends",
-    "lost": "its cycle could not be followed farther",
+    "lost": "stages are invalid or unknown",
 }
 """Ways in which a curve of the plane ends, in words."""
 
@@ -316,23 +309,27 @@ def end_sentence(traced: Diagram, key: ShownKey) -> str:
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Describe each curve in the plane of two keys, and the corners."""
-    curves = boundary.lines(traced)
-    text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
-    text += [
-        f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
-    ]
-    text += [BASIN] if any(line.shape == "asymmetric" for line in curves) else []
-    return [*text, *_corners(traced, keys), *_untraced(traced, keys)]
+    curves = boundary.curves(traced)
+    text = [f"{_course(curve, keys)} ({_accuracy(curve, keys)})." for curve in curves]
+    kinds = dict.fromkeys(kind for curve in curves for kind in curve.kinds if kind in MEANINGS)
+    return [*text, *(f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in kinds), *_corners(traced, keys)]
 
 
-def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
-    """Say how many points a curve has, and how large their errors are at most."""
-    finite = line.error[np.isfinite(line.error).all(axis=1)]
-    errors = ", ".join(key.text(error, 1) for key, error in zip(keys, finite.max(axis=0, initial=0.0), strict=True))
-    unknown = len(line.error) - len(finite)
-    errors_at = [f"largest error: {errors}"] if len(finite) else []
-    errors_at += [f"error unknown at {unknown} of the points"] if unknown else []
-    return f"{len(line.at)} points, {', '.join(errors_at)}"
+def _accuracy(curve: PlaneCurve, keys: tuple[ShownKey, ...]) -> str:
+    """Say how many points a curve has of each kind, and how far apart the stages beside it are at most."""
+    kinds = [f"{curve.kinds.count(kind)} by {KINDS[kind]}" for kind in dict.fromkeys(curve.kinds)]
+    errors = ", ".join(key.text(error, 1) for key, error in zip(keys, curve.error.max(axis=0), strict=True))
+    return f"{len(curve.at)} points, {', '.join(kinds)}; largest error: {errors}"
+
+
+KINDS: dict[LossKind, str] = {
+    "flip": "a flip",
+    "fold": "a fold",
+    "torus": "a torus",
+    "lost": "the end of the cycle",
+    "seen": "simulation",
+}
+"""What ends hunting at points of a curve, in words."""
 
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -341,15 +338,6 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     if len({verdict for _, _, verdict in corners}) == 1:
         return [f"At all four corners: {VERDICTS[corners[0][2]]}."]
     return [f"At {_place((x, y), keys)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
-
-
-def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say near which points hunting changes although no curve could be followed from there.
-
-    The list is empty if there are no such points.
-    """
-    places = [_place(values, keys) for values in boundary.lost_places(traced).tolist()]
-    return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 
 def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6) -> str:

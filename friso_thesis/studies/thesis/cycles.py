@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting import Bifurcation, KeyRange, Space, edge_curves
+from friso.hunting import KeyRange, Space, plane
 from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
 from friso_thesis.studies.thesis.claims import by_attraction, by_peak_count
@@ -34,12 +34,8 @@ SMALLEST_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class Edge:
-    """A curve in a map of two keys on which a cycle stops attracting.
+    """A curve in a map of two keys on which hunting ends: its points [SI] along both axes, shape (points,) each."""
 
-    The curve has a kind, and its points [SI] along the two axes of the map, shape (points,) each.
-    """
-
-    kind: Bifurcation
     x: np.ndarray
     y: np.ndarray
 
@@ -113,7 +109,7 @@ def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: K
     The survey of what attracts is also compared with the peaks counted in the runs.
     """
     ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
-    about = ("edges of hunting", runs.attrs["stage"], runs.attrs["links"], ends)
+    about = ("curves on which hunting ends", runs.attrs["stage"], runs.attrs["links"], ends)
     arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))
     return CyclesOnMap(_from_arrays(arrays), _comparison(surveyed))
 
@@ -124,8 +120,8 @@ def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
 
 
 def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
-    whole = ({key: arrays[f"{n}.{key}"] for key in ("kind", "x", "y")} for n in range(len(arrays) // 3))
-    return tuple(Edge(cast("Bifurcation", str(edge["kind"])), edge["x"], edge["y"]) for edge in whole)
+    whole = ({key: arrays[f"{n}.{key}"] for key in ("x", "y")} for n in range(len(arrays) // 2))
+    return tuple(Edge(**edge) for edge in whole)
 
 
 def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
@@ -170,7 +166,7 @@ def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
 
 
 def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
-    """Return the curves over a map on which cycles stop attracting.
+    """Return the curves over a map on which hunting ends.
 
     There are none if the axes belong to the motion, which does not affect them.
     """
@@ -179,10 +175,9 @@ def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
     source = study_of(runs)
     ranges = tuple(_range(runs[span.key].values, span.key, span.log) for span in study.spans)
     space = Space(ranges, lambda values: flat_cells(source.stage, source.links, values))
-    curves = edge_curves(space, nodes=CURVE_NODES)
-    lines = [space.values(curve.points) for curve in curves]
+    lines = (space.values(curve.points) for curve in plane(space, nodes=CURVE_NODES).curves)
     x, y = (swept.key for swept in ranges)
-    return tuple(Edge(curve.kind, line[x], line[y]) for curve, line in zip(curves, lines, strict=True))
+    return tuple(Edge(line[x], line[y]) for line in lines)
 
 
 def _range(values: np.ndarray, key: str, log: bool) -> KeyRange:
