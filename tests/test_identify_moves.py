@@ -354,7 +354,8 @@ def sound() -> Log:
 def test_no_effect_is_seen_where_there_is_none(sound: Log) -> None:
     case = fit_case(sound, *rigid(sound))
     assert case.leading is None
-    assert not [raised for doubt in (forces, forces, delay) for raised in doubt.find(case)]
+    finders = (forces.find_coupling, forces.find_load_friction, delay.find_delay)
+    assert not [raised for find in finders for raised in find(case)]
     assert not [*DOUBTS["force-digits"].find(RecordCase(sound, inverse_model(sound)))]
 
 
@@ -621,4 +622,4 @@ def on_bristles(rate: float, step: float, seconds: float) -> Log:
 def test_what_friction_does_at_the_reversals_of_a_sine_is_no_delay_and_no_coupling(rate: float, step: float) -> None:
     """Delays of 4 to 100 ms were named, and a coupling that changed the mass infinitely."""
     case = fit_case(log := on_bristles(rate, step, 20.0), *rigid(log), led=False)
-    assert not "".join(one.words for doubt in (delay, forces) for one in doubt.find(case))
+    assert not "".join(one.words for find in (delay.find_delay, forces.find_coupling) for one in find(case))
