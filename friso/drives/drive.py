@@ -78,7 +78,7 @@ class AxisParameters:
         return bool(entry)
 
     def refuse_negative(self, names: Iterable[str]) -> None:
-        """Raise InputError for the first of some gains that is below 0."""
+        """Refuse the first of some gains that is below 0. Raises InputError."""
         for name in names:
             if (gain := self.number(name, 0.0)) < 0:
                 raise InputError(name, f"{gain:g}", "a gain of 0 or more", f"{name} = 10")
