@@ -38,7 +38,7 @@ from friso.hunting import (
 from friso.hunting.attractors import starts
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.basin import ends_in, swings_seldom
-from friso.hunting.cycle.rest import bent
+from friso.hunting.cycle.ensemble import bent
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import run_motions
 from friso.hunting.settings import CheckSettings

@@ -19,7 +19,7 @@ from friso.hunting import (
     find_swings,
     plane,
 )
-from friso.hunting.continuation.crossing import turn
+from friso.hunting.continuation.locate import turn
 from friso.studies.boundary import stability_changes
 
 pytestmark = pytest.mark.xdist_group("rigid")

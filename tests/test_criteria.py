@@ -57,7 +57,7 @@ def one(end: End, k: int) -> End:
 
 @given(st.tuples(*[st.booleans()] * 5))
 def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool, bool]) -> None:
-    """The table of `friso.hunting.criteria.stage_verdict` is tested entry by entry."""
+    """The table of `friso.hunting.criteria.run_outcome` is tested entry by entry."""
     completed, decided, attracts, in_cycle, rests = facts
     sure = completed and decided
     (word,) = verdicts(*(np.array([flag]) for flag in facts))

@@ -5,7 +5,7 @@ import pytest
 
 import friso
 from friso.hunting import StickSlipSpeeds, is_moved_evenly
-from friso.hunting.sliding import stick_slip
+from friso.hunting.tracking import stick_slip
 from friso.shown.motion_words import stick_slip_sentences
 from friso.stage import Stage
 

@@ -4,7 +4,6 @@ They may also import from `friso.hunting.criteria` and `friso.hunting.measures`.
 change.
 """
 
-from friso.hunting.advice import BandwidthAdvice, advised
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt, moves_that_hunt, pushes_that_hunt
@@ -23,14 +22,11 @@ from friso.hunting.boundary import (
     plane,
 )
 from friso.hunting.cases import LONG_RUN_RTOL, Case, Solver, check, check_given, needed_kernels
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, find_cycles
-from friso.hunting.cycle.hunting import DITHERS, Cycle, Hunting, Swing, cannot_hunt, hunting
-from friso.hunting.cycle.multipliers import Multipliers, multipliers
-from friso.hunting.cycle.rest import stuck, wait
-from friso.hunting.cycle.return_map import ReturnMap
+from friso.hunting.cycle.ensemble import Ensemble, stuck, wait
+from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, Multipliers, find_cycles, multipliers
+from friso.hunting.cycle.guess import ReturnMap
+from friso.hunting.cycle.hunting import DITHERS, Cycle, Hunting, HuntingDoubt, Swing, cannot_hunt, hunting
 from friso.hunting.cycle.shooting import Orbits
-from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.feeding import Decline, Feeding
 from friso.hunting.loop import LoopState, LowerGains, unstable
 from friso.hunting.many_stages import (
@@ -46,12 +42,19 @@ from friso.hunting.many_stages import (
 )
 from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions, rests_off
-from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind
+from friso.hunting.path import MORE_WORK, SEARCH_LIMITS, AttractionEnd, BandwidthWindow, LossKind
 from friso.hunting.return_map.settings import ReturnMapSettings
-from friso.hunting.search_limits import MORE_WORK, SEARCH_LIMITS
-from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, lasting_swings
-from friso.hunting.stage_margins import ParameterMargin, joint_margins
-from friso.hunting.tracking import Dwell, Tracking, dwells, dwells_of_trace, tracking
+from friso.hunting.stage_margins import BandwidthAdvice, ParameterMargin, advised, joint_margins
+from friso.hunting.tracking import (
+    Dwell,
+    StickSlipSpeeds,
+    Tracking,
+    dwells,
+    dwells_of_trace,
+    is_moved_evenly,
+    lasting_swings,
+    tracking,
+)
 from friso.hunting.verdict import CheckPart, Judgement
 
 __all__ = [

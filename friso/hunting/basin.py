@@ -16,13 +16,12 @@ from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.rounds import SURVEY_RTOL, TIGHT_SURVEY_RTOL, typical_period
 from friso.hunting.criteria.run_outcome import lasts
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import pushed
+from friso.hunting.cycle.ensemble import Ensemble, pushed
 from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of
-from friso.hunting.return_map.fates import motions_go_on
+from friso.hunting.path import SEARCH_LIMITS
+from friso.hunting.return_map.attracting import motions_go_on
 from friso.hunting.return_map.landing_map import LandingMap
-from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import basin_settings
 from friso.intervals import share_interval
 from friso.stage import Stage

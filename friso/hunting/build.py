@@ -12,7 +12,7 @@ from friso.engine.cache import keep
 from friso.engine.machine_code import object_code
 from friso.engine.scalar_code import scalar_llvm
 from friso.hunting import turning
-from friso.hunting.turns import KINDS
+from friso.hunting.turning import KINDS
 
 
 def build(folder: Path, task: bytes) -> str:

@@ -16,7 +16,6 @@ from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.engine.side_by_side import side_by_side
 from friso.equations.motion import size, stands
 from friso.equations.structure import structure
-from friso.hunting.advice import BandwidthAdvice, advised
 from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
@@ -28,9 +27,8 @@ from friso.hunting.measures import bands_of, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.path import BandwidthWindow
 from friso.hunting.settings import ToleranceSettings, check_settings
-from friso.hunting.sliding import StickSlipSpeeds, is_moved_evenly, stick_slip
-from friso.hunting.stage_margins import ParameterMargin, friction_margin
-from friso.hunting.tracking import Dwell, Tracking, dwells, tracking
+from friso.hunting.stage_margins import BandwidthAdvice, ParameterMargin, advised, friction_margin
+from friso.hunting.tracking import Dwell, StickSlipSpeeds, Tracking, dwells, is_moved_evenly, stick_slip, tracking
 from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
@@ -66,7 +64,7 @@ class Case:
       quarter.
     - `bands` [m]: about the reference, into which it settles (see `friso.hunting.measures.bands_of`).
     - `settling_time`: for each of them, the time [s] to settle wherever the reference stands (None: it does not
-      settle; see `friso.hunting.criteria.settling`); `in_the_end`: at the last of these places.
+      settle; see `friso.hunting.criteria.run_outcome`); `in_the_end`: at the last of these places.
     - `largest_force` [N]: of the actuator; `breakaway` [N]: the smallest actuator force, beside constant forces, that
       may move the stage. A motion with less force leaves a stage without a free joint `unmoved`.
     - `force_limit` [N]: the controller's limit, if it holds the stage off its reference (None: it does not).

@@ -19,7 +19,7 @@ from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.criteria import verdicts
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.ensemble import ArrayRows, Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.cycle.hunting import surely_surveyed, why_not
 from friso.hunting.loop import unstable_among, winds_up_at_a_limit
@@ -33,7 +33,6 @@ from friso.hunting.motions import (
     run_motions,
     some_of,
 )
-from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import check_settings
 from friso.hunting.what_attracts import surveyed_roughly
 

@@ -9,12 +9,10 @@ import numpy as np
 from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.ensemble import Ensemble, spans
 from friso.hunting.loop import unstable_among
-from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind, ParameterPath, bandwidth_path
+from friso.hunting.path import SEARCH_LIMITS, AttractionEnd, BandwidthWindow, LossKind, ParameterPath, bandwidth_path
 from friso.hunting.path_search import PathSearch
-from friso.hunting.rows import spans
-from friso.hunting.search_limits import SEARCH_LIMITS
 from friso.hunting.settings import check_settings
 from friso.stage import Stage
 

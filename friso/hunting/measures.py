@@ -16,10 +16,26 @@ from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import Stand, ends_evenly, last_corner, last_part, stands
 from friso.equations.structure import structure
-from friso.hunting.criteria.run_outcome import REST_BAND, End, end_of_traces, last_outside, outcomes, swings_on
-from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
-from friso.hunting.turning import COUNTED_AFTER, LAST_HALF, LAST_QUARTER, LEAST_VALLEY_DEPTH, zigzag
-from friso.hunting.turns import Turns, scan_turning_points
+from friso.hunting.criteria.run_outcome import (
+    REST_BAND,
+    End,
+    end_of_traces,
+    last_outside,
+    outcomes,
+    settling_in_the_end,
+    settling_of_runs,
+    settling_of_traces,
+    swings_on,
+)
+from friso.hunting.turning import (
+    COUNTED_AFTER,
+    LAST_HALF,
+    LAST_QUARTER,
+    LEAST_VALLEY_DEPTH,
+    Turns,
+    scan_turning_points,
+    zigzag,
+)
 from friso.stage import Stage
 from friso.stage.controllers import dead_band
 
@@ -73,7 +89,7 @@ class Measures:
     - `peak_to_peak` [m], `offset` [m] of the middle between the extremes, and `period` [s] of the last quarter (NaN: no
       swing, or one that dies out).
     - `settling_time` [s]: until the deviation stays within each of `bands`, wherever the reference stands;
-      `in_the_end`: at the last of these places (NaN: not within the run; see `friso.hunting.criteria.settling`).
+      `in_the_end`: at the last of these places (NaN: not within the run; see `friso.hunting.criteria.run_outcome`).
     - `outcome`: words of `friso.hunting.criteria.run_outcome`.
     - `largest_force` [N]: of the actuator.
     - `status`, `steps` attempted and `rejected`: of the solver.

@@ -17,10 +17,8 @@ from friso.equations.structure import shared_structure
 from friso.hunting.attractors.rounds import loose_from
 from friso.hunting.attractors.settings import settings
 from friso.hunting.criteria import COUNTED_ABOVE, lasts
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import wait
+from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, wait
 from friso.hunting.measures import Measures, measure_runs, measuring_options, swing_of
-from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import check_settings
 from friso.hunting.turning import LAST_HALF, LAST_QUARTER
 

@@ -28,17 +28,16 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import (
     Cycle,
     Hunting,
+    HuntingDoubt,
     Swing,
     cannot_hunt,
     hunting,
 )
-from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.loop import leaves_for_good, may_run_away
 from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, bands_of, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
-from friso.hunting.path import AttractionEnd, BandwidthWindow
-from friso.hunting.search_limits import SEARCH_LIMITS
+from friso.hunting.path import SEARCH_LIMITS, AttractionEnd, BandwidthWindow
 from friso.hunting.settings import basin_settings, check_settings
 from friso.hunting.what_attracts import resolved_map
 from friso.stage import Stage
@@ -80,7 +79,7 @@ PARTS = CheckPart.ATTRACTION, CheckPart.STARTS, CheckPart.BANDWIDTHS
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict (see `friso.hunting.criteria.stage_verdict`) and the results behind it.
+    """The verdict (see `friso.hunting.criteria.run_outcome`) and the results behind it.
 
     - `displacement`, `push`, `moves`: starts of hunting, for a stage that has a stable cycle.
     - `margin`: edge of hunting in bandwidth; `windows`: other bandwidths at which the stage hunts.

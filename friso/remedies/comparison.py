@@ -66,8 +66,9 @@ class MachineMeasures(ArrayColumns):
     """Measures of the runs of machines, arrays of shape (count,).
 
     `outcome` are words of `friso.hunting.criteria.run_outcome`, with the tolerance as band. `settling` [s] is the
-    longest time to settle at a place (`friso.hunting.criteria.settling`). `force` [N] is the largest one, and `error`
-    [m] the largest deviation in the last quarter of the run. Numbers that are unknown, or never reached, are infinite.
+    longest time to settle at a place (`friso.hunting.criteria.run_outcome`). `force` [N] is the largest one, and
+    `error` [m] the largest deviation in the last quarter of the run. Numbers that are unknown, or never reached, are
+    infinite.
     """
 
     outcome: np.ndarray

@@ -44,9 +44,9 @@ by at most a thousandth, usually by a tenth of that."""
 class Moves(ArrayColumns):
     """Moves of points on machines, all arrays of shape (points, machines).
 
-    `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`), and
-    `looser` [s] the time for the looser tolerance. Both are infinite if the stage is not in position when the reference
-    moves on or the run ends. `force` [N] is the largest force.
+    `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.run_outcome`),
+    and `looser` [s] the time for the looser tolerance. Both are infinite if the stage is not in position when the
+    reference moves on or the run ends. `force` [N] is the largest force.
     """
 
     settling: np.ndarray

@@ -16,10 +16,9 @@ from friso.hunting.attractors.rounds import TIGHT_SURVEY_RTOL, typical_period
 from friso.hunting.attractors.settings import settings
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Repelling, Survey, Swinging
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.ensemble import ArrayRows, Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, families
 from friso.hunting.loop import surely_run_away
-from friso.hunting.rows import ArrayRows
 
 
 @dataclass(frozen=True)

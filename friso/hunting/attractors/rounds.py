@@ -1,4 +1,11 @@
-"""Run stages in rounds, each longer than the last, until they rest or repeat themselves."""
+"""Rounds of runs that are followed to their attractors: whether they repeat, and the orbits they close.
+
+Detect whether swings repeat themselves: after how many swings, and after what time.
+
+Run stages in rounds, each longer than the last, until they rest or repeat themselves.
+
+Close orbits from runs that repeat themselves, after any number of swings.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +15,90 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS, Status
 from friso.engine.settings import room_settings
-from friso.hunting.attractors.recurrence import Recurrence, recurrence
+from friso.hunting.attractors.settings import settings
 from friso.hunting.attractors.settings import settings as survey_settings
-from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.find import GUESS_RTOL
-from friso.hunting.cycle.rest import wait
-from friso.hunting.cycle.return_map import trace_returns
+from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, done, wait
+from friso.hunting.cycle.find import GUESS_RTOL, Cycles, described
+from friso.hunting.cycle.guess import last_swings, trace_returns
 from friso.hunting.cycle.settings import settings as orbit_settings
-from friso.hunting.cycle.swings import last_swings
-from friso.hunting.rows import ArrayRows
+from friso.hunting.cycle.shooting import Orbits, close
 from friso.hunting.settings import ToleranceSettings
+
+
+@dataclass(frozen=True)
+class Recurrence(ArrayRows):
+    """Whether and how runs repeat themselves, arrays of shape (runs,).
+
+    - `swings`: smallest number of swings after which a run repeats (0: it does not); `time` [s]: how long they take.
+    - `better`, `better_time` [s]: likewise for a larger number of swings that repeats much more closely, if there is
+      one.
+    - `size` [m]: peak-to-peak deviation, about its `middle` [m]; `deviation`: error of the repetition after `better`
+      swings, over `size`.
+    - `earlier`: this error, computed some swings earlier (NaN: too few swings).
+    - `mean` [m]: mean size of single swings.
+
+    Times and errors are NaN for a run that does not repeat.
+    """
+
+    swings: np.ndarray
+    time: np.ndarray
+    better: np.ndarray
+    better_time: np.ndarray
+    size: np.ndarray
+    deviation: np.ndarray
+    earlier: np.ndarray
+    mean: np.ndarray
+    middle: np.ndarray
+
+
+@np.errstate(all="ignore")  # swings that a run does not have are NaN
+def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> Recurrence:
+    """Detect how the last swings of runs repeat.
+
+    `values` [m] and `times` [s] are the turning points, shape (runs, swings), the last in the last column, NaN before
+    the first. Where `mirrored`, shape (runs,), a motion may also repeat as its mirror image, after an odd number of
+    swings.
+    """
+    runs, room = values.shape
+    legs = np.abs(np.diff(values, axis=1))
+    mean = np.nansum(legs, axis=1) / np.maximum(np.isfinite(legs).sum(axis=1), 1)
+    finite = np.isfinite(values)
+    high = np.max(values, axis=1, initial=-np.inf, where=finite)
+    low = np.min(values, axis=1, initial=np.inf, where=finite)
+    size, middle = high - low, (high + low) / 2
+    swings, better = np.zeros(runs, np.int64), np.zeros(runs, np.int64)
+    time, better_time, least, earlier = (np.full(runs, np.nan) for _ in range(4))
+    for n in range(1, settings.most_repeating_swings + 1):
+        compared = _compared(n)
+        if room < compared + n:
+            break
+        deviations = _deviation(values, n, room) / size
+        takes = (times[:, room - compared :] - times[:, room - compared - n : room - n]).mean(axis=1)
+        same = (deviations <= settings.repeated_swing_share) & (mirrored | (n % 2 == 0))
+        first = same & (swings == 0)
+        swings[first], time[first] = n, takes[first]
+        closer = first | (same & (deviations < settings.closer_repetition_share * least))
+        better[closer], better_time[closer], least[closer] = n, takes[closer], deviations[closer]
+        if room - settings.compared_swings >= compared + n:
+            earlier[closer] = (_deviation(values, n, room - settings.compared_swings) / size)[closer]
+    return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, earlier, mean, middle)
+
+
+def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
+    """Return how far the last turning points are from those `swings` earlier [m], shape (runs,).
+
+    After an odd number of swings they are compared with mirror images. `values` [m], shape (runs, swings), are the
+    turning points. The last are those before column `end`, and the largest difference counts.
+    """
+    compared = _compared(swings)
+    last, before = values[:, end - compared : end], values[:, end - compared - swings : end - swings]
+    return np.asarray(np.abs(last - (-1) ** swings * before).max(axis=1))
+
+
+def _compared(swings: int) -> int:
+    """Return how many swings to compare with earlier ones to detect a repetition after `swings`."""
+    return max(swings, 4)
+
 
 SURVEY_RTOL = ToleranceSettings().survey_rtol
 TIGHT_SURVEY_RTOL = ToleranceSettings().tight_survey_rtol
@@ -157,3 +238,108 @@ def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
         ),
     )
     return replace(runs, durations=np.maximum(survey_settings.next_round_factor * runs.durations, least))
+
+
+def close_orbits(
+    runs: Pending, swings: np.ndarray, times: np.ndarray, sizes: np.ndarray, rtol: float
+) -> list[tuple[np.ndarray, Cycles]]:
+    """Close an orbit near each run that repeats itself, by Newton's method.
+
+    Run k repeats after `swings[k]` swings and `times[k]` [s]; `sizes[k]` [m] is its peak-to-peak deviation, each of
+    shape (runs,). Returns groups of runs with equal numbers of swings: the numbers of the runs, and their cycles. A
+    cycle is not `closed` where no orbit of the run's size was reached. An orbit that passes through a simpler one
+    several times is replaced by the simpler one.
+    """
+    states = _where_they_stick(runs, times)
+    parts = []
+
+    def close_from(group: np.ndarray, starts: np.ndarray, times: np.ndarray, n: int) -> Cycles:
+        """Close orbits of `n` swings for the runs with the numbers `group`.
+
+        `starts`, shape (group, states), are states near the orbits, and `times` [s] the approximate times of return.
+        """
+        sign = -1.0 if n % 2 else 1.0
+        stages = runs.stages.take(group)
+        if sign < 0:
+            starts = starts * np.sign(starts[:, stages.sticking])[:, None]
+        cycles = described(stages, close(stages, starts, times, sign, rtol, n), rtol)
+        cycles.closed[~(np.abs(2 * cycles.amplitude / sizes[group] - 1) < settings.closed_swing_share)] = False
+        parts.append((group, cycles))
+        return cycles
+
+    for n in np.unique(swings).tolist():
+        group = np.flatnonzero(swings == n)
+        cycles = close_from(group, states[group], times[group], n)
+        for fewer in (m for m in range(1, n) if n % m == 0):
+            which = np.flatnonzero(cycles.closed & (runs.mirrored[group] | (fewer % 2 == 0)))
+            which = which[_repeat_after(runs.stages.take(group[which]), cycles.orbits.take(which), fewer, rtol)]
+            if which.size:
+                orbits = cycles.orbits.take(which)
+                once = close_from(group[which], orbits.states, orbits.times * fewer / n, fewer)
+                once.closed[~_alike(once.orbits, orbits, n / fewer, runs.stages.sticking)] = False
+                cycles.closed[which] &= ~once.closed
+    return parts
+
+
+def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
+    """Return which closed orbits, shape (count,), only repeat a simpler orbit of `fewer` swings.
+
+    After `fewer` swings, such an orbit is back at the state in which the stage sticks. If `fewer` is odd, it is back at
+    the mirror image of that state.
+    """
+    if not stages.count:
+        return np.zeros(0, bool)
+    ends = stages.run(orbits.states, orbits.times * fewer / orbits.swings, rtol).ends[:, stages.sticking]
+    sign, sticks = -1.0 if fewer % 2 else 1.0, orbits.states[:, stages.sticking]
+    return np.abs(sign * ends - sticks) < settings.repeated_orbit_share * np.abs(sticks)
+
+
+def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
+    """Return which orbits, shape (count,), only repeat the simpler orbit `once`, `passes` times.
+
+    Compared are the sticking distance, in the state numbered `sticking`, and the time of return.
+    """
+    distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
+    return (np.abs(distances - 1) < settings.repeated_orbit_share) & (
+        np.abs(passes * once.times / orbits.times - 1) < settings.repeated_orbit_share
+    )
+
+
+def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
+    """Return a state in which each run sticks, (runs, states), within twice the `times` [s].
+
+    At this instant the integrator balances the constant forces on a stage at rest. If there are several such instants,
+    the one after the longest standstill is taken; if there is none, the state at the start. `pending` are the runs, and
+    `times` has the shape (runs,).
+    """
+    stages, size = pending.stages, len(pending.stages.kernel.states)
+    numbers, ahead = np.arange(stages.count), np.zeros(stages.count)
+    octave = np.round(np.log2(times))  # runs of about the same length are sampled together
+    for group in (numbers[octave == n] for n in np.unique(octave)):
+        runs, step = pending.take(group), float(times[group].min()) / settings.samples_per_repetition
+        paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step).samples
+        for k, path in zip(group, paths, strict=True):
+            residuals = stages.unbalanced(path, k)
+            ahead[k] = step * _balanced(residuals, path[:, stages.sticking])
+    return stages.run(pending.states, np.maximum(ahead, 1e-9 * times), pending.rtol).ends[:, :size]
+
+
+def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
+    """Return at which sample, with a fraction, the integrator balances the constant forces.
+
+    At this sample `residuals`, their imbalance, passes zero. Among several such samples, the one with the longest
+    standstill before it counts; 0 is returned if there is none. `place` [m] is the position that sticks. Both arrays
+    have the shape (samples,).
+    """
+    if not np.isfinite(place).any():  # the run failed
+        return 0.0
+    standing = np.abs(np.diff(place)) < settings.still_move_share * np.nanmax(
+        place
+    ) - settings.still_move_share * np.nanmin(place)
+    moves = np.where(~standing, np.arange(len(standing)), -1)
+    stood = np.arange(len(standing)) - np.maximum.accumulate(moves)
+    crossed = np.flatnonzero((residuals[:-1] * residuals[1:] <= 0) & np.isfinite(residuals[1:]))
+    if not crossed.size:
+        return 0.0
+    j = crossed[stood[crossed].argmax()]
+    return float(j + residuals[j] / (residuals[j] - residuals[j + 1]))

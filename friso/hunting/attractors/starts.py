@@ -8,9 +8,8 @@ import numpy as np
 
 from friso.hunting.attractors.rounds import SURVEY_RTOL, Pending, loose_from, typical_period
 from friso.hunting.attractors.settings import settings
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.ensemble import Ensemble, bent, pushed, spread_over, stuck
 from friso.hunting.cycle.find import Cycles
-from friso.hunting.cycle.rest import bent, pushed, spread_over, stuck
 from friso.stage.controllers import FORCE_LIMIT
 
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from friso.hunting.attractors.closing import close_orbits
-from friso.hunting.attractors.recurrence import Recurrence
-from friso.hunting.attractors.rounds import Ends, Pending, lengthened, one_round
+from friso.hunting.attractors.rounds import Ends, Pending, Recurrence, close_orbits, lengthened, one_round
 from friso.hunting.attractors.settings import settings
+from friso.hunting.cycle.ensemble import ArrayRows
 from friso.hunting.cycle.find import Cycles
-from friso.hunting.rows import ArrayRows
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ from friso.hunting.boundary.space import Space
 from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.loop import unstable_among
-from friso.hunting.orbit_line import OrbitLine
-from friso.hunting.path import LossKind, ParameterPath
+from friso.hunting.path import LossKind, OrbitLine, ParameterPath
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import sketched, surveyed_roughly, what_attracts
 from friso.progress import Progress, Tally, silent

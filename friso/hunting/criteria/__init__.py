@@ -17,6 +17,7 @@ from friso.hunting.criteria.peak_count import (
     peaks_in_traces,
 )
 from friso.hunting.criteria.run_outcome import (
+    ATTRACTED,
     CREEPS,
     FAILED,
     LASTING_RATIO,
@@ -25,14 +26,20 @@ from friso.hunting.criteria.run_outcome import (
     REST_BAND,
     RESTS,
     SWINGS,
+    UNDECIDED,
+    VERDICT_CRITERION,
+    VERDICTS,
     End,
+    Verdict,
     end_of_traces,
     last_outside,
     lasts,
     outcomes,
+    settling_in_the_end,
+    settling_of_runs,
+    settling_of_traces,
+    verdicts,
 )
-from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
-from friso.hunting.criteria.stage_verdict import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS, Verdict, verdicts
 
 __all__ = [
     "ATTRACTED",

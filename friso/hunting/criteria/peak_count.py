@@ -16,8 +16,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, LEAST_PEAK_SEPARATION, LEAST_VALLEY_DEPTH
-from friso.hunting.turns import scan_turning_points
+from friso.hunting.turning import (
+    COUNTED_ABOVE,
+    COUNTED_AFTER,
+    LEAST_PEAK_SEPARATION,
+    LEAST_VALLEY_DEPTH,
+    scan_turning_points,
+)
 
 __all__ = [
     "COUNTED_ABOVE",

@@ -1,4 +1,13 @@
-"""State what a run did until its end: it swings, creeps, rests or failed.
+"""Name what a stage does, by its run and by what attracts it, and when it has settled.
+
+Define the settling time for friso check, compare, simulate, sweep, map and tune.
+
+The time runs from the last corner of the reference until the deviation stays within a band while the reference stands
+there. For a motion that stands at several places it is the longest of these times. It is infinite if the deviation is
+outside the band when the reference leaves, or when the run ends. So a stage that does not move at all has not settled,
+although it is in position once the reference is back.
+
+State what a run did until its end: it swings, creeps, rests or failed.
 
 An outcome says nothing on what the stage can do.
 
@@ -11,18 +20,88 @@ An outcome says nothing on what the stage can do.
 
 Just one of the four holds. The band depends on the question: `REST_BAND` for sweeps and maps, the position window of a
 specification, or the user's band for being in position. A swing slower than the run is long looks like creeping.
+
+The verdict on a stage: by the cycles that attract, and by where its own motion ends.
+
+| verdict | a cycle attracts | the stage's own motion |
+|---|---|---|
+| hunts | yes | ends in it |
+| bistable | yes | rests; a kick or another move starts hunting |
+| transient | no | has not come to rest at its end |
+| settles | no | has come to rest |
+| undecided | perhaps | was completed; whether a cycle attracts, or where the motion ends, is not certain |
+| failed | | was not completed |
+| none | unknown | has a reference that keeps moving: of a single stage there is no verdict then |
+
+Just one of them holds. A run alone gives no verdict (see `friso.hunting.criteria.run_outcome` for what a run did). What
+attracts is a cycle that was closed as an orbit, or else, and then it is said ("observed"), a swing that long
+simulations do not leave.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
-from friso.equations.motion import last_part
-from friso.hunting.turning import LAST_HALF, LAST_QUARTER
-from friso.hunting.turns import scan_turning_points
+from friso.engine.batch import Runs
+from friso.equations.motion import Stand, last_part, stands
+from friso.hunting.turning import LAST_HALF, LAST_QUARTER, scan_turning_points
+
+BandName = Literal["inner", "outer"]
+
+
+def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
+    """Return the settling times [s] of a chunk of runs into one of their bands, shape (runs,).
+
+    `flat` has the keys of the stages, such as "friction.static", in SI; arrays have one entry per run of the chunk.
+    Runs that were not completed get a time as well.
+    """
+    return _longest(_at_stands(flat, runs, band))
+
+
+def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
+    """Return the settling times [s] of runs at the last place of the reference, shape (runs,).
+
+    The verdict on a stage needs no other place. `flat` has the keys of the stages in SI.
+    """
+    return _at_stands(flat, runs, band)[-1]
+
+
+def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
+    """Return settling times [s] at the places that the reference leaves, and at its last place.
+
+    Both arrays have the shape (runs,). The first has the longest time over all places that the reference leaves. A time
+    is infinite for a run that is outside its `band` when the reference leaves or the run ends.
+    """
+    last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
+    in_the_end = _since(stands(flat)[-1], np.where(last < runs.statistic("ended"), last, np.inf))
+    return [np.maximum(before, 0.0), in_the_end]
+
+
+def settling_of_traces(places: list[Stand], time: np.ndarray, deviation: np.ndarray, within: float) -> np.ndarray:
+    """Return the longest settling time [s] of sampled runs over the reference's places, (runs,).
+
+    The deviations [m] have the shape (runs, n), the times [s] (n,). A run has settled at the sample after the last one
+    outside of the band, `within` [m].
+    """
+    times = []
+    for place in places:
+        seen = time if place is places[-1] else time[time < place.until]
+        following = np.searchsorted(seen, last_outside(seen, deviation[:, : len(seen)], within), side="right")
+        times.append(_since(place, np.append(seen, np.inf)[following]))
+    return _longest(times)
+
+
+def _since(place: Stand, entered: np.ndarray) -> np.ndarray:
+    return np.maximum(entered - place.corner, 0.0)
+
+
+def _longest(times: list[np.ndarray]) -> np.ndarray:
+    return np.max(times, axis=0)
+
 
 SWINGS: Final = "swings"
 CREEPS: Final = "creeps"
@@ -126,3 +205,32 @@ def last_outside(time: np.ndarray, deviation: np.ndarray, band: float) -> np.nda
     outside = ~(np.abs(deviation) <= band)
     last = len(time) - 1 - outside[:, ::-1].argmax(axis=1)
     return np.where(outside.any(axis=1), time[last], -np.inf)
+
+
+Verdict = Literal["hunts", "bistable", "transient", "settles", "undecided", "failed", "none"]
+
+VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "undecided", "failed")
+"""All verdicts, the worst first."""
+
+ATTRACTED: tuple[Verdict, ...] = ("hunts", "bistable")
+"""Verdicts on stages with a stable limit cycle."""
+
+UNDECIDED: tuple[Verdict, ...] = ("undecided", "failed")
+"""Verdicts that leave open whether a stage has a stable limit cycle."""
+
+VERDICT_CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
+
+
+def verdicts(
+    completed: np.ndarray, decided: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray
+) -> np.ndarray:
+    """Return the verdict on every stage; all arrays have the shape (count,).
+
+    `completed` is true if the run of the stage's own motion was, and `decided` if the following arguments are certain.
+    `attracts` is true if the stage has a stable limit cycle. The end of its own motion is described by `ends_in_cycle`
+    if it has one, else by `rests`.
+    """
+    hunting = np.where(ends_in_cycle, "hunts", "bistable")
+    free = np.where(rests, "settles", "transient")
+    word = np.where(decided, np.where(attracts, hunting, free), "undecided")
+    return np.where(completed, word, "failed").astype(object)

@@ -1,11 +1,18 @@
-"""Represent stages of equal equations, with the reference at zero and any initial state."""
+"""Stages of equal equations that run side by side, their rows, and their states at rest.
+
+Base for results of many stages or runs: arrays with one row each, to select from.
+
+Represent stages of equal equations, with the reference at zero and any initial state.
+
+Make states of stages at rest or stuck off their reference, from which hunting starts.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -17,7 +24,37 @@ from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, carrying_force, shared_structure
 from friso.hunting.cycle.settings import settings
 from friso.hunting.settings import tolerance_settings
+from friso.stage.controllers import integral_leak
 from friso.stage.tables import BACKLASH
+
+
+class ArrayRows:
+    """Base of dataclasses with one row for every stage or run.
+
+    All arrays have these rows, and so have parts with arrays of their own. Numbers and words that all rows share stay
+    unchanged.
+    """
+
+    def take(self, numbers: Any) -> Self:
+        """Select the rows with these numbers; a number may occur several times."""
+        parts = {part.name: _rows_of(getattr(self, part.name), numbers) for part in fields(self)}  # type: ignore[arg-type]
+        return replace(self, **parts)  # type: ignore[type-var]
+
+
+def spans(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first and last numbers of each group of neighbouring flags, shape (count,), that are true."""
+    ends = np.flatnonzero(np.diff(flags.astype(int), prepend=0, append=0))
+    return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def _rows_of(part: Any, numbers: Any) -> Any:
+    """Select rows by number from an array, or all arrays in a `part`; return others unchanged."""
+    if isinstance(part, np.ndarray):
+        return part[numbers]
+    if isinstance(part, tuple):
+        return tuple(_rows_of(one, numbers) for one in part)
+    return part.take(numbers) if hasattr(part, "take") and not isinstance(part, np.generic) else part
+
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
 """Cached properties of an ensemble that have one row per stage."""
@@ -271,3 +308,58 @@ def _with_room(results: Results, room: int) -> Results:
 def done(results: Results) -> np.ndarray:
     """Return which runs were completed, shape (runs,)."""
     return np.equal(results.statuses, Status.DONE)
+
+
+def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:
+    """Return states of stages stuck at displacements [m] (count,), shape (count, states).
+
+    Bristles are relaxed. The actuator exerts no force, or balances constant forces that friction does not hold.
+    Integrals of outer loops have `wound` up for a time [s].
+
+    A stage stuck there winds up until it breaks away, which erases its past. These states form a line through all
+    cycles with sticking, and the distance to the reference decides what follows, unless several loops have integrals.
+    """
+    states = stages.settled(Steady(-displacement, displacement, force=stages.balancing))
+    states[:, stages.outer_integrals] = np.reshape(-displacement * wound, (-1, 1))
+    return states
+
+
+def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np.ndarray:
+    """Return states of stages stuck at displacements [m], with bristles bent by earlier travels.
+
+    The `travels` [m], slow and each of shape (count,), follow one another, and bend bristles no farther than break-away
+    does. With several bristles some may stick while others slip, so that the distance alone does not decide what
+    follows.
+    """
+    states, bristles = stuck(stages, displacement), stages.kernel.having(Role.BRISTLE)
+    most = stages.scales[:, bristles]
+    for travel in travels:
+        states[:, bristles] = np.clip(states[:, bristles] + travel[:, None], -most, most)
+    return states
+
+
+def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
+    """Return states of stages at their reference that move at a velocity [m/s], (count, states).
+
+    All masses move alike; everything else is as from rest.
+    """
+    states = stages.at_rest(0.0)
+    states[:, stages.kernel.having(Role.VELOCITY)] = velocity[:, None]
+    return states
+
+
+def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
+    """Return the time [s] in which the integrator winds up to break-away, (count,).
+
+    The stage sticks meanwhile, at a `displacement` [m]. If the integrator pauses, the result is one period of the
+    loop's natural frequency. With a leak it is at most a few time constants of the leak.
+    """
+    rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)
+    with np.errstate(divide="ignore"):
+        winding = np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))
+        return np.minimum(winding, settings.leak_time_constants / np.asarray(2 * np.pi * integral_leak(stages.flat)))
+
+
+def spread_over(*ranges: tuple[float, float, int]) -> np.ndarray:
+    """Return numbers, shape (n,), that are spread evenly in their logarithm over ranges: first, last and number."""
+    return np.concatenate([np.geomspace(*one) for one in ranges])

@@ -1,9 +1,13 @@
-"""Find the limit cycles of one stage, or the reason why there are none."""
+"""Find the limit cycles of one stage, or the reason why there are none.
+
+Name the reasons why an answer about hunting is not certain (docs/hunting.md lists their causes).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,17 +21,29 @@ from friso.equations.structure import Structure, structure
 from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.attractors.rounds import TIGHT_SURVEY_RTOL
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, time_constant
-from friso.hunting.cycle.multipliers import returns_of, slopes
-from friso.hunting.cycle.return_map import ReturnMap, return_map
+from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, returns_of, slopes, time_constant
+from friso.hunting.cycle.guess import ReturnMap, return_map
 from friso.hunting.cycle.settings import settings
-from friso.hunting.doubt import HuntingDoubt
 from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm, unstable
+from friso.hunting.path import MORE_WORK
 from friso.stage import Stage
 from friso.stage.controllers import dead_band
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+class HuntingDoubt(StrEnum):
+    """Reason why it is not certain what attracts a stage, or how its motion ends: a code, and its sentence."""
+
+    WORK = f"deciding takes {MORE_WORK}"
+    RUNS = "runs that had to decide were stopped, or contradict each other or orbits followed from other bandwidths"
+    MOTION = "this motion was not seen to end at rest or in a swing that was found to attract"
+    BEYOND = "swings smaller or larger than those searched may last"
+    GROWTH = "without anti-windup swings may grow or die out beyond the force limit: a size is where a run was stopped"
+    LOOP = "its loop is unstable, or its controller pushes ever harder at standstill as an integral does"
+    LOAD = "friction grows with the drive's force, and no proof about its loop covers that"
+    SWITCHES = "its controller switches the force by windows that remember, which feeds swings without an integral too"
 
 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"

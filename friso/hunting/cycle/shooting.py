@@ -13,9 +13,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from friso.engine.arrays import STATISTICS
-from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, done
 from friso.hunting.cycle.settings import settings
-from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import tolerance_settings
 
 

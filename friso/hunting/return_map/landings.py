@@ -11,11 +11,9 @@ import numpy as np
 
 from friso.equations.roles import Role
 from friso.hunting.attractors.settings import settings as survey_settings
-from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.rest import wait
+from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, done, wait
 from friso.hunting.cycle.settings import settings as orbit_settings
 from friso.hunting.return_map.settings import settings as return_map_settings
-from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
 LANDING_RTOL = ToleranceSettings().landing_rtol

@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from friso.hunting.attractors.settings import settings as survey_settings
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import spread_over, stuck
+from friso.hunting.cycle.ensemble import Ensemble, spread_over, stuck
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import LANDING_RTOL, Landings, find_landings
 from friso.hunting.return_map.settings import settings as return_map_settings
