@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.truth.by_hand import NotWritten, by_hand
+from benchmarks.by_hand import NotWritten, by_hand
 from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, least_swing
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
 from benchmarks.truth.trials import CLOSER, FINE, LINGERING, ROUGH, ROUNDS, Bench, Outcome, Trial
@@ -169,42 +169,17 @@ def may_attract(bench: Bench, motion: Swinging) -> bool:
 
 def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
     """Return what the equations by hand say about a swing [m] in which a run ended."""
+    names, times = bench.kernel.states, np.linspace(0.0, SCIPY_PERIODS * bench.period, 2000)
     try:
         equations = by_hand(bench.flat).held()
+        x = equations.run(equations.state(names, end[: len(names)]), times)[:, equations.measured]
     except NotWritten as missing:
         return f"no equations by hand ({missing})"
-    if missing := [name for name in bench.kernel.states if name not in _PLACES]:
-        return f"no equations by hand ({', '.join(missing)})"
-    y = equations.start()
-    for name, value in zip(bench.kernel.states, end, strict=False):
-        y[_PLACES[name]] = value
-    if "cart_position" not in bench.kernel.states:
-        y[2:4] = y[0:2]
-    if not {"parasitic_position", "motor_position"} & set(bench.kernel.states):
-        y[4:6] = y[0:2]
-    times = np.linspace(0.0, SCIPY_PERIODS * bench.period, 2000)
-    x = equations.run(y, times)[:, equations.measured]
     if not np.isfinite(x[-1]):
         return "SciPy does not get there"
     swing = float(np.ptp(x) / 2)
     word = "confirms" if abs(swing / amplitude - 1) < ALIKE else "CONTRADICTS"
     return f"SciPy {word}: {swing:.6g} m over {times[-1]:.4g} s"
-
-
-_PLACES = {
-    "position": 0,
-    "velocity": 1,
-    "cart_position": 2,
-    "cart_velocity": 3,
-    "parasitic_position": 4,
-    "parasitic_velocity": 5,
-    "motor_position": 4,
-    "motor_velocity": 5,
-    "bristle_deflection": 6,
-    "filtered_error": 7,
-    "filtered_position": 7,
-    "integral": 8,
-}
 
 
 def _away(claim: Claim, bench: Bench) -> Iterator[Refutation]:
