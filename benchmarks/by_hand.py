@@ -16,6 +16,7 @@ integrals: docs/controllers.md; transmission: docs/drives.md.
 
 from __future__ import annotations
 
+import warnings
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.integrate import solve_ivp
+from scipy.integrate import ODEintWarning, odeint, solve_ivp
 
 Flat = Mapping[str, Any]
 
@@ -372,16 +373,16 @@ class ByHand:
             stop, start = min(end, times[-1]), max(piece[0], times[0])
             if stop <= start:
                 continue
-            at = times[(times > start) & (times <= stop)]
-            solution = solve_ivp(
-                rate, (start, stop), y, "LSODA", np.unique([*at, stop]), args=(piece,), rtol=rtol,
-                atol=rtol * scales, jac=slopes, max_step=(stop - start) / 50,
-            )  # fmt: skip
-            left -= solution.nfev
-            if not solution.success or left < 0:
+            at = (times > start) & (times <= stop)
+            with warnings.catch_warnings(action="ignore", category=ODEintWarning):
+                states, told = odeint(
+                    rate, y, np.unique([start, *times[at], stop]), (piece,), slopes, tfirst=True, full_output=True,
+                    rtol=rtol, atol=rtol * scales, tcrit=[stop], hmax=(stop - start) / 50, mxstep=left,
+                )  # fmt: skip
+            left -= int(told["nfe"][-1])
+            if told["message"] != "Integration successful." or left <= 0:
                 return out
-            y, here = solution.y[:, -1], np.isin(times, at)
-            out[here] = solution.y[:, np.searchsorted(solution.t, times[here])].T
+            y, out[at] = states[-1], states[1 : 1 + np.count_nonzero(at)]
         return out
 
     def followed(self, y: np.ndarray, duration: float, rtol: float, method: str = "Radau") -> Followed:
@@ -460,7 +461,7 @@ class ByHand:
         return longest
 
     def _long(self, y: np.ndarray, slips: np.ndarray, *how: Any) -> Run:
-        arguments = y.astype(float), slips, *how, self.scales, self.live, self.arrays
+        arguments: tuple[Any, ...] = (y.astype(float), slips, *how, self.scales, self.live, self.arrays)
         times, places, count, *rest = _followed(*arguments)
         return Run(times[:count], places[:count], *rest)
 

@@ -28,7 +28,7 @@ FEW = (16, 8, 32, 8)
 """Numbers of starts of each kind at a crossover beside an edge."""
 
 SECOND = 24
-"""Starts of a battery that are also followed at the finer tolerance."""
+"""Starts of a battery that are also followed at the finer tolerance, and first where any that swings is enough."""
 
 TRIED, APART = 3, 1e-3
 """Number of swinging starts that are examined closely, and the relative difference of their amplitudes: closer ones are
@@ -116,7 +116,9 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
 
 
 def _may_hunt(bench: Bench, trial: Trial, kicks: tuple[float, ...] = ()) -> bool:
-    """Tell whether any start may keep swinging: first the claimed kicks, then the trial."""
+    """Tell whether any start may keep swinging: first a few of them, then the claimed kicks and the whole trial."""
+    if SWINGS in bench.follow(_few(trial), ROUGH, ROUNDS[:1], patient=False).words:
+        return True
     trials = (bench.released(np.array(kicks)), trial) if kicks else (trial,)
     runs = (bench.follow(begun, rtol) for rtol in (ROUGH, FINE) for begun in trials)
     return any(np.isin(run.words.astype(str), (SWINGS, UNSURE)).any() for run in runs)
@@ -127,8 +129,7 @@ def swinging(bench: Bench, trial: Trial) -> str:
 
     Its neighbours swing as well. The text includes SciPy's answer.
     """
-    few = np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int))
-    for rtol, begun in ((ROUGH, trial), (FINE, trial.take(few))):
+    for rtol, begun in ((ROUGH, trial), (FINE, _few(trial))):
         run = bench.follow(begun, rtol)
         for start in _different(run):
             if attracts(bench, run.ends[start], float(run.periods[start])):
@@ -137,6 +138,11 @@ def swinging(bench: Bench, trial: Trial) -> str:
                 beside = f"and so do its neighbours at {CLOSER:g} and {FINE:g}"
                 return f"{begins} {seen}, {beside}; {by_scipy(bench, run.ends[start], swing)}"
     return ""
+
+
+def _few(trial: Trial) -> Trial:
+    """Return `SECOND` starts of a battery, of all kinds and sizes."""
+    return trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
 
 
 def _different(run: Outcome) -> np.ndarray:
