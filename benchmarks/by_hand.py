@@ -462,7 +462,8 @@ class ByHand:
 
     def _long(self, y: np.ndarray, slips: np.ndarray, *how: Any) -> Run:
         arguments: tuple[Any, ...] = (y.astype(float), slips, *how, self.scales, self.live, self.arrays)
-        times, places, count, *rest = _followed(*arguments)
+        followed: tuple[Any, ...] = _followed(*arguments)
+        times, places, count, *rest = followed
         return Run(times[:count], places[:count], *rest)
 
 
