@@ -3,7 +3,7 @@
 `python -m benchmarks.advice [--copies N] [--only NAME ...]` tunes the machines of `advice.toml`. For each it prints the
 answer, and a row: CPU time until the first verified answer and until the end, as multiples of a check of the same
 stage; the settling time told and the one of copies drawn anew, at the worse end of their moves, by
-`benchmarks.advice_equations`; and bandwidth and force of the answer over those of the least speed of the controller
+`benchmarks.by_hand`; and bandwidth and force of the answer over those of the least speed of the controller
 that meets the goal. That speed is found by brute search, in steps of `STEP`. Kernels are to be in the cache: run it
 twice.
 """
@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import argparse
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
+from typing import Any
 
 import numpy as np
 
 import friso
-from benchmarks.advice_equations import settling
+from benchmarks.by_hand import by_hand
 from benchmarks.report import print_table
 from friso.axis import speaking_of
 from friso.equations.bandwidth import sped_up
@@ -92,7 +93,7 @@ def row(name: str, stage: Stage, copies: int) -> list[str]:
     drawn = draw_fleet(outcome.stage, Correlations(), copies, FRESH_SEED, goal.moves)
     flat = drawn.laid_over(outcome.stage, {}, 1)
     one_by_one = [{key: value[k] if np.ndim(value) else value for key, value in flat.items()} for k in range(copies)]
-    times = np.array([settling(one, goal.within) for one in one_by_one])
+    times = np.array([_settling(one, goal.within) for one in one_by_one])
     low, high = outcome.measured.slowest_interval(goal)
     least = least_speed(advice, draw_fleet(stage, Correlations(), advice.machines.count, FRESH_SEED + 1, goal.moves))
     ratios = ["no speed works", "–"]
@@ -112,6 +113,12 @@ def row(name: str, stage: Stage, copies: int) -> list[str]:
     ]
     print(cells, flush=True)
     return cells
+
+
+def _settling(flat: Mapping[str, Any], within: float) -> float:
+    """Return the longer settling time [s] of a move by hand, of the place that the controller is given."""
+    moved = by_hand({key: value for key, value in flat.items() if not key.startswith("drive.")})
+    return moved.settling(within, flat["motion.duration"], moved.measured)
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """Test settings of `friso tune` on fresh machines by independent equations.
 
 `python -m benchmarks.eight_machines FILE` tunes eight kinds of machine. Each setting that works is tried on machines
-for which nothing was tuned, by the equations and the integrator of `benchmarks.machines_by_hand`. A row for each
+for which nothing was tuned, by the equations and the integrator of `benchmarks.by_hand`. A row for each
 machine and move goes to FILE as one line of JSON, so that a run may be continued; the table by size of move is printed
 at the end. `--only NAME ...` chooses machines, `--machines N` sets how many are tried.
 """
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.machines_by_hand import machine
+from benchmarks.by_hand import by_hand
 from benchmarks.report import print_table
 from friso.questions.tune.words import changes
 from friso.remedies.machines import Goal, draw_fleet
@@ -115,9 +115,13 @@ def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
         for number in range(count):
             if (row["setting"], number) in done:
                 continue
-            flat = {key: value[number] if isinstance(value, list) else value for key, value in row["flat"].items()}
+            flat = {
+                key: value[number] if isinstance(value, list) else value
+                for key, value in row["flat"].items()
+                if not key.startswith("drive.")
+            }
             result = {"machine": name, "setting": row["setting"], "number": number, "size": row["sizes"][number]}
-            settling = machine(flat).settling(row["within"], flat["motion.duration"])
+            settling = by_hand(flat).settling(row["within"], flat["motion.duration"])
             with file.open("a") as written:
                 written.write(json.dumps(result | {"settling": settling}) + "\n")
 

@@ -15,18 +15,17 @@ appended to that file as they come, and are not computed again: a long study run
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.report import Goal, print_goals, print_table
+from benchmarks.report import Goal, Task, each, numbered, print_goals, print_table
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.break_away import static_from_ramps
@@ -210,9 +209,6 @@ def shown_by(log: Log, machine: Machine) -> set[str]:
     return {keys.get(name, name) for name, fine in zip(names, good, strict=True) if fine}
 
 
-Task = tuple[str, int]
-"""A group of experiments, and the number of the machine."""
-
 TASKS: Mapping[str, Callable[[int], Iterable[Answer]]] = {
     "rigid": lambda seed: of_rigid(drawn(seed, False)),
     "jointed": lambda seed: of_jointed(drawn(seed, True)),
@@ -221,35 +217,22 @@ TASKS: Mapping[str, Callable[[int], Iterable[Answer]]] = {
 
 
 def run(tasks: Iterable[Task], kept: Path | None = None) -> list[Answer]:
-    """Return the answers on machines by task; the file `kept` stores and supplies them."""
-    before = _read(kept) if kept else {}
-    every: list[Answer] = []
-    for task in tasks:
-        if task in before:
-            every += before[task]
-            continue
-        kind, seed = task
-        begin, answers = time.perf_counter(), []
-        try:
-            answers = list(TASKS[kind](seed))
-        except InputError as error:
-            print(f"  machine {seed}, {kind}: refused: {' '.join(str(error).split())}")
-        for answer in answers:
-            if not answer.holds:
-                print(f"  machine {seed}, {answer.miss}")
-        print(f"machine {seed}, {kind}: {time.perf_counter() - begin:.0f} s", flush=True)
-        if kept:
-            with kept.open("a", encoding="utf-8") as file:
-                file.write(json.dumps([kind, seed, [asdict(answer) for answer in answers]]) + "\n")
-        every += answers
-    return every
+    """Return the answers on machines by group of experiments and number; the file `kept` keeps them."""
+    return [Answer(**answer) for _, answers in each(tasks, _answers, kept) for answer in answers]
 
 
-def _read(kept: Path) -> dict[Task, list[Answer]]:
-    if not kept.exists():
-        return {}
-    lines = (json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines())
-    return {(kind, seed): [Answer(**answer) for answer in answers] for kind, seed, answers in lines}
+def _answers(task: Task) -> list[dict[str, Any]]:
+    kind, seed = str(task[0]), int(task[1])
+    begin, answers = time.perf_counter(), list[Answer]()
+    try:
+        answers = list(TASKS[kind](seed))
+    except InputError as error:
+        print(f"  machine {seed}, {kind}: refused: {' '.join(str(error).split())}")
+    for answer in answers:
+        if not answer.holds:
+            print(f"  machine {seed}, {answer.miss}")
+    print(f"machine {seed}, {kind}: {time.perf_counter() - begin:.0f} s", flush=True)
+    return [asdict(answer) for answer in answers]
 
 
 def counted(answers: Iterable[Answer]) -> dict[tuple[str, str], Count]:
@@ -294,11 +277,8 @@ def goals(counts: dict[tuple[str, str], Count]) -> list[Goal]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--machines", type=int, default=20)
+    parser = numbered(__doc__, 20)
     parser.add_argument("--moves", type=int, default=10, help="machines whose moves are fitted")
-    parser.add_argument("--first", type=int, default=0, help="number of the first machine")
-    parser.add_argument("--kept", type=Path, help="file of answers, which a run in pieces adds to")
     arguments = parser.parse_args()
     numbers = {"rigid": arguments.machines, "jointed": arguments.machines, "moves": arguments.moves}
     tasks = [(kind, seed) for kind, n in numbers.items() for seed in range(arguments.first, arguments.first + n)]

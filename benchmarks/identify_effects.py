@@ -9,17 +9,14 @@ first, how many reported values hold the truth, and how many were still reported
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numba import njit
 
-from benchmarks.report import print_table
+from benchmarks.report import each, numbered, print_table
 from friso.errors import InputError
 from friso.identification.experiments.moves import KIND
 from friso.identification.kind import NOTHING_CHOSEN, Prior
@@ -334,24 +331,15 @@ def outcome(family: str, seed: int) -> Outcome:
 
 def main() -> None:
     """Run the families, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = numbered(__doc__, 5)
     parser.add_argument("families", nargs="*", default=[*FAMILIES])
-    parser.add_argument("--machines", type=int, default=5)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kept", type=Path, help="file of outcomes, which a run in pieces adds to")
     arguments = parser.parse_args()
-    before: dict[tuple[str, int], Outcome] = {}
-    if arguments.kept and arguments.kept.exists():
-        rows = [Outcome(**json.loads(line)) for line in arguments.kept.read_text("utf-8").splitlines()]
-        before = {(row.family, row.seed): row for row in rows}
-    table = []
+    table, seeds = [], range(arguments.first, arguments.first + arguments.machines)
     for family in arguments.families:
         several = []
-        for seed in range(arguments.first, arguments.first + arguments.machines):
-            one = before.get((family, seed)) or outcome(family, seed)
-            if arguments.kept and (family, seed) not in before:
-                with arguments.kept.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(asdict(one)) + "\n")
+        tasks = [(family, seed) for seed in seeds]
+        for (_, seed), data in each(tasks, lambda task: asdict(outcome(str(task[0]), int(task[1]))), arguments.kept):
+            one = Outcome(**data)
             said = one.refused or "; ".join(f"[{name}] {words[:150]}" for name, words in one.doubts)
             print(f"{family} {seed}: {one.seconds:.0f} s; {said}; missed: {one.missed}", flush=True)
             several.append(one)

@@ -10,7 +10,6 @@ computed again.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import tempfile
@@ -23,7 +22,7 @@ from typing import Any
 import numpy as np
 
 import friso
-from benchmarks.report import print_table
+from benchmarks.report import each, numbered, print_table
 from friso.errors import InputError
 from friso.hunting.criteria import ATTRACTED
 from friso.identification.logs.log import Log
@@ -156,22 +155,12 @@ def table(results: Iterable[Mapping[str, Any]]) -> None:
 
 def main() -> None:
     """Follow the machines, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--machines", type=int, default=20)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kept", type=Path)
-    options = parser.parse_args()
-    kept = options.kept.read_text().splitlines() if options.kept and options.kept.exists() else []
-    results = {one["seed"]: one for one in map(json.loads, kept)}
-    for seed in range(options.first, options.first + options.machines):
-        if seed in results:
-            continue
-        results[seed] = one = followed(seed)
+    options, results = numbered(__doc__, 20).parse_args(), []
+    tasks = [(seed,) for seed in range(options.first, options.first + options.machines)]
+    for _, one in each(tasks, lambda task: followed(int(task[0])), options.kept):
         print(json.dumps(one, default=float), flush=True)
-        if options.kept:
-            with options.kept.open("a") as file:
-                file.write(json.dumps(one, default=float) + "\n")
-    table(results.values())
+        results.append(one)
+    table(results)
 
 
 if __name__ == "__main__":

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
+import json
 import os
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from friso.platform.system import usable_cores
+
+Task = tuple[str | int, ...]
+"""What a result is of: a machine by its number, for one."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,33 @@ def print_goals(goals: Sequence[Goal], title: str) -> None:
         ("goal", "wanted", "measured", "reached?"),
         [(g.about, g.target, g.measured, words[g.reached]) for g in goals],
     )
+
+
+def each(tasks: Iterable[Task], job: Callable[[Task], Any], file: Path | None = None) -> Iterator[tuple[Task, Any]]:
+    """Yield tasks with their results, which are data.
+
+    A file keeps them, a line of JSON each: those in it are not computed again, so that a run continues where one was
+    stopped.
+    """
+    lines = file.read_text("utf-8").splitlines() if file and file.exists() else []
+    there = {tuple(task): result for task, result in map(json.loads, lines)}
+    for task in tasks:
+        if task not in there:
+            there[task] = job(task)
+            if file:
+                file.parent.mkdir(parents=True, exist_ok=True)
+                with file.open("a", encoding="utf-8") as stream:
+                    stream.write(json.dumps([task, there[task]], default=float) + "\n")
+        yield task, there[task]
+
+
+def numbered(document: str | None, machines: int) -> argparse.ArgumentParser:
+    """Return a parser of the options of a benchmark on drawn machines: how many, the first, and a file of results."""
+    parser = argparse.ArgumentParser(description=document, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--machines", type=int, default=machines)
+    parser.add_argument("--first", type=int, default=0, help="number of the first machine")
+    parser.add_argument("--kept", type=Path, help="file of results, which a run in pieces adds to")
+    return parser
 
 
 def clock(job: Callable[[], Any]) -> float:

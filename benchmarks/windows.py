@@ -1,7 +1,7 @@
 """Compare verdicts on stages with windows against friction with brute force: `python -m benchmarks.windows`.
 
 Stages are drawn: a PID on a rigid mass with LuGre friction, and a window of each kind in turn. Equations by hand
-(`benchmarks.windows_by_hand`) follow each from many starts for 25 s of the stage's time, in fixed steps. A sure
+(`benchmarks.by_hand`) follow each from many starts for 25 s of the stage's time, in fixed steps. A sure
 verdict is wrong if a start swings on although nothing is said to attract, or if all come to rest although hunting is
 sure. A sure edge in bandwidth is wrong if no start swings on a tenth below it, or one does a tenth above. A swing
 above that is gone 6 % to either side lies in a window narrower than the steps of the search, of which *certain* does
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.windows_by_hand import relaxed, trace
+from benchmarks.by_hand import relaxed, trace
 from friso.equations.bandwidth import faster
 from friso.hunting import Hunting, find_margin, hunting
 from friso.stage import Stage, loads

@@ -1,7 +1,6 @@
 """Elasto-plastic and rolling friction: laws of one bristle that differ from LuGre in how it gives way."""
 
 import numpy as np
-import plain
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,6 +20,7 @@ from variants import (
 )
 
 import friso
+from benchmarks import by_hand as plain
 from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.equations.imposed import Driven

@@ -10,7 +10,6 @@ from typing import Any
 
 import control
 import numpy as np
-import plain
 import pytest
 import sympy as sp
 from emps import emps_log
@@ -18,6 +17,7 @@ from scipy.integrate import solve_ivp
 from variants import cascade, gains, limit, lugre, release, stage, step, there_and_back
 
 import friso
+from benchmarks import by_hand as plain
 from friso.equations.bandwidth import faster
 from friso.equations.blocks import Loop
 from friso.equations.component import state

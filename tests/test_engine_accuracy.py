@@ -4,7 +4,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import plain
 import pytest
 from cycles import by_gains
 from scipy.integrate import solve_ivp
@@ -13,7 +12,8 @@ from scipy.optimize import brentq
 from variants import HOLD, PARASITIC, TOUCHING, VARIANTS, lugre, stage, step, van_dijk
 
 import friso
-from benchmarks.truth.by_hand import by_hand
+from benchmarks import by_hand as plain
+from benchmarks.by_hand import by_hand
 from benchmarks.truth.draws import draw
 from friso.engine.arrays import BatchOptions, Results, Status, new_queue
 from friso.engine.batch import RunOptions, prepare, run_chunks

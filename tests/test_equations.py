@@ -7,11 +7,11 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-import plain
 import pytest
 import sympy as sp
 from variants import VARIANTS, plain_module
 
+from benchmarks import by_hand as plain
 from friso.equations import motion
 from friso.equations.component import TIME
 from friso.equations.model import REFERENCE, Model, assemble

@@ -6,13 +6,13 @@ from typing import Any
 
 import maxwell_slip
 import numpy as np
-import plain
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from variants import VARIANTS, maxwell, release, stage, van_dijk
 
 import friso
+from benchmarks import by_hand as plain
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel

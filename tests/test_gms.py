@@ -1,14 +1,11 @@
 """Generalised Maxwell-slip friction: elements that stick or slip, against references written by hand."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from gms_reference import Elements, Loop
-from slip_reference import imposed, virgin
 from variants import MICRO_DAMPING, VARIANTS, gains, gms, release, stage, van_dijk
 
 import friso
+from benchmarks.by_hand import X, Z, by_hand
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.friction.laws import GeneralisedMaxwellSlip, polygon
 from friso.equations.imposed import imposed_form
@@ -37,10 +34,21 @@ HUNTS = stage(
 )
 
 
-def strengths(flat: dict[str, Any]) -> dict[str, Any]:
-    """The keys with the strength of each element, as `slip_reference` knows them."""
-    static = flat["friction.static"]
-    return flat | {f"friction.element_strength.{n}": static * share for n, share in enumerate(SHARE, 1)}
+LIMIT = 2 * SHARE / STIFFNESS
+"""Deflections [m] at which elements of `FLAT_CURVE` slip."""
+
+
+def virgin(way: np.ndarray) -> np.ndarray:
+    """Force [N] of such elements after a way [m] from rest without load."""
+    return np.sum(STIFFNESS * np.minimum(way[..., None], LIMIT), axis=-1)
+
+
+def imposed(displacement: np.ndarray) -> np.ndarray:
+    """Deflections [m], (n, elements), along a displacement [m] that is monotone between its n points, from rest."""
+    deflections = [np.zeros(len(LIMIT))]
+    for moved in np.diff(displacement):
+        deflections.append(np.clip(deflections[-1] + moved, -LIMIT, LIMIT))
+    return np.array(deflections)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -61,11 +69,10 @@ def test_inner_loops_close_to_rounding() -> None:
     times = np.concatenate([response.time, response.turning_time])
     positions = np.concatenate([response.position, response.turning_deviation + reference])
     order = np.argsort(times, kind="stable")
-    exact = imposed(strengths(HELD.flat()), positions[order])[order < response.sizes["time"]]
+    exact = imposed(positions[order])[order < response.sizes["time"]]
     ours = np.stack([response[f"deflection_{n}"].values for n in (1, 2, 3)], axis=1)
-    limit = 2 * SHARE / STIFFNESS
     assert len(response.turning_time) > 20
-    assert np.max(np.abs(ours - exact)) < 1e-9 * limit.max()
+    assert np.max(np.abs(ours - exact)) < 1e-9 * LIMIT.max()
     assert np.max(np.abs(response.friction_force.values - exact @ STIFFNESS)) < 1e-9 * 2
     slips = np.stack([response[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
     assert slips.any(axis=0)[0]
@@ -79,17 +86,16 @@ def test_masing_s_rule() -> None:
     branch = np.flatnonzero((response.time.values > first) & (response.time.values < second))
     turn = float(response.turning_deviation[0])
     side = np.sign(positions[branch[-1]] - turn)
-    expected = -side * 2 + side * 2 * virgin(strengths(SLIDES.flat()), np.abs(positions[branch] - turn) / 2)
-    assert np.ptp(positions[branch]) > 4 * (2 * SHARE / STIFFNESS).max()
+    expected = -side * 2 + side * 2 * virgin(np.abs(positions[branch] - turn) / 2)
+    assert np.ptp(positions[branch]) > 4 * LIMIT.max()
     assert np.max(np.abs(response.friction_force.values[branch] - expected)) < 1e-8 * 2
 
 
 @pytest.mark.slow
 def test_a_loop_against_scipy_with_events() -> None:
     """The first slips and sticks of a stage on a falling curve: how many, and where the stage is then."""
-    flat = HUNTS.flat()
-    start = np.array([4e-3, 0.0, -4e-3, *np.zeros(4)])  # the filtered error has settled
-    times, states, slips = Loop(flat).run(start, 0.2, 1e-11)
+    equations = by_hand(HUNTS.flat())
+    times, states, slips, *_ = equations.followed(equations.start(4e-3), 0.2, 1e-11)
     assert len(times) > 5
     response = friso.simulate(HUNTS.replace({"motion.displacement": "4 mm", "motion.duration": "200 ms"}), 1e-11, 1e-6)
     ours = np.stack([response[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
@@ -97,19 +103,16 @@ def test_a_loop_against_scipy_with_events() -> None:
     changed = times[1:][np.any(np.diff(slips, axis=0) != 0, axis=1)]
     assert len(moments) == len(np.unique(np.round(changed, 6)))
     assert moments == pytest.approx(np.unique(np.round(changed, 6)), abs=2e-6)
-    assert response.position.values[-1] == pytest.approx(states[-1, 0], rel=1e-7)
-    forces = np.stack([response[f"deflection_{n}"].values[-1] for n in (1, 2, 3)]) * STIFFNESS
-    assert forces == pytest.approx(states[-1, 4:], rel=1e-6)
+    assert response.position.values[-1] == pytest.approx(states[-1, X], rel=1e-7)
+    deflections = np.stack([response[f"deflection_{n}"].values[-1] for n in (1, 2, 3)])
+    assert deflections == pytest.approx(states[-1, Z:], rel=1e-6)
     assert np.array_equal(ours[-1], slips[-1])
 
 
 def test_an_element_bent_against_the_motion_goes_on_sticking() -> None:
     """Read by abs(F_i), it would be at its level at once, as the speed after the turn makes that fall below it."""
-    elements = Elements(HUNTS.flat())
-    bent = 0.9 * SHARE * 3.0
-    fast = -5e-3
-    assert np.all(np.abs(bent) > SHARE * elements.level(fast))
-    assert all(elements.lacking(n, bent, fast, -1.0) > 0 for n in range(3))
+    bent, fast = 0.9 * SHARE * 3.0, -5e-3
+    assert np.all(np.abs(bent) > SHARE * (1 + 2 * np.exp(-((fast / 1.6e-3) ** 2))))
     stages = Ensemble.held(HUNTS.flat(), 1)
     names = list(stages.kernel.states)
     state = np.zeros((1, len(names)))
@@ -117,7 +120,8 @@ def test_an_element_bent_against_the_motion_goes_on_sticking() -> None:
     for n in range(3):
         state[0, names.index(f"deflection_{n + 1}")] = bent[n] / STIFFNESS[n]
     rates = stages.rates(state)[0]
-    assert [rates[names.index(f"deflection_{n}")] for n in (1, 2, 3)] == [fast] * 3
+    equations, at = by_hand(HUNTS.flat()), [names.index(f"deflection_{n}") for n in (1, 2, 3)]
+    assert rates[at].tolist() == equations.rate(0.0, equations.state(names, state[0]))[Z:].tolist() == [fast] * 3
 
 
 @pytest.mark.slow
@@ -131,21 +135,18 @@ def test_the_cycle_against_simulation_and_scipy_with_events() -> None:
         late = long.turning_deviation.values[long.turning_time.values > 60 - 2 * cycles.period[0]]
         ends.append(np.ptp(late) / 2)
     assert ends == pytest.approx([cycles.amplitude[0]] * 2, rel=1e-4)
-    names = ["position", "velocity", "filtered_error", "integral"]
-    at = [stages.kernel.states.index(name) for name in names]
-    forces = [
-        cycles.states[0][stages.kernel.states.index(f"deflection_{n}")] * k for n, k in enumerate(STIFFNESS, start=1)
-    ]
-    start = np.array([*cycles.states[0][at], *forces])
-    _, states, slips = Loop(HUNTS.flat()).run(start, cycles.period[0] / 2, 1e-10)
+    equations, names = by_hand(HUNTS.flat()), stages.kernel.states
+    start = equations.state(names, cycles.states[0])
+    _, states, slips, *_ = equations.followed(start, cycles.period[0] / 2, 1e-10)
     assert np.any(slips)
-    assert states[-1, :4] == pytest.approx(-start[:4], abs=1e-5 * cycles.amplitude[0])
+    at = equations.places(["position", "velocity", "filtered_error", "integral"])
+    assert states[-1][at] == pytest.approx(-start[at], abs=1e-5 * cycles.amplitude[0])
     assert abs(cycles.multiplier[0]) < 1
 
 
 def test_describing_function_of_elements() -> None:
     """Each element has k (theta - sin(2 theta)/2)/pi + i 4 k L (1 - L/A)/(pi A), cos(theta) = 1 - 2 L/A; k below L."""
-    amplitudes, limits = np.array([2e-6, 1e-5, 3e-5, 1e-3]), 2 * SHARE / STIFFNESS
+    amplitudes, limits = np.array([2e-6, 1e-5, 3e-5, 1e-3]), LIMIT
     table = describing(HELD, amplitudes, [3.0])
     assert set(np.ravel(table.status)) == {"done"}
     expected = np.zeros(len(amplitudes), complex)

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 
 import numpy as np
-import plain
 import pytest
 from refusals import refused
 from scipy.integrate import solve_ivp
 from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains, lugre, stage, stribeck, van_dijk
 
+from benchmarks import by_hand as plain
 from friso.hunting import Ensemble, find_cycles
 from friso.stage import Stage
 from friso_thesis.studies.describing.balance import DEFAULT_FREQUENCIES, receptance, single_harmonic

@@ -6,12 +6,12 @@ Limits, formulas by hand, and what is said of hunting beside long runs of the eq
 from __future__ import annotations
 
 import numpy as np
-import plain
 import pytest
 from scipy.integrate import solve_ivp
 from variants import HOLD, dwell, elasto_plastic, gains, load_dependent, lugre, release, rolling, stage, van_dijk
 
 import friso
+from benchmarks import by_hand as plain
 from friso.engine.batch import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.imposed import Dragged

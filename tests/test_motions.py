@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import plain
 import pytest
 from log_files import write_twincat
 from own_motion import Spiral as Spiral
@@ -14,7 +13,8 @@ from scipy.io import savemat
 from variants import gains, limit, lugre, release, stage
 
 import friso
-from benchmarks.truth.by_hand import by_hand
+from benchmarks import by_hand as plain
+from benchmarks.by_hand import by_hand
 from friso.engine.batch import simulate
 from friso.equations import motion
 from friso.equations.motion import value

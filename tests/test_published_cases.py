@@ -123,7 +123,7 @@ def test_cycles_of_the_locked_rig(crossover: float, displacement: float, amplitu
 def test_jump_that_starts_hunting(crossover: float, dies: float, hunts: float) -> None:
     """Bistable: it takes a jump of about 0.25 mm at 4 Hz and 1.75 mm at 8 Hz to start hunting from rest.
 
-    references.md has 0.29 and 1.8 mm; SciPy Radau on the equations of plain.py hunts from 0.25 mm but not from 0.24 mm.
+    references.md has 0.29 and 1.8 mm; SciPy Radau on the equations by hand hunts from 0.25 mm but not from 0.24 mm.
     """
     times, heights = swings(jumping(crossover, dies), rtol=1e-8)
     assert np.all(heights[times > 50] < 1e-9)  # none, or of rounding

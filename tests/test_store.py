@@ -24,6 +24,7 @@ from refusals import refused
 from systems import posix
 
 import friso as friso_api
+from benchmarks.trust.damage import exchange, flip
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
 from friso.studies.settings import StudySettings
@@ -304,25 +305,10 @@ def stored(finished: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished, tmp_path / "a.zarr"))
 
 
-def flip(file: Path, place: float) -> None:
-    """Change one bit of a file, at a share of its length."""
-    content = bytearray(file.read_bytes())
-    content[int(place * len(content))] ^= 0x10
-    file.write_bytes(content)
-
-
 def unfinished(path: Path) -> list[str]:
     """Return the blocks of a store that a resumed study would run, as Zarr numbers them."""
     store = Store(path, study_of(read_store(path)))
     return [store._number(block) for block in store.missing()]
-
-
-def exchange(first: Path, second: Path) -> None:
-    """Give two files each other's names."""
-    spare = first.with_name("spare")
-    first.rename(spare)
-    second.rename(first)
-    spare.rename(second)
 
 
 def file_of(store: Path, name: object, number: str) -> Path:

@@ -1,13 +1,11 @@
 """A screw or belt between motor and load, with encoders on either side: against models written by hand."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 import friso
+from benchmarks.by_hand import XF, X, by_hand
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.pid import numbers
 from friso.equations.structure import structure
@@ -23,9 +21,6 @@ from friso.stage import Stage
 from friso.stage.plausible import idle_encoder
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import own_motion
-
-Law = Callable[[np.ndarray, list[float]], tuple[float, list[float]]]
-"""A controller by hand."""
 
 LUGRE = {
     "model": "lugre",
@@ -97,76 +92,23 @@ def test_an_encoder_that_no_controller_reads_is_named() -> None:
     assert not [*idle_encoder(machine())]
 
 
-def bristles(flat: dict[str, float], table: str, velocity: float, z: float) -> tuple[float, float]:
-    """Rate of the bristles of LuGre, and the friction force."""
-    key = {name.removeprefix(f"{table}."): value for name, value in flat.items() if name.startswith(f"{table}.")}
-    fall = np.exp(-((velocity / key["stribeck_velocity"]) ** 2))
-    level = key["coulomb"] + (key["static"] - key["coulomb"]) * fall
-    rate = velocity - key["bristle_stiffness"] * abs(velocity) / level * z
-    return rate, key["bristle_stiffness"] * z + key["bristle_damping"] * rate + key["viscous"] * velocity
+NOTCH = {"kind": "notch", "frequency": "200 Hz", "width": "80 Hz", "depth": 0.8}
+LOW_PASS = {"kind": "low_pass", "path": "feedback", "frequency": "300 Hz"}
+LOOPS = {"kind": "cascade", "kv": "40 1/s", "kp": "8e3 N*s/m", "velocity_integral_time": "20 ms"}
 
 
-def by_hand(stage: Stage, times: np.ndarray, law: Law, numbers_held: int) -> np.ndarray:
-    """Positions of load and motor [m] by SciPy's Radau, of a rigid stage with LuGre friction on both sides, after a
-    step: `law` takes positions and velocities of load and motor and its own numbers to the force and their rates."""
-    flat = stage.flat()
-    load, motor = flat["masses.stage"], flat["transmission.mass"]
-    half = flat.get("transmission.backlash", 0.0) / 2
-
-    def rates(_: float, y: np.ndarray) -> list[float]:
-        x, v, big_x, big_v, z, big_z, *own = y
-        gap = big_x - x
-        force = 0.0
-        if abs(gap) > half:
-            force = flat["transmission.stiffness"] * (gap - np.sign(gap) * half)
-            force += flat["transmission.damping"] * (big_v - v)
-        z_rate, on_load = bristles(flat, "friction", v, z)
-        big_z_rate, on_motor = bristles(flat, "motor_friction", big_v, big_z)
-        pull, own_rates = law(y[:4], own)
-        return [v, (force - on_load) / load, big_v, (pull - force - on_motor) / motor, z_rate, big_z_rate, *own_rates]
-
-    begin, span = np.zeros(6 + numbers_held), (0, times[-1])
-    answer = solve_ivp(rates, span, begin, "Radau", times, rtol=1e-9, atol=1e-13, max_step=times[-1] / 500)
-    return answer.y[[0, 2]]
-
-
-@pytest.mark.slow
-def test_trace_of_a_pid_on_the_load() -> None:
-    stage = machine()
-    gains, size = numbers(stage.flat()), stage.flat()["motion.size"]
-
-    def law(moved: np.ndarray, own: list[float]) -> tuple[float, list[float]]:
-        passed, integral = own
-        slope = (size - moved[0] - passed) / gains["tau_p"]
-        share = (1 + gains["tau_z"] / gains["tau_i"]) * passed + integral / gains["tau_i"] + gains["tau_z"] * slope
-        return gains["k_p"] * share, [slope, passed]
-
-    response = friso.simulate(stage, rtol=1e-9, sample_time=2e-3)
-    load, motor = by_hand(stage, response.time.values, law, 2)
-    assert np.abs(response["position"].values - load).max() < 2e-9
-    assert np.abs(response["motor_position"].values - motor).max() < 2e-9
-
-
-@pytest.mark.thorough
-def test_trace_of_a_cascade_on_both_encoders() -> None:
-    """Position from the load, velocity from the motor through a low-pass, the force through a notch."""
-    notch = {"kind": "notch", "frequency": "200 Hz", "width": "80 Hz", "depth": 0.8}
-    low_pass = {"kind": "low_pass", "path": "feedback", "frequency": "300 Hz"}
-    loops = {"kind": "cascade", "kv": "40 1/s", "kp": "8e3 N*s/m", "velocity_integral_time": "20 ms"}
-    stage = machine(
-        controller={**loops, "filters": [notch, low_pass]}, encoder={"position": "load", "velocity": "motor"}
-    )
-    size, (centre, width, corner) = stage.flat()["motion.size"], 2 * np.pi * np.array([200.0, 80.0, 300.0])
-
-    def law(moved: np.ndarray, own: list[float]) -> tuple[float, list[float]]:
-        wound, velocity, notched, rate = own
-        wanting = 40 * (size - moved[0]) - velocity
-        force = 8e3 * (wanting + wound / 0.02)
-        bend = force - width * rate - centre**2 * notched
-        return force - 0.8 * width * rate, [wanting, corner * (moved[3] - velocity), rate, bend]
-
-    response = friso.simulate(stage, rtol=1e-9, sample_time=2e-3)
-    load, motor = by_hand(stage, response.time.values, law, 4)
+@pytest.mark.cases(slow=1)
+@pytest.mark.parametrize(
+    "stage",
+    [
+        machine(),
+        machine(controller={**LOOPS, "filters": [NOTCH, LOW_PASS]}, encoder={"position": "load", "velocity": "motor"}),
+    ],
+    ids=["PID on the load", "cascade on both encoders"],
+)
+def test_traces_of_load_and_motor_against_equations_by_hand(stage: Stage) -> None:
+    response, equations = friso.simulate(stage, rtol=1e-9, sample_time=2e-3), by_hand(stage.flat())
+    load, motor = equations.run(equations.start(), response.time.values, 1e-11)[:, [X, XF]].T
     assert np.ptp(motor - load) > stage.flat()["transmission.backlash"]
     assert np.abs(response["position"].values - load).max() < 2e-9
     assert np.abs(response["motor_position"].values - motor).max() < 2e-9

@@ -12,7 +12,7 @@ import pytest
 from variants import gains, lugre, release, stage, there_and_back
 
 import friso
-from benchmarks.windows_by_hand import trace
+from benchmarks.by_hand import trace
 from friso.equations import motion
 from friso.equations.settings import gain_states
 from friso.hunting import HuntingDoubt

@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.oracles.plain_runs import Plain, Run
-from benchmarks.truth.by_hand import NotWritten
+from benchmarks.by_hand import ByHand, NotWritten, Run, by_hand
 from benchmarks.truth.classes import classes_of
 from benchmarks.truth.draws import SERIES, draw
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE, judge, legs
@@ -117,14 +116,15 @@ def _written(series: str, forms: tuple[int, ...]) -> Iterator[tuple[str, int]]:
         if number % len(SERIES[series]) not in forms:
             continue
         with suppress(NotWritten):
-            if np.isfinite(Plain.of(draw(SEED, number, series).flat()).period):
+            plain = by_hand(draw(SEED, number, series).flat()).held().faster(1.0)
+            if np.isfinite(plain.period) and not plain.remembers:
                 yield series, number
 
 
 def by_brute_force(series: str, number: int) -> Record:
     """Return what becomes of a stage at many bandwidths, and between which two hunting ends."""
     start, flat = time.process_time(), draw(SEED, number, series).flat()
-    words = _words(Plain.of(flat))
+    words = _words(by_hand(flat).held())
     edge = edge_of(words)
     return {
         "series": series,
@@ -137,7 +137,7 @@ def by_brute_force(series: str, number: int) -> Record:
     }
 
 
-def _words(plain: Plain) -> dict[float, str]:
+def _words(plain: ByHand) -> dict[float, str]:
     words, swings = dict[float, str](), dict[float, float]()
 
     def attempt(factor: float) -> None:
@@ -174,7 +174,7 @@ def edge_of(words: Mapping[float, str]) -> list[float] | None:
     return pairs[-1] if pairs else None
 
 
-def what_becomes(plain: Plain, amplitude: float = 0.0, lasting: bool = False) -> tuple[str, float]:
+def what_becomes(plain: ByHand, amplitude: float = 0.0, lasting: bool = False) -> tuple[str, float]:
     """Return whether a stage keeps swinging from any start, and how far [m].
 
     It is also started around an `amplitude` [m]. Near an edge swings may die out after hundreds of periods: `lasting`
@@ -198,7 +198,7 @@ def what_becomes(plain: Plain, amplitude: float = 0.0, lasting: bool = False) ->
     return (UNSURE if starts else RESTS), np.nan
 
 
-def _starts(plain: Plain, amplitude: float) -> Iterator[np.ndarray]:
+def _starts(plain: ByHand, amplitude: float) -> Iterator[np.ndarray]:
     for share in ABOUT if amplitude else ():
         yield plain.stuck(share * amplitude)
     for place, distance in enumerate(DISTANCES[::-1] * plain.length):
@@ -206,15 +206,15 @@ def _starts(plain: Plain, amplitude: float) -> Iterator[np.ndarray]:
         yield plain.jumped(-distance if place % 2 else distance)
 
 
-def _followed(plain: Plain, start: np.ndarray, periods: float, rtol: float, last: bool) -> tuple[str, Run]:
+def _followed(plain: ByHand, start: np.ndarray, periods: float, rtol: float, last: bool) -> tuple[str, Run]:
     """Return what becomes of a run, and the run."""
     end = periods * plain.period
-    run = plain.run(start, end, rtol)
+    run = plain.long_run(start, end, rtol)
     small = SMALL * plain.length
     return judge(legs(run.times, run.places, end), run.spread, small, last) if run.done else FAILED, run
 
 
-def _confirmed(plain: Plain, state: np.ndarray, rounds: int) -> bool:
+def _confirmed(plain: ByHand, state: np.ndarray, rounds: int) -> bool:
     """Tell whether neighbours of a state on a swing resume that swing.
 
     They must keep `KEPT` of its spread for the given number of rounds.

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.by_hand import ByHand, by_hand
 from benchmarks.code_digest import code_digest
 from benchmarks.oracles.edges import FINE, QUOTAS, ROUNDS, Quota, Record, kept, of_quota
 from benchmarks.oracles.oracle import Finding, Oracle
-from benchmarks.oracles.plain_runs import BRISTLE, Plain
+from benchmarks.report import Task, each
 from benchmarks.return_map.answers import checked
-from benchmarks.truth.by_hand import INTEGRAL, LOW, VC, VP, XC, XP, V, X, Z
 from benchmarks.truth.claims import ATTRACTED
 from benchmarks.truth.draws import draw
 from benchmarks.truth.kept import CHECKED
@@ -36,33 +35,21 @@ JUST_BELOW, LASTING, SAME_SWING = 0.9975, 5, 0.01
 """Fraction of friso's edge at which plain runs start on its own motion, rounds for which they are followed, and the
 largest relative difference of their amplitude."""
 
-PLACES = {
-    **{"position": X, "velocity": V, "cart_position": XC, "cart_velocity": VC, "motor_position": XP},
-    **{"motor_velocity": VP, "parasitic_position": XP, "parasitic_velocity": VP, "bristle_deflection": Z},
-    **{"filtered_error": LOW, "filtered_position": LOW, "integral": INTEGRAL},
-    **{"motor_bristle_deflection": BRISTLE},
-}
-"""Indices in plain runs of friso's states."""
-
 SLACK = 1e-3
 """Relative distance by which an edge may lie outside brute force's bracket: the error of runs at 1e-6."""
 
 
 def answer(record: Record) -> Record:
     """Return what friso says about a stage."""
-    key = {"series": record["series"], "seed": record["seed"], "number": record["number"], "code": code_digest(CHECKED)}
-    lines = ANSWERS.read_text().splitlines() if ANSWERS.exists() else []
-    for said in map(json.loads, lines):
-        if {name: said[name] for name in key} == key:
-            return said
-    stage = draw(record["seed"], record["number"], record["series"])
-    kernels(needed_kernels(stage))
-    with np.errstate(all="ignore"):
-        said = key | checked(stage)
-    ANSWERS.parent.mkdir(parents=True, exist_ok=True)
-    with ANSWERS.open("a") as stream:
-        stream.write(json.dumps(said) + "\n")
-    return said
+
+    def asked(_: Task) -> Record:
+        stage = draw(record["seed"], record["number"], record["series"])
+        kernels(needed_kernels(stage))
+        with np.errstate(all="ignore"):
+            return checked(stage)
+
+    task = record["series"], record["seed"], record["number"], code_digest(CHECKED)
+    return next(said for _, said in each([task], asked, ANSWERS))
 
 
 def edges() -> Iterator[Finding]:
@@ -100,20 +87,15 @@ def missed(record: Record, said: Record) -> bool:
         return False
     factor = end["factor"] * JUST_BELOW
     flat = draw(record["seed"], record["number"], record["series"]).flat()
-    plain, names = Plain.of(flat).faster(factor), [*kernel(structure(faster(flat, factor))).states]
+    plain, names = by_hand(flat).held().faster(factor), [*kernel(structure(faster(flat, factor))).states]
     return any(_lasts(plain, names, motion) for motion in find_swings(faster(flat, factor)))
 
 
-def _lasts(plain: Plain, names: Sequence[str], motion: Swinging) -> bool:
+def _lasts(plain: ByHand, names: Sequence[str], motion: Swinging) -> bool:
     state = motion.seen if motion.cycles is None else motion.cycles.states[motion.number]
-    y = plain.released(0.0)
-    for name, value in zip(names, [] if state is None else state, strict=False):
-        y[PLACES[name]] = value
-    for follower, name in ((XC, "cart_position"), (XP, "motor_position")):
-        if name not in names and (name != "motor_position" or "parasitic_position" not in names):
-            y[follower : follower + 2] = y[:2]
+    y = plain.start() if state is None else plain.state(names, state[: len(names)])
     for _ in range(LASTING):
-        run = plain.run(y, ROUNDS[0] * plain.period, FINE)
+        run = plain.long_run(y, ROUNDS[0] * plain.period, FINE)
         if not run.done or abs(run.spread / 2 / motion.amplitude - 1) > SAME_SWING:
             return False
         y = run.state

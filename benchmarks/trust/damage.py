@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from pathlib import Path
 
 _TOKENS = (
     b"\x00", b"\xff\xfe", b"\x1b[2J", b"\xe2\x80\xae", b"\r", b"\n", b'"', b"'", b"[", b"]", b"{", b"}", b"=", b"#",
@@ -12,6 +13,20 @@ _TOKENS = (
     b"1" * 50_000, b"*" * 50_000, b"a" * 50_000, b" " * 50_000,
     b"\xed\xa0\x80", b"=1+1", b":log", b":0", b":1000000000",
 )  # fmt: skip
+
+
+def flip(file: Path, place: float) -> None:
+    """Change one bit of a file, at a share of its length."""
+    content = bytearray(file.read_bytes())
+    content[min(int(place * len(content)), len(content) - 1)] ^= 0x10
+    file.write_bytes(content)
+
+
+def exchange(first: Path, second: Path) -> None:
+    """Give two files each other's contents."""
+    one, other = first.read_bytes(), second.read_bytes()
+    first.write_bytes(other)
+    second.write_bytes(one)
 
 
 def damaged(content: bytes, rng: random.Random) -> bytes:

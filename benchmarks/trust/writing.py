@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import friso
-from benchmarks.trust.damage import damaged
+from benchmarks.trust.damage import damaged, exchange
 from benchmarks.trust.faults import struck
 from benchmarks.trust.inputs import folder_until_the_end
 from friso.errors import InputError
@@ -144,10 +144,10 @@ def _damage(path: Path, rng: random.Random) -> tuple[str, ...]:
     else:
         if kind == "exchange alike":
             second = rng.choice([item for item in every if item.parent == first.parent])
-        one, other = first.read_bytes(), second.read_bytes()
-        first.write_bytes(other)
-        if kind != "copy":
-            second.write_bytes(one)
+        if kind == "copy":
+            first.write_bytes(second.read_bytes())
+        else:
+            exchange(first, second)
     alone = kind not in ("exchange", "exchange alike")
     return (kind, *(str(file.relative_to(path)) for file in ((first,) if alone else (first, second))))
 

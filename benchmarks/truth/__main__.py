@@ -24,9 +24,9 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded
 
+from benchmarks.by_hand import NotWritten
 from benchmarks.truth.attack import attack
-from benchmarks.truth.by_hand import NotWritten
-from benchmarks.truth.draws import SERIES, draw
+from benchmarks.truth.draws import SERIES, UNDER_LAWS, draw, numbers_of
 from benchmarks.truth.kept import KeptAttacks, Record, dated, is_current
 from benchmarks.truth.positions import compared, summary
 from benchmarks.truth.tally import document, page, print_tally
@@ -37,7 +37,7 @@ from friso.platform.system import usable_cores
 
 def main() -> None:
     arguments = _arguments()
-    numbers = arguments.number or range(arguments.first, arguments.first + arguments.stages)
+    numbers = arguments.number or numbers_of(arguments.series, arguments.first, arguments.stages)
     if arguments.simulate:
         _simulate(arguments.seed, numbers, arguments.series)
         return
@@ -165,6 +165,12 @@ def _arguments() -> argparse.Namespace:
         default="stages",
         help="machines: cascades, transmissions, deadbands; axes: of machine tools, with settings against friction; "
         "drives: axes with friction at the motor; servos: with friction of joints, settings at standstill",
+    )
+    parser.add_argument(
+        "--law",
+        dest="series",
+        choices=UNDER_LAWS,
+        help="series: stages under this law of friction, whose cycles SciPy follows from event to event, too",
     )
     parser.add_argument("--checks", action="store_true", help="check the stages alone, and refute nothing")
     parser.add_argument("--simulate", action="store_true", help="compare runs of the stages with SciPy instead")

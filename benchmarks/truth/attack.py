@@ -13,7 +13,8 @@ import numpy as np
 
 from benchmarks.truth.claims import Claim, checked
 from benchmarks.truth.classes import classes_of
-from benchmarks.truth.draws import draw
+from benchmarks.truth.cycles import cycles_of
+from benchmarks.truth.draws import UNDER_LAWS, draw
 from benchmarks.truth.refute import Refutation, attempts
 from benchmarks.truth.second_opinion import scipy_refutations
 from friso.engine.allowance import Exhausted, allowance
@@ -51,6 +52,12 @@ def _attack(stage: Stage, record: dict[str, Any], scipy_share: float, checks: bo
     record |= {"cpu": said.cpu, "work": said.work}
     start = time.process_time()
     for claim in said.claims:
+        if record["series"] in UNDER_LAWS and not checks:
+            for cycle in cycles_of(claim):
+                record.setdefault("cycles", []).append(asdict(cycle))
+                if cycle.wrong:
+                    why = f"of {cycle.amplitude:.4g} m: {cycle.wrong}"
+                    record["refuted"].append({"case": claim.case, "of": "cycle", "sure": True, "why": why})
         tried = {} if checks else _tried(claim, record["number"], scipy_share)
         outcomes, refuted = _outcomes(tried)
         record["claims"].append(_as_data(claim) | {"outcomes": outcomes})

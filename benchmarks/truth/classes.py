@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from benchmarks.truth.by_hand import joint_state
+from benchmarks.by_hand import joint_state
 from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.tables import BACKLASH, MOTOR_FRICTION, TRANSMISSION
 

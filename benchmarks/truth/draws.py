@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import count, islice
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy as np
 from friso.quantities import Quantity
 from friso.stage import Stage
 from friso.stage.section import numeric_fields
-from friso.stage.tables import FRICTION
+from friso.stage.tables import FRICTION, friction_law
+from friso.studies.laws import with_friction
 
 GRAVITY = 9.81
 SPREAD = 3.0
@@ -154,9 +156,40 @@ SERVOS = tuple(
 
 SERIES = {"stages": FORMS, "machines": MACHINES, "axes": AXES, "drives": DRIVES, "servos": SERVOS}
 
+UNDER_LAWS = ("dahl", "elasto_plastic", "rolling", "gms")
+"""Further series: stages with LuGre friction and van Dijk's controller alone, each under this law instead."""
+
+LAW_FORMS = (Form("rigid"), Form("free"), Form("locked"))
+LAW_ELEMENTS = {"rigid": 4, "free": 2, "locked": 6}
+"""Structures of stages under a law, and the number of elements of a law with several, as each needs a kernel."""
+
+
+def numbers_of(series: str, first: int, stages: int) -> list[int]:
+    """Return the numbers of so many stages of a series."""
+    usable = (n for n in count(first) if series not in UNDER_LAWS or FORMS[n % len(FORMS)] in LAW_FORMS)
+    return [*islice(usable, stages)]
+
+
+def _under(law: str, seed: int, number: int) -> Stage:
+    """Return the numbered stage under a law, with a shape before sliding drawn anywhere within its ranges."""
+    stage, rng, joint = draw(seed, number), np.random.default_rng([seed, number, 11]), FORMS[number % len(FORMS)].joint
+    keys = dict(friction_law(law).keeping(friction_law("lugre").shown(stage.flat()), LAW_ELEMENTS[joint]))
+    if law == "elasto_plastic":
+        most = keys["friction.coulomb"] / keys["friction.bristle_stiffness"]
+        keys["friction.breakaway_deflection"] = float(rng.uniform(0.05, 0.95)) * most
+    if law == "rolling":
+        keys["friction.rolling_exponent"] = float(rng.uniform(1.0, 2.5))
+    if law == "gms":
+        shares = rng.dirichlet(np.full(sum("share" in key for key in keys), 3.0))
+        keys["friction.attraction"] *= float(np.exp(rng.uniform(-2.3, 2.3)))
+        keys |= {f"friction.element_share.{n}": float(value) for n, value in enumerate(shares, 1)}
+    return with_friction(stage, law, keys)
+
 
 def draw(seed: int, number: int, series: str = "stages") -> Stage:
     """Return the numbered stage of a series that begins with `seed`."""
+    if series in UNDER_LAWS:
+        return _under(series, seed, number)
     forms = SERIES[series]
     tables = _Draw(np.random.default_rng([seed, number]), forms[number % len(forms)]).tables()
     kind = "" if forms is FORMS else f", {series}"

@@ -16,7 +16,7 @@ from benchmarks.code_digest import code_digest
 CHECKED = ("stage", "equations", "engine", "hunting")
 """Folders of friso that determine the answers of a check."""
 
-ATTACKING = ("attack", "by_hand", "claims", "draws", "refute", "second_opinion", "swings", "trials")
+ATTACKING = ("attack", "../by_hand", "claims", "cycles", "draws", "refute", "second_opinion", "swings", "trials")
 """Modules of this adversary that determine its own answers."""
 
 Record = dict[str, Any]
@@ -30,7 +30,7 @@ def code_version() -> str:
 
     Comments and words are left out.
     """
-    own = [str(Path(__file__).with_name(f"{name}.py")) for name in ATTACKING]
+    own = [str((Path(__file__).parent / f"{name}.py").resolve()) for name in ATTACKING]
     return f"{code_digest(CHECKED)}-{code_digest(own)}"
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import friso
+from benchmarks.by_hand import ByHand, by_hand
 from benchmarks.report import Goal, print_goals, print_table
-from benchmarks.truth.by_hand import ByHand, by_hand
 from benchmarks.truth.draws import draw
 from friso.engine.batch import SIMULATION_RTOL
 from friso.stage import Stage

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.truth.by_hand import NotWritten, by_hand
+from benchmarks.by_hand import NotWritten, by_hand
 from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, least_swing
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
 from benchmarks.truth.trials import CLOSER, FINE, LINGERING, ROUGH, ROUNDS, Bench, Outcome, Trial
@@ -27,7 +27,7 @@ FEW = (16, 8, 32, 8)
 """Numbers of starts of each kind at a crossover beside an edge."""
 
 SECOND = 24
-"""Starts of a battery that are also followed at the finer tolerance."""
+"""Starts of a battery that are also followed at the finer tolerance, and first where any that swings is enough."""
 
 TRIED, APART = 3, 1e-3
 """Number of swinging starts that are examined closely, and the relative difference of their amplitudes: closer ones are
@@ -115,7 +115,9 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
 
 
 def _may_hunt(bench: Bench, trial: Trial, kicks: tuple[float, ...] = ()) -> bool:
-    """Tell whether any start may keep swinging: first the claimed kicks, then the trial."""
+    """Tell whether any start may keep swinging: first a few of them, then the claimed kicks and the whole trial."""
+    if SWINGS in bench.follow(_few(trial), ROUGH, ROUNDS[:1], patient=False).words:
+        return True
     trials = (bench.released(np.array(kicks)), trial) if kicks else (trial,)
     runs = (bench.follow(begun, rtol) for rtol in (ROUGH, FINE) for begun in trials)
     return any(np.isin(run.words.astype(str), (SWINGS, UNSURE)).any() for run in runs)
@@ -126,8 +128,7 @@ def swinging(bench: Bench, trial: Trial) -> str:
 
     Its neighbours swing as well. The text includes SciPy's answer.
     """
-    few = np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int))
-    for rtol, begun in ((ROUGH, trial), (FINE, trial.take(few))):
+    for rtol, begun in ((ROUGH, trial), (FINE, _few(trial))):
         run = bench.follow(begun, rtol)
         for start in _different(run):
             if attracts(bench, run.ends[start], float(run.periods[start])):
@@ -136,6 +137,11 @@ def swinging(bench: Bench, trial: Trial) -> str:
                 beside = f"and so do its neighbours at {CLOSER:g} and {FINE:g}"
                 return f"{begins} {seen}, {beside}; {by_scipy(bench, run.ends[start], swing)}"
     return ""
+
+
+def _few(trial: Trial) -> Trial:
+    """Return `SECOND` starts of a battery, of all kinds and sizes."""
+    return trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
 
 
 def _different(run: Outcome) -> np.ndarray:
@@ -168,42 +174,17 @@ def may_attract(bench: Bench, motion: Swinging) -> bool:
 
 def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
     """Return what the equations by hand say about a swing [m] in which a run ended."""
+    names, times = bench.kernel.states, np.linspace(0.0, SCIPY_PERIODS * bench.period, 2000)
     try:
         equations = by_hand(bench.flat).held()
+        x = equations.run(equations.state(names, end[: len(names)]), times)[:, equations.measured]
     except NotWritten as missing:
         return f"no equations by hand ({missing})"
-    if missing := [name for name in bench.kernel.states if name not in _PLACES]:
-        return f"no equations by hand ({', '.join(missing)})"
-    y = equations.start()
-    for name, value in zip(bench.kernel.states, end, strict=False):
-        y[_PLACES[name]] = value
-    if "cart_position" not in bench.kernel.states:
-        y[2:4] = y[0:2]
-    if not {"parasitic_position", "motor_position"} & set(bench.kernel.states):
-        y[4:6] = y[0:2]
-    times = np.linspace(0.0, SCIPY_PERIODS * bench.period, 2000)
-    x = equations.run(y, times)[:, equations.measured]
     if not np.isfinite(x[-1]):
         return "SciPy does not get there"
     swing = float(np.ptp(x) / 2)
     word = "confirms" if abs(swing / amplitude - 1) < ALIKE else "CONTRADICTS"
     return f"SciPy {word}: {swing:.6g} m over {times[-1]:.4g} s"
-
-
-_PLACES = {
-    "position": 0,
-    "velocity": 1,
-    "cart_position": 2,
-    "cart_velocity": 3,
-    "parasitic_position": 4,
-    "parasitic_velocity": 5,
-    "motor_position": 4,
-    "motor_velocity": 5,
-    "bristle_deflection": 6,
-    "filtered_error": 7,
-    "filtered_position": 7,
-    "integral": 8,
-}
 
 
 def _away(claim: Claim, bench: Bench) -> Iterator[Refutation]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.truth.by_hand import ByHand, NotWritten, by_hand
+from benchmarks.by_hand import ByHand, NotWritten, by_hand
 from benchmarks.truth.claims import RUNS_AWAY, Claim
 from benchmarks.truth.refute import Refutation
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
@@ -33,20 +33,22 @@ def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
     hunt.
     """
     flat = claim.stage.flat()
+    displaced = flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
     try:
         equations = by_hand(flat)
+        start, still = equations.start(displaced), equations.held()
+        begun = {"its own motion": (equations, start)}
+        begun |= {f"release {d:.6g}": (still, still.start(d)) for d in np.array(RELEASES) * equations.length}
     except NotWritten:
         return
-    if flat["motion.kind"] == "ramp" or not np.isfinite(equations.wait) or claim.verdict == "failed":
+    if claim.verdict == "failed" or flat["motion.kind"] == "ramp":
         return
-    displaced = flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
-    start, still = equations.start(displaced), equations.held()
+    if equations.remembers or not np.isfinite(equations.wait):
+        return
     if claim.verdict in ("hunts", RUNS_AWAY) and ends_so(equations, start, RESTS):
         yield Refutation("own motion", claim.sure, "SciPy: the motion rests in the end")
     if claim.attracted or claim.verdict == RUNS_AWAY:
         return
-    begun = {"its own motion": (equations, start)}
-    begun |= {f"release {d:.6g}": (still, still.start(d)) for d in np.array(RELEASES) * equations.length}
     for name, run in begun.items():
         if ends_so(*run, SWINGS):
             yield Refutation("verdict", claim.sure, f"SciPy: {name} swings on")
@@ -64,7 +66,7 @@ def ends_so(equations: ByHand, start: np.ndarray, word: str) -> bool:
 def followed(equations: ByHand, start: np.ndarray, rtol: float) -> str:
     """Return what becomes of a stage from a state, as a word of `swings`."""
     corner = float(equations.pieces[-1, 0])
-    period = 2 * (3 * equations.wait + 2 * np.pi / equations.omega)
+    period = equations.period
     times = corner + np.linspace(0.0, PERIODS * period, SAMPLES)
     if corner > 0:
         before = np.linspace(0.0, corner, 100)

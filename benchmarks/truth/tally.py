@@ -89,6 +89,7 @@ def print_tally(records: Sequence[Record], tally: dict[str, Any]) -> None:
     for witness in tally["wrong"]:
         print(f"  WRONG: {witness['stage']}, {witness['case']}, {witness['of']}: {witness['why']}")
     _print_doubts(records)
+    _print_cycles(records)
     every, check, attack = tally["all"], tally["check_cpu_s"], tally["attack_cpu_s"]
     wrong = sum(every[f"{part}_wrong"] for part in ("verdicts", "edges", "margins"))
     share = every["verdicts_certain"] / max(every["verdicts"], 1)
@@ -161,6 +162,20 @@ def _witnesses(records: Iterable[Record], sure: bool) -> list[dict[str, Any]]:
 def _spread(seconds: Sequence[float]) -> dict[str, float]:
     seconds = seconds or [0.0]
     return {"median": float(np.median(seconds)), "mean": float(np.mean(seconds)), "worst": max(seconds)}
+
+
+def _print_cycles(records: Iterable[Record]) -> None:
+    """Print how far cycles under a law of friction differ at most from those of SciPy and of simulations."""
+    cycles: dict[str, list[dict[str, float]]] = {}
+    for record in records:
+        cycles.setdefault(record["series"], []).extend(record.get("cycles", []))
+    rows = []
+    for law, some in ((law, some) for law, some in cycles.items() if some):
+        grown = [abs(cycle["growth"] - cycle["multiplier"]) for cycle in some if np.isfinite(cycle["growth"])]
+        worst = [*(max(cycle[name] for cycle in some) for name in ("gap", "size")), max(grown, default=0.0)]
+        rows.append([law, len(some), *(f"{value:.1g}" for value in (*worst, max(c["brute"] for c in some)))])
+    if rows:
+        print_table(("law", "cycles", "open by", "size", "multiplier", "brute"), rows)
 
 
 def _print_doubts(records: Iterable[Record]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.truth.swings import FAILED, SWINGS, UNSURE, judge, legs
+from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE, judge, legs
 from friso.engine.arrays import STATISTICS, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
@@ -45,6 +45,9 @@ LINGERING = 12_000.0
 """Periods of a swing for which its neighbours are followed. In that time a deviation of 0.3 % from a cycle that repels
 by 0.03 % a swing grows by a factor of a thousand. Errors of 1e-6 change such a multiplier by as much as it differs from
 1: at the rough tolerance runs stay on the cycle for 60 000 periods."""
+
+SOONER = 0.05
+"""Share of that time after which neighbours that rest are looked for, if it is longer than the first round."""
 
 FOLLOWED = 6
 """Number of runs that are followed further."""
@@ -179,14 +182,19 @@ class Bench:
         return Trial(states, ("release",) * count, displacements)
 
     def follow(
-        self, trial: Trial, rtol: float, rounds: tuple[float, ...] = ROUNDS, any_will_do: bool = True
+        self,
+        trial: Trial,
+        rtol: float,
+        rounds: tuple[float, ...] = ROUNDS,
+        any_will_do: bool = True,
+        patient: bool = True,
     ) -> Outcome:
         """Return what becomes of starts.
 
         A few of the starts that are undecided after a round are followed further, unless a single swinging one is
-        enough.
+        enough. After the last round a start that is undecided is judged by how it has changed, if `patient`.
         """
-        return self._follow(self.held, trial.states, 0.0, rtol, rounds, any_will_do)
+        return self._follow(self.held, trial.states, 0.0, rtol, rounds, any_will_do, patient)
 
     def stuck_at(self, displacements: np.ndarray) -> np.ndarray:
         """Return states of the stage stuck at displacements [m], with no force exerted."""
@@ -209,9 +217,14 @@ class Bench:
         """
         states = beside(1 + np.concatenate([-BESIDE, BESIDE]))
         trial = Trial(states, ("beside a swing",) * len(states), np.ones(len(states)))
-        both = np.ones(len(BESIDE), bool)
+        both, periods = np.ones(len(BESIDE), bool), time / self.period
+        if SOONER * periods > ROUNDS[0]:  # most that leave a swing rest long before the end
+            soon = self.follow(trial, CLOSER, (SOONER * periods,), patient=False)
+            both = (soon.words.reshape(2, -1) != RESTS).all(axis=0)
+            if not both.any():
+                return False
         for rtol in (CLOSER, FINE):
-            ended = np.isin(self.follow(trial, rtol, (time / self.period,)).words.astype(str), words)
+            ended = np.isin(self.follow(trial, rtol, (periods,)).words.astype(str), words)
             both &= ended.reshape(2, -1).all(axis=0)
             if not both.any():
                 return False
@@ -234,6 +247,7 @@ class Bench:
         rtol: float,
         rounds: tuple[float, ...],
         any_will_do: bool,
+        patient: bool = True,
     ) -> Outcome:
         count = 1 if states is None else len(states)
         words = np.full(count, UNSURE, dtype=object)
@@ -245,7 +259,9 @@ class Bench:
             own = {**flat, "motion.duration": end}
             for part in run_chunks(self.kernel, own, len(on), self._options(rtol), begin):
                 which = on[part.numbers]
-                words[which], amplitude[which], own_periods[which] = self._words(part, end, number == len(rounds) - 1)
+                words[which], amplitude[which], own_periods[which] = self._words(
+                    part, end, patient and number == len(rounds) - 1
+                )
                 ends[which] = self._at_rest(part.results.ends, flat)
                 followed[which] += end
             unsure = np.flatnonzero(words == UNSURE)

@@ -20,7 +20,6 @@ from friso.shown.drawing.figure import (
     Axis,
     Category,
     Cloud,
-    Dash,
     Figure,
     Lettering,
     Limit,
@@ -39,16 +38,12 @@ NAMES: dict[CycleShape, str] = {
 }
 COLOURS: dict[CycleShape, str] = {"symmetric": INK, "asymmetric": BLUE, "whole": INK}
 SYMBOLS: dict[str, Symbol] = {"flip": "circle", "fold": "triangle", "torus": "patch"}
-DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
 NODES = {
     ATTRACTS: Category("hunting is possible", VERMILLION),
     REPELS: Category("no hunting was found", QUIET),
     UNKNOWN: Category("unknown", "#ffffff"),
     INVALID: Category("invalid stage", LIGHT),
 }
-
-LOST = "not followed farther"
-"""Label of ends of curves inside the range, and of changes of verdict at which no curve could be started."""
 
 LARGEST_MULTIPLIER = 2.5
 """Largest Floquet multiplier that is shown."""

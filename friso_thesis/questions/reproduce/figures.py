@@ -11,7 +11,6 @@ import numpy as np
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE, counted_peaks
 from friso.quantities import percent
 from friso.questions.bode.figures import ResponseCurve, bode_figures, magnitude
-from friso.questions.boundary.figures import DASHES
 from friso.questions.check.figures import SHARES
 from friso.questions.map.figures import map_panel
 from friso.questions.map.findings import statement
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from friso_thesis.studies.rig.experiments.frf import MeasuredLoop
-    from friso_thesis.studies.thesis.cycles import Edge
     from friso_thesis.studies.thesis.linear.loops import CrossoverLoops
     from friso_thesis.studies.thesis.reproduce import Reproduction
 
@@ -170,16 +168,12 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
 
 
 def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) -> Panel:
-    """Return the map with the curves on which the hunting cycle stops attracting."""
+    """Return the map with the curves on which hunting ends."""
     figures = reproduction.cycles.get(study.name)
     if figures is None:
         return panel
-    lines = tuple(_line(edge) for edge in figures.edges)
+    lines = tuple(Series(edge.x, edge.y, "edge of hunting", VERMILLION, width=2.2) for edge in figures.edges)
     return replace(panel, series=(*panel.series, *lines))
-
-
-def _line(edge: Edge) -> Series:
-    return Series(edge.x, edge.y, f"edge of the attracting cycle ({edge.kind})", VERMILLION, DASHES[edge.kind], 2.2)
 
 
 def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:

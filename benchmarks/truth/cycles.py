@@ -1,6 +1,6 @@
-"""Follow with SciPy the cycles that friso closes by shooting.
+"""Follow with SciPy, from event to event, the cycles that friso closes by shooting.
 
-The tests ask whether they close, how large they are, and how a deviation grows. Brute force repeats this at two
+It is asked whether they close, how large they are, and how a deviation grows. Simulations repeat this at two
 tolerances.
 """
 
@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from benchmarks.laws.by_hand import by_hand
+from benchmarks.by_hand import INTEGRAL, RIGID, XC, X, by_hand
 from benchmarks.truth.claims import Claim
 from friso.hunting import Cycles, Ensemble
 
@@ -37,7 +36,6 @@ class Shown:
     limiter chatters); and the relative difference of the amplitude by brute force.
     """
 
-    case: str
     amplitude: float
     multiplier: float
     gap: float
@@ -61,8 +59,11 @@ class Shown:
 
 
 @np.errstate(all="ignore")
-def cycles_of(claim: Claim, surveyed: Any) -> Iterator[Shown]:
+def cycles_of(claim: Claim) -> Iterator[Shown]:
     """Yield the cycles of a claim, including unstable ones."""
+    surveyed = claim.surveyed
+    if surveyed is None:
+        return
     families = [family for family in surveyed.families if family.closed[0] and not family.attracting[0]]
     closed = [m.cycles.take(np.array([m.number])) for m in surveyed.motions if m.cycles is not None]
     for cycle in (*closed, *families):
@@ -70,25 +71,22 @@ def cycles_of(claim: Claim, surveyed: Any) -> Iterator[Shown]:
 
 
 def _shown(claim: Claim, cycle: Cycles) -> Shown:
-    ensemble, equations = Ensemble.held(claim.stage.flat(), 1), by_hand(claim.stage.flat())
+    ensemble, equations = Ensemble.held(claim.stage.flat(), 1), by_hand(claim.stage.flat()).held()
     names, time, sign = ensemble.kernel.states, float(cycle.orbits.times[0]), cycle.sign
-    start = equations.state(dict(zip(names, cycle.states[0], strict=True)))
-    end, rates, high, low = equations.run(start, time, RTOL)
-    gap = float(np.max(np.abs(_on_section(end, rates, sign, start) - start) / equations.scales))
-    other_high, other_low = (-low, -high) if sign < 0 else (high, low)
-    size = (max(high, other_high) - min(low, other_low)) / 2 / float(cycle.amplitude[0]) - 1
-    growth = np.nan
+    at, start = equations.places(names), equations.state(names, cycle.states[0])
+    one = equations.followed(start, time, RTOL)
+    gap = np.max(np.abs(_on_section(one.states[-1], one.rates, sign, start) - start)[at] / equations.scales[at])
+    high, low = (max(one.high, -one.low), min(one.low, -one.high)) if sign < 0 else (one.high, one.low)
+    size, growth = (high - low) / 2 / float(cycle.amplitude[0]) - 1, np.nan
     if not ensemble.chatters:
-        body = 0 if equations.joint == "rigid" else 2
-        direction = equations.state(dict(zip(names, cycle.direction[0], strict=True)))
+        body = X if equations.numbers.joint == RIGID else XC
         away = AWAY * abs(start[body])
-        ends = [equations.run(start + way * away * direction, time, RTOL)[0] for way in (1, -1)]
-        off = [_on_section(other, rates, sign, start)[body] for other in ends]
+        aside = away * equations.state(names, cycle.direction[0])
+        ends = [equations.followed(start + way * aside, time, RTOL).states[-1] for way in (1, -1)]
+        off = [_on_section(other, one.rates, sign, start)[body] for other in ends]
         growth = float(off[0] - off[1]) / (2 * away)
-    return Shown(
-        claim.case, float(cycle.amplitude[0]), float(cycle.multiplier[0]), gap, abs(size), growth,
-        _brute(ensemble, cycle),
-    )  # fmt: skip
+    multiplier, brute = float(cycle.multiplier[0]), _brute(ensemble, cycle)
+    return Shown(float(cycle.amplitude[0]), multiplier, float(gap), abs(size), growth, brute)
 
 
 def _on_section(end: np.ndarray, rates: np.ndarray, sign: float, start: np.ndarray) -> np.ndarray:
@@ -96,7 +94,7 @@ def _on_section(end: np.ndarray, rates: np.ndarray, sign: float, start: np.ndarr
 
     On the section the integrator's state equals that of the start, or of its mirror image for half a period.
     """
-    return sign * end - sign * rates * (sign * end[5] - start[5]) / (sign * rates[5])
+    return sign * end - sign * rates * (sign * end[INTEGRAL] - start[INTEGRAL]) / (sign * rates[INTEGRAL])
 
 
 def _brute(ensemble: Ensemble, cycle: Cycles) -> float:

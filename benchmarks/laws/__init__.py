@@ -1,1 +1,0 @@
-"""Test random stages under each friction law against SciPy and brute force."""
