@@ -870,7 +870,7 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     shown = replace(thorough_study, cycles={"system": cycles_})
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
-    assert "edge of the attracting cycle (flip)" in labels
+    assert "edge of hunting" in labels
 
 
 def unreadable_archive(stream: BinaryIO) -> None:
