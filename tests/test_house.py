@@ -9,12 +9,14 @@ from collections import defaultdict
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
+from statistics import median
 
 import grimp
 import pytest
 
 import friso
 import friso_thesis
+from benchmarks.code import count
 from friso.interface.answer import Answer
 from friso.interface.question import QUESTIONS
 
@@ -190,6 +192,20 @@ def inner_modules(path: Path) -> Iterator[str]:
             module = next(".".join(parts[:n]) for n in range(len(parts), 0, -1) if ".".join(parts[:n]) in MODULES)
             if module.count(".") > 1 and module not in OFFERED:
                 yield module
+
+
+def test_a_module_is_a_room() -> None:
+    """Half of the modules with code have 120 lines of it or more, and imports are a tenth of all (9 % are wanted)."""
+    modules = {name: text for name, text in sources().items() if not name.startswith("friso_thesis")}
+    sizes = [count(text).code for text in modules.values()]
+    imports = sum(
+        (node.end_lineno or node.lineno) - node.lineno + 1
+        for text in modules.values()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    )
+    assert median(size for size in sizes if size) >= 120
+    assert imports / sum(sizes) < 0.102
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
