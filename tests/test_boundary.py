@@ -20,6 +20,7 @@ from friso.hunting import (
     plane,
 )
 from friso.hunting.continuation.locate import turn
+from friso.stage import Stage
 from friso.studies.boundary import stability_changes
 
 pytestmark = pytest.mark.xdist_group("rigid")
@@ -223,3 +224,22 @@ def test_where_hunting_ends_beyond_a_curve_it_is_searched_on() -> None:
     for hunts, places in zip((True, False), beside(plane(space, nodes=3), 0.02), strict=True):
         for place in places:
             assert bool(find_swings(space.stages(place[None]).flat)) == hunts
+
+
+@pytest.mark.slow
+def test_a_symmetric_orbit_ends_where_the_stage_is_not_symmetric() -> None:
+    """An orbit over half a period does not exist beyond, though Newton's method closes one."""
+    space = Space.of(RIGID, [KeyRange("controller.crossover", 8.5, 9.0), KeyRange("friction.asymmetry", 0.0, 0.04)])
+    result = plane(space, nodes=3)
+    assert result.attracts.tolist() == [True, False, False] * 3
+    for place in beside(result, 0.05)[1]:
+        assert not find_swings(space.stages(place[None]).flat)
+
+
+@pytest.mark.slow
+def test_a_range_over_four_decades_is_searched(rig: Stage) -> None:
+    """Keys are compared with their values in the middle of a line, not with a ten-thousandth of them."""
+    axes = [KeyRange("joint.stroke", 1e-7, 1e-3, unit="m"), KeyRange("controller.crossover", 5.0, 9.0, unit="Hz")]
+    result = plane(Space.of(rig.replace({"joint.locked": False}), axes), nodes=3)
+    assert result.attracts.reshape(3, 3)[0].all()
+    assert {"flip"} <= {*result.curves[0].kinds}

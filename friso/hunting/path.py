@@ -199,10 +199,11 @@ class OrbitLine:
 
     They are closed at `places`, logarithms of factors, ascending in that direction. There they have `states` (count,
     states), return after `times` [s], or to their mirror image if `sign` is -1, and have a `multiplier`, all (count,).
-    `swings` counts swings in that time.
+    `swings` counts swings in that time. Orbits are closed to the relative tolerance `rtol`.
     """
 
     path: ParameterPath
+    rtol: float
     ahead: float
     sign: float
     swings: int
@@ -212,12 +213,14 @@ class OrbitLine:
     multiplier: np.ndarray
 
     @classmethod
-    def of(cls, path: ParameterPath, ahead: float, factor: float, motion: Swinging) -> OrbitLine:
+    def of(
+        cls, path: ParameterPath, ahead: float, factor: float, motion: Swinging, rtol: float = CYCLE_RTOL
+    ) -> OrbitLine:
         """Begin with the closed orbit of a motion of the stage at a factor."""
         assert motion.cycles is not None
         one = motion.cycles.take(np.array([motion.number]))
         orbits, places = one.orbits, np.log([factor])
-        return cls(path, ahead, one.sign, one.swings, places, orbits.states, orbits.times, one.multiplier)
+        return cls(path, rtol, ahead, one.sign, one.swings, places, orbits.states, orbits.times, one.multiplier)
 
     def distance(self, factor: float) -> float:
         """Return the distance [m] at which the stage sticks on the orbit nearest to a factor."""
@@ -225,20 +228,25 @@ class OrbitLine:
         return float(self.states[nearest, self._stages(self.places[:1]).sticking])
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-    def close_at(self, place: float) -> list[Swinging]:
-        """Close the orbit at a further place, if that succeeds, and return it as a list if it is stable."""
+    def close_at(self, place: float) -> tuple[Swinging, ...]:
+        """Close the orbit at a further place, if that succeeds, and return it if it is stable.
+
+        There is no orbit over half a period where the stage is not symmetric.
+        """
         stages, (states, times) = self._stages(np.array([place])), self._guessed(place)
-        rtol = stages.searching_rtol(CYCLE_RTOL)
+        if self.sign < 0 and not stages.symmetric[0]:
+            return ()
+        rtol = stages.searching_rtol(self.rtol)
         orbits = close(stages, states, times, self.sign, rtol, self.swings)
         orbits.closed[:] &= kept(stages, orbits, states[:, stages.sticking])
         cycles = described(stages, orbits, rtol)
         if not cycles.closed[0]:
-            return []
+            return ()
         k = int((self.ahead * self.places).searchsorted(self.ahead * place))
         self.places, self.states = np.insert(self.places, k, place), np.insert(self.states, k, orbits.states[0], axis=0)
         self.times = np.insert(self.times, k, orbits.times[0])
         self.multiplier = np.insert(self.multiplier, k, cycles.multiplier[0])
-        return of_cycles(np.zeros(1, np.int64), cycles, stages.sticking)
+        return tuple(of_cycles(np.zeros(1, np.int64), cycles, stages.sticking))
 
     def _guessed(self, place: float) -> tuple[np.ndarray, np.ndarray]:
         """Predict the states, (1, states), and the time of return [s], (1,), of the orbit at a place.
@@ -274,7 +282,9 @@ class OrbitLine:
                 return None
             if beyond.size:
                 target = self._root(at)
-                if min(abs(self.places - target)) < tolerance or abs(beyond[0] - low) < tolerance:
+                near = int(np.abs(self.places - target).argmin())
+                met = abs(abs(self.multiplier[near]) - 1) < edge_settings.met_multiplier_share
+                if (met and abs(self.places[near] - target) < tolerance) or abs(beyond[0] - low) < tolerance:
                     return float(np.exp(target)), self._kind(at)
             else:
                 target = low + self.ahead * step if step < abs(last - low) else last

@@ -86,7 +86,7 @@ class EdgeSearch:
             beyond, survey = self._proved(next_to, farther, distances)
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:
-                if again := tuple(line.close_at(float(np.log(next_to)))):
+                if again := line.close_at(float(np.log(next_to))):
                     if next_to == self.farthest:
                         raise Beyond
                     place.at, place.motions, place.outside = next_to, again, self._still_ahead(next_to, place.outside)

@@ -108,11 +108,15 @@ class EdgeSettings(Settings):
     longest_edge_step: float = setting(0.12, "log of the parameter")
     """Longest step between orbits that are closed on the way to an edge. Over more, Newton's method mostly fails."""
 
-    flip_search_step: float = setting(1e-4, "log of bandwidth")
-    """Precision of a flip in bandwidth; the edge is shown with four digits."""
+    met_multiplier_share: float = setting(0.01, "")
+    """Largest difference of a multiplier from its limit at an orbit that is taken for the end. A multiplier that jumps
+    past its limit does not come so near."""
 
-    chattering_edge_step: float = setting(2e-3, "log of bandwidth")
-    """Step in bandwidth with a chattering limiter. Shorter steps follow the roughness of multipliers."""
+    flip_search_step: float = setting(1e-4, "log of the parameter")
+    """Precision of a flip; the edge is shown with four digits."""
+
+    chattering_edge_step: float = setting(2e-3, "log of the parameter")
+    """Step with a chattering limiter. Shorter steps follow the roughness of multipliers."""
 
     beyond_bandwidths: tuple[float, ...] = setting((1.0095, 1.03, 1.06), "")
     """Factors beyond the end of an orbit in bandwidth at which other attractors are looked for. The first makes the

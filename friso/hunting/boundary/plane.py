@@ -9,18 +9,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from typing import Literal
 
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
+from friso.hunting.attractors import Attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.boundary.space import Space
 from friso.hunting.continuation.settings import continuation_settings
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.hunting.path import LossKind, OrbitLine, ParameterPath
 from friso.hunting.settings import edge_settings
-from friso.hunting.what_attracts import sketched, surveyed_roughly, what_attracts
+from friso.hunting.what_attracts import has_a_map, sketched, surveyed_roughly, what_attracts
 from friso.progress import Progress, Tally, silent
 
 INVALID = -1.0
@@ -104,9 +108,8 @@ def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, prog
     allowed = np.flatnonzero(space.allowed(points))
     stages = space.stages(points[allowed])
     unstable = np.any([*unstable_among(stages).values()], axis=0)
-    surveyed = surveyed_roughly(stages)
     state = np.full(nodes * nodes, INVALID)
-    state[allowed] = np.where(surveyed.decided, surveyed.attracts, np.nan)
+    state[allowed] = _hunts(stages, surveyed_roughly(stages))
     search = _Search(space, points, state, rtol)
     search.run(progress)
     mesh = space.grid(2 * nodes - 1).reshape(2 * nodes - 1, 2 * nodes - 1, 2)
@@ -127,9 +130,8 @@ class _Search:
     """Search for the edge of hunting on the lines between neighbours of a grid.
 
     `points` are the coordinates of the stages, (n, 2), and `hunts`, (n,), tells which hunt: 1, 0, NaN if that is not
-    known, or INVALID. `motions` are those of the stages that were searched thoroughly, `reached` others that an orbit
-    reached.
-    `found` holds between which places hunting ends, and how.
+    known, or INVALID. `motions` are those of stages whose orbits were closed, `reached` others that an orbit reached.
+    `found` holds between which places hunting ends, and how; "" where surveys did not decide.
     """
 
     space: Space
@@ -138,7 +140,7 @@ class _Search:
     rtol: float
     motions: dict[int, tuple[Swinging, ...]] = field(default_factory=dict)
     reached: set[int] = field(default_factory=set)
-    found: dict[Pair, tuple[np.ndarray, np.ndarray, LossKind]] = field(default_factory=dict)
+    found: dict[Pair, tuple[np.ndarray, np.ndarray, LossKind | Literal[""]]] = field(default_factory=dict)
 
     def run(self, progress: Progress) -> None:
         """Locate the edge between all neighbours of which only one hunts."""
@@ -158,23 +160,27 @@ class _Search:
                 yield from zip(inner[changes].tolist(), outer[changes].tolist(), strict=True)
 
     def _inspect(self, numbers: list[int]) -> None:
-        """Search stages thoroughly that seem to hunt, by number."""
-        survey = what_attracts(self.space.stages(self.points[numbers]), self.rtol)
-        for k, number in enumerate(numbers):
+        """Close orbits of stages that seem to hunt, by number."""
+        stages = self.space.stages(self.points[numbers])
+        survey = what_attracts(stages, self.rtol)
+        for k, (number, hunts) in enumerate(zip(numbers, _hunts(stages, survey).tolist(), strict=True)):
             self.motions[number] = survey.take(np.array([k])).motions
-            if not survey.attracts[k] and number not in self.reached:
-                self.hunts[number] = 0 if survey.decided[k] else np.nan
+            if number not in self.reached:
+                self.hunts[number] = hunts
 
     def _locate(self, pairs: Sequence[Pair], progress: Progress) -> None:
         """Locate the edge on the lines between pairs of neighbours, all at once.
 
-        Where an orbit reaches the second of them, that hunts as well. Where it ends just before, that does not: motions
-        take too long there for a survey to decide.
+        Where an orbit reaches the second of them, that hunts as well. Where it was closed on both sides of its end just
+        before, that does not: motions take too long there for a survey to decide.
         """
         lines = [_Line.between(self.space, self.points[inner], self.points[outer]) for inner, outer in pairs]
         tally = Tally(progress, len(pairs))
         ends = side_by_side(
-            [partial(line.end, self.motions[inner], tally) for line, (inner, _) in zip(lines, pairs, strict=True)]
+            [
+                partial(line.end, self.motions[inner], self.rtol, tally)
+                for line, (inner, _) in zip(lines, pairs, strict=True)
+            ]
         )
         for end, (_, outer) in zip(ends, pairs, strict=True):
             if end is None:
@@ -184,36 +190,48 @@ class _Search:
         inside, kinds = np.array([factor for *_, factor, _ in ended]), [kind for *_, kind in ended]
         lines, farthest = [line for line, *_ in ended], np.array([line.farthest for line, *_ in ended])
         nearest, *others = edge_settings.beyond_bandwidths
-        outside, begin = np.minimum(nearest * inside, farthest), inside.copy()
+        outside, begin, unknown = np.minimum(nearest * inside, farthest), inside.copy(), np.zeros(len(lines), bool)
         for factor in (nearest, *others):
-            goes_on = self._attract(lines, factor * inside, factor * inside < farthest, roughly=factor > nearest)
-            begin[goes_on] = factor * inside[goes_on]
+            hunts = self._told(lines, factor * inside, factor * inside < farthest, roughly=factor > nearest)
+            begin[hunts == 1] = factor * inside[hunts == 1]
         seen = (begin > inside) | (np.array(kinds) == "seen")
         inside, outside[seen] = begin, farthest[seen]
-        while (wide := seen & (outside > inside * (1 + edge_settings.edge_bracket_share))).any():
+        while (wide := seen & ~unknown & (outside > inside * (1 + edge_settings.edge_bracket_share))).any():
             middle = np.sqrt(inside * outside)
-            attract = self._attract(lines, middle, wide)
-            inside[attract], outside[wide & ~attract] = middle[attract], middle[wide & ~attract]
+            hunts = self._told(lines, middle, wide)
+            inside[hunts == 1], outside[hunts == 0] = middle[hunts == 1], middle[hunts == 0]
+            unknown |= wide & np.isnan(hunts)
         for k, (line, pair, _, kind) in enumerate(ended):
-            if np.isnan(self.hunts[pair[1]]) and farthest[k] < inside[k] * others[0]:
+            passed = kind in ("flip", "fold", "torus") and not seen[k]
+            if np.isnan(self.hunts[pair[1]]) and passed and farthest[k] < inside[k] * others[0]:
                 self.hunts[pair[1]] = 0
-            self.found[pair] = line.at(inside[k]), line.at(outside[k]), "seen" if seen[k] else kind
+            told = "" if unknown[k] else "seen" if seen[k] else kind
+            self.found[pair] = line.at(inside[k]), line.at(outside[k]), told
 
-    def _attract(
+    def _told(
         self, lines: Sequence[_Line], factors: np.ndarray, which: np.ndarray, roughly: bool = False
     ) -> np.ndarray:
-        """Return on which of the lines something attracts at its factor, (lines,); only some are asked.
+        """Return on which of the lines stages hunt at their factors, (lines,): 1, 0, or NaN if that is not known.
 
-        If that is to be told `roughly`, stages are searched only where a sketch of their map shows an attractor.
+        Only some are asked; of the others it is not known. If it is to be told `roughly`, orbits are closed only where
+        a sketch of a map, or a simulation without a map, shows an attractor.
         """
-        attract, numbers = np.zeros(len(lines), bool), np.flatnonzero(which)
+        hunts, numbers = np.full(len(lines), np.nan), np.flatnonzero(which)
         places = np.array([lines[k].at(factors[k]) for k in numbers.tolist()]).reshape(-1, 2)
         if roughly and numbers.size:
-            shown = sketched(self.space.stages(places))[0]
+            stages = self.space.stages(places)
+            shown = sketched(stages)[0] if has_a_map(stages) else surveyed_roughly(stages).attracts
             numbers, places = numbers[shown], places[shown]
         if numbers.size:
-            attract[numbers] = what_attracts(self.space.stages(places), self.rtol).attracts
-        return attract
+            stages = self.space.stages(places)
+            hunts[numbers] = _hunts(stages, what_attracts(stages, self.rtol))
+        return hunts
+
+
+def _hunts(stages: Ensemble, survey: Attractors) -> np.ndarray:
+    """Return which surveyed stages hunt, (count,): 1, 0, or NaN if that is not known."""
+    decided = survey.decided & (survey.attracts | surely_surveyed(stages, survey))
+    return np.where(decided, survey.attracts, np.nan)
 
 
 @dataclass(frozen=True)
@@ -230,16 +248,16 @@ class _Line:
 
     @classmethod
     def between(cls, space: Space, start: np.ndarray, end: np.ndarray) -> _Line:
-        """Make a line from its ends."""
+        """Make a line from its ends; keys are compared with their values at its middle."""
         length = float(np.linalg.norm(end - start))
-        hundredths = length / space.hundredth(start, (end - start) / length)(0.0)
+        hundredths = length / space.hundredth(start, (end - start) / length)(length / 2)
         return cls(space, start, end - start, float(1.01**hundredths))
 
     def at(self, factors: np.ndarray | float) -> np.ndarray:
         """Return the coordinates at factors, (..., 2)."""
         return self.start + np.multiply.outer(np.log(factors) / np.log(self.farthest), self.way)
 
-    def end(self, motions: tuple[Swinging, ...], tally: Tally) -> tuple[float, LossKind] | None:
+    def end(self, motions: tuple[Swinging, ...], rtol: float, tally: Tally) -> tuple[float, LossKind] | None:
         """Follow a closed orbit from the start to the factor at which it ceases to attract, and tell how it does.
 
         Returns None if it attracts up to the end. Without a closed orbit the first factor is told, as seen.
@@ -251,4 +269,4 @@ class _Line:
         path = ParameterPath(
             lambda factors: self.space.stages(self.at(factors)), np.ones(1), 0, edge_settings.beyond_bandwidths
         )
-        return OrbitLine.of(path, 1.0, 1.0, orbit).end(self.farthest, self.farthest)
+        return OrbitLine.of(path, 1.0, 1.0, orbit, rtol).end(self.farthest, self.farthest)

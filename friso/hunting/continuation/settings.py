@@ -1,4 +1,4 @@
-"""Settings of the continuation of limit cycles and of the curves on which they change."""
+"""Settings of the continuation of limit cycles, and of the grid over two keys."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ContinuationSettings(Settings):
-    """Settings of the continuation of branches and curves of cycles, in one key or two."""
+    """Settings of the continuation of branches of cycles."""
 
     first_branch_step: float = setting(0.002, "")
     """First step along a branch. A longer one may lead to another branch."""
