@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friso.hunting import Diagram, KeyRange, Plane
-from friso.questions.boundary.words import MEANINGS, ShownKey, end_sentence
+from friso.questions.boundary.words import MEANINGS, ShownKey, answer, end_sentence
 from friso.questions.map.words import QUIET, quantity
 from friso.questions.settings import boundary_figure_settings
 from friso.shown.drawing.figure import (
@@ -58,12 +58,13 @@ PLANE_MARGIN = 0.02
 def boundary_figure(
     traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "", condition: str = ""
 ) -> Figure:
-    """Return the figure of a boundary; points such as folds are named in the units shown.
+    """Return the figure of a boundary, whose title is the answer; points such as folds are named in the units shown.
 
     It holds under a `condition`, with which its note begins.
     """
     figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
-    return replace(figure, subject=subject, note=condition + figure.note)
+    title = answer(traced, keys)[int(traced.unstable.any())].rstrip(".")  # behind a sentence on unstable loops
+    return replace(figure, title=title, subject=subject, note=condition + figure.note)
 
 
 def _diagram(traced: Diagram, key: ShownKey) -> Figure:

@@ -46,8 +46,11 @@ MEANINGS = {
 """State of a cycle on the other side of a special point."""
 
 
-PLAIN_ERROR = 1e-5
-"""Largest relative error with which a value is stated without its interval, in six significant digits."""
+DIGITS = 4
+"""Most significant digits of a value."""
+
+PLAIN_ERROR = 5e-4
+"""Largest relative error with which a value is stated without its interval, in four significant digits."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ class ShownKey:
         """Convert a value [SI] to the unit shown."""
         return float(f"{value / self.factor:.15g}")
 
-    def text(self, value: float, digits: int = 6) -> str:
+    def text(self, value: float, digits: int = DIGITS) -> str:
         """Write a value [SI] in the unit shown, to at most `digits` digits."""
         return self._with_unit(f"{self.number(value):.{digits}g}")
 
@@ -92,7 +95,7 @@ class ShownKey:
     def extent(self, values: Array, swept: KeyRange) -> str:
         """Write the lowest and highest of some values [SI], cut to the range `swept`."""
         low, high = self.number(max(swept.low, float(values.min()))), self.number(min(swept.high, float(values.max())))
-        return self._with_unit(f"{low:.6g} to {high:.6g}")
+        return self._with_unit(f"{low:.{DIGITS}g} to {high:.{DIGITS}g}")
 
     def _with_unit(self, numbers: str) -> str:
         """Add the unit to numbers, if the key has one."""
@@ -197,7 +200,7 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
     return f"Of the corners of the plane, hunting is possible at {'; '.join(hunting)}{others}."
 
 
-def _course(curve: PlaneCurve, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
+def _course(curve: PlaneCurve, keys: tuple[ShownKey, ...], digits: int = DIGITS) -> str:
     """Say from which point to which a curve of a plane runs, and how it ends there; values have `digits` digits."""
     start, stop = (_place(at.tolist(), keys, digits) for at in curve.at[[0, -1]])
     first, last = curve.ends
@@ -216,30 +219,28 @@ ENDS = {
 
 
 def _edges(traced: Diagram, key: ShownKey) -> list[str]:
-    """Say where hunting begins and ends over the range, and between which values tried it attracts as well."""
+    """Say where hunting begins and ends over the range."""
     changes, verdicts = boundary.stability_changes(traced), boundary.place_verdicts(traced)
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of {len(verdicts)} values tried" if UNKNOWN in verdicts else ""
-    at = {change.low for change in changes}
     errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in boundary.lines(traced) for k in line.special}
-    others = _also_attracting(
-        [(value, begins) for value, begins in boundary.followed_changes(traced) if value not in at], key, errors
-    )
     if not changes:
-        return [f"{_no_boundary(traced.space, (key,))[:-1]}{unknown}.", end_sentence(traced, key), *others]
+        return [f"{_no_boundary(traced.space, (key,))[:-1]}{unknown}.", end_sentence(traced, key)]
     places = [
         f"{'begins' if change.begins else 'ends'} {_between(change, key, errors)}{_if_unstable(traced, change)}"
         for change in changes
     ]
-    return [f"Hunting {listed(places, 'and')}{unknown}.", *others]
+    return [f"Hunting {listed(places, 'and')}{unknown}."]
 
 
-def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
+def _also_attracting(traced: Diagram, key: ShownKey) -> list[str]:
     """Say in which ranges, between neighbouring values tried, a cycle attracts as well.
 
-    `turns` are the values [SI] at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds
-    their errors [SI]. Values that bound no such range are listed by themselves. The list is empty without `turns`.
+    Values that bound no such range are listed by themselves. The list is empty if cycles change nowhere else.
     """
-    text = {value: key.as_known(value, errors[value]) for value, _ in turns}
+    at = {change.low for change in boundary.stability_changes(traced)}
+    turns = [(value, begins) for value, begins in boundary.followed_changes(traced) if value not in at]
+    errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in boundary.lines(traced) for k in line.special}
+    text = {value: key.uncertain(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
     within = {value for ends in ranges for value in ends}
     others = [text[value] for value, _ in turns if value not in within]
@@ -270,7 +271,8 @@ def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
     """Describe each branch over one key, and its flips, folds and other special points."""
     branches = boundary.lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
-    return [*(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
+    also = _also_attracting(traced, key)
+    return [*also, *(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
 
 
 def _turn(line: Line, k: int, key: ShownKey) -> str:
@@ -340,7 +342,7 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     return [f"At {_place((x, y), keys)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
 
 
-def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6) -> str:
+def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = DIGITS) -> str:
     """Write a point in the plane of two keys, given by its `values` [SI]."""
     return ", ".join(f"{key.key} = {key.text(value, digits)}" for key, value in zip(keys, values, strict=True))
 
