@@ -644,11 +644,11 @@ NEVER_ENDING = "import sys\nwhile True:\n    sys.stdout.buffer.write(bytes(1 << 
 READING = """
 import sys
 from pathlib import Path
-from friso.identification.logs import confined
+from friso.identification.logs.read import content
 from friso.identification.logs.settings import LogSettings
 
 with LogSettings(time_of_reading=1e5).in_use():
-    confined.content("MAT", Path(sys.argv[1]))
+    content("MAT", Path(sys.argv[1]))
 """
 
 

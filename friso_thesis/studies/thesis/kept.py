@@ -99,7 +99,7 @@ SOURCES = (
         "leaf_springs",
         "design_method",
     ),
-    *("axis.py", "evidence.py", "evidence.toml", "intervals.py", "materials.py", "materials.toml", "shares.py"),
+    *("axis.py", "evidence.py", "evidence.toml", "intervals.py", "materials.py", "materials.toml"),
 )
 """Folders and files, besides the equations, whose contents decide on saved results. Paths start from the package
 friso."""
