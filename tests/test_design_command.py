@@ -304,6 +304,7 @@ SAID: dict[str, Changed] = {
 }
 
 
+@pytest.mark.slow
 def test_words(designed: Design, snapshots: Snapshots) -> None:
     """A case keeps what no case before it said."""
     texts, before = [], set()
