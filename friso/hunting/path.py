@@ -1,10 +1,6 @@
-"""Paths through stages along which one parameter moves, and where an orbit ceases to attract on them.
+"""Define paths through stages: one parameter of a stage moves, and hunting begins and ends on the way.
 
-State how far and how finely friso searches for hunting.
-
-Define paths through stages: one parameter of a stage moves, and hunting begins and ends on the way.
-
-Close the orbits of one branch along a path, and find where the branch ceases to attract.
+Along a path, the orbits of one branch are closed to find where the branch ceases to attract.
 """
 
 from __future__ import annotations
@@ -270,11 +266,12 @@ class OrbitLine:
 
         The branch is followed to the factor `outside`, and on for as long as it attracts, up to the `farthest` one.
         Returns None if it attracts up to there. Between an orbit that attracts and one that does not, the end is where
-        the multiplier passes its limit.
+        the multiplier passes its limit. Where it jumps past it, interpolation hardly moves one of both orbits: every
+        third one is closed half-way.
         """
         chatters, last = self._stages(self.places[:1]).chatters, float(np.log(farthest))
         tolerance = edge_settings.chattering_edge_step if chatters else edge_settings.flip_search_step
-        step = min(abs(float(np.log(outside)) - self.places[0]), edge_settings.longest_edge_step)
+        step, tries = min(abs(float(np.log(outside)) - self.places[0]), edge_settings.longest_edge_step), 0
         while True:
             at = self._last_stable
             low, beyond = float(self.places[at]), self.places[at + 1 :]
@@ -286,6 +283,8 @@ class OrbitLine:
                 met = abs(abs(self.multiplier[near]) - 1) < edge_settings.met_multiplier_share
                 if (met and abs(self.places[near] - target) < tolerance) or abs(beyond[0] - low) < tolerance:
                     return float(np.exp(target)), self._kind(at)
+                tries += 1
+                target = target if tries % 3 else (low + float(beyond[0])) / 2
             else:
                 target = low + self.ahead * step if step < abs(last - low) else last
             self.close_at(target)

@@ -1,12 +1,8 @@
-"""Search a path for hunting, and its ends.
+"""Search a path for hunting: survey stages at a grid of factors, and follow attraction from there to its ends.
 
-Find an edge of hunting along a path: the factor of a parameter beyond which the stage has no attractor.
-
-A closed orbit is followed to its end: a flip, a fold, a torus, or the loss of the orbit. If another attractor exists
-just beyond, its orbit is followed in turn, until there is none. Where no orbit can be followed, surveys narrow down the
-edge between the last factor with an attractor and the first one without.
-
-Search a path for hunting: a grid of factors is surveyed, and attraction followed from there to its ends.
+A closed orbit is followed to its end. If another attractor exists just beyond, its orbit is followed in turn, until
+there is none. Where no orbit can be followed, surveys narrow down the edge between the last factor with an attractor
+and the first one without.
 """
 
 from __future__ import annotations
@@ -19,7 +15,7 @@ from friso.engine.allowance import Exhausted, allowance, current_allowance
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble, spans
-from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting.cycle.hunting import surely_told
 from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind, OrbitLine, ParameterPath
 from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import bends, has_a_map, sketched, what_attracts
@@ -174,7 +170,7 @@ class EdgeSearch:
         """Find the attractors at some factors; runs also start from `distances` [m], shape (n,)."""
         begun, stages = np.broadcast_to(distances, (len(factors), len(distances))), self.path.stages(factors)
         survey = what_attracts(stages, distances=begun)
-        return replace(survey, decided=survey.decided & (survey.attracts | surely_surveyed(stages, survey)))
+        return replace(survey, decided=surely_told(stages, survey))
 
     def _ahead(self, at: float) -> float:
         """Return the direction of the search from the factor `at`: 1 up, -1 down."""
@@ -437,7 +433,7 @@ class PathSearch:
         stages = self._stages(numbers)
         survey = what_attracts(stages)
         self.attracts[numbers] = survey.attracts | self.passed[numbers]
-        self.decided[numbers] = survey.decided & (survey.attracts | surely_surveyed(stages, survey))
+        self.decided[numbers] = surely_told(stages, survey)
         for k, number in enumerate(numbers.tolist()):
             self.motions[number] = list(survey.take(np.array([k])).motions)
         self.inspected |= set(numbers.tolist())

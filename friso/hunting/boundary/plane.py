@@ -20,7 +20,7 @@ from friso.hunting.boundary.space import Space
 from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL
-from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting.cycle.hunting import surely_told
 from friso.hunting.loop import unstable_among
 from friso.hunting.path import LossKind, OrbitLine, ParameterPath
 from friso.hunting.settings import edge_settings
@@ -230,8 +230,7 @@ class _Search:
 
 def _hunts(stages: Ensemble, survey: Attractors) -> np.ndarray:
     """Return which surveyed stages hunt, (count,): 1, 0, or NaN if that is not known."""
-    decided = survey.decided & (survey.attracts | surely_surveyed(stages, survey))
-    return np.where(decided, survey.attracts, np.nan)
+    return np.where(surely_told(stages, survey), survey.attracts, np.nan)
 
 
 @dataclass(frozen=True)

@@ -251,6 +251,11 @@ def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
     return np.asarray(survey.decided & (beyond_the_survey(stages, survey) == ""))
 
 
+def surely_told(stages: Ensemble, survey: Attractors) -> np.ndarray:
+    """Return of which stages it is certain whether they hunt, (count,): one found attractor tells it."""
+    return survey.decided & (survey.attracts | surely_surveyed(stages, survey))
+
+
 def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
     """Return why something may attract stages beyond the reach of a survey, texts (count,).
 
