@@ -1,8 +1,7 @@
-"""Errors about inputs: each states in one clear message what is wrong.
+"""Errors about inputs, each of which states in one clear message what is wrong; and safe texts for them.
 
-Escape texts from files before they are shown.
-
-Their characters must not control a terminal, reverse the reading direction, or become a formula.
+Texts from files are escaped before they are shown. Their characters must not control a terminal, reverse the reading
+direction, or become a formula.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
-"""Uncertain numbers as intervals, and shares of runs or machines with theirs.
+"""Read uncertain numbers as intervals, and give shares of runs, draws, machines or rails with their 95 % intervals.
 
-Quantities with a range: "1 N .. 3 N", "1.7 kg +/- 5 %", "1.7 kg +/- 0.1 kg", or a single value.
+A quantity is a range, "1 N .. 3 N", "1.7 kg +/- 5 %" or "1.7 kg +/- 0.1 kg", or a single value.
 
 The notation has two uses. A specification allows every value of a range (`Span`). A key of a stage file is uncertain
 within it (`uncertain_value`).
-
-Fractions of runs, draws, machines or rails with a property, and their 95 % intervals.
 """
 
 from __future__ import annotations

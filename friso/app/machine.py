@@ -1,12 +1,10 @@
-"""The machine of the app: its stage file, uploads, lines of keys, and the archive of answers.
+"""Hold the machine that a page shows: its stage file, the keys changed since, its uploads, and the archive of answers.
 
-Keep files that were dropped on the page in a folder of the server, while it runs.
+Files that were dropped on the page stay in a folder of the server while it runs.
 
-Hold the machine that a page shows: a stage file, and the keys changed since.
+The archive has what a command would write; no other file is written.
 
-Write the shell command and the line of Python that repeat what the page shows.
-
-Pack what a command would write into one archive, without writing any other file.
+A shell command and a line of Python repeat what the page shows.
 """
 
 from __future__ import annotations

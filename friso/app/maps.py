@@ -1,13 +1,10 @@
 """What the app draws beside answers: maps, runs of earlier values, cures.
 
-Compute verdicts over keys for the page: maps, first without located edges, and the tracks of sliders.
+Maps are drawn first without located edges. Runs of earlier values are the tracks of sliders. Cures are keys to set that
+stop hunting, offered as buttons of the page.
 
-Add to a figure what it is compared with.
-
-On most figures that is the machine pinned for comparison, in grey; on a map it is the edge of hunting; on a run it is
-the other state of the joint, and a logged run.
-
-Offer what stops the hunting of a machine as keys to set, for buttons of the page.
+Figures show what they are compared with: on most it is the machine pinned for comparison, in grey; on a map, the edge
+of hunting; on a run, the other state of the joint, and a logged run.
 """
 
 from __future__ import annotations

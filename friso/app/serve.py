@@ -1,10 +1,7 @@
-"""Serve the app to this machine, and count who is connected.
+"""Serve the app to this machine, and open the browser.
 
-Limit how many connections clients hold, and for how long.
-
-A client without a key cannot keep others from the server.
-
-Start the server of the page and open the browser.
+Clients may hold only so many connections, and only for so long. So a client without a key cannot keep others from the
+server.
 """
 
 from __future__ import annotations

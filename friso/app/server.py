@@ -1,10 +1,7 @@
-"""The server of the app, and the gate before it.
+"""Serve the page: its files, its questions, its uploads and its downloads, behind a gate.
 
-Let in the browser that opened the address with the token, and nobody else.
-
-The browser exchanges the token for a key, which it sends with every later request.
-
-Serve the page: its files, its questions, its uploads, and its downloads.
+The gate lets in the browser that opened the address with the token, and nobody else. The browser exchanges the token
+for a key, which it sends with every later request.
 """
 
 from __future__ import annotations

@@ -1,18 +1,13 @@
-"""Questions at work: jobs, their frames, and what is kept of them.
+"""Answer the questions of the page: run each in a thread, pack its answer in frames, and keep it for later.
 
-Pack answers for the page: frames of a JSON text and of its numbers in binary.
+A question runs until it is answered or superseded. Progress and messages are sent to the page meanwhile.
 
-A frame begins with two whole numbers of four bytes, least significant byte first: the lengths of the text and of the
-numbers, which follow. In the text, an array is an object {"array": index of its first byte, "shape": [...]}. Arrays are
-float32.
+A frame begins with two whole numbers of four bytes, least significant byte first: the lengths of the text, which is
+JSON, and of the numbers in binary. Both follow. In the text, an array is an object {"array": index of its first byte,
+"shape": [...]}. Arrays are float32.
 
-Run each question in a thread until it is answered or superseded.
-
-Progress and messages are sent to the page meanwhile.
-
-Keep answers for later, because the same machine is often asked about again.
-
-For example, a tab is opened again, a change is undone, a machine is pinned, or the files of an answer are downloaded.
+Answers are kept because the same machine is often asked about again: a tab is opened again, a change is undone, a
+machine is pinned, or the files of an answer are downloaded.
 """
 
 from __future__ import annotations

@@ -2,9 +2,7 @@
 
 Exit status: 0 done, 1 the computation could not be completed, 2 the input is wrong, 130 interrupted.
 
-Collect the commands of friso.
-
-Each question has a command; a few commands ask no question (`friso/cli/commands/`).
+Each question has a command. A few commands ask no question (`friso/cli/commands.py`).
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Ask questions on the command line: their arguments, and how answers are shown.
+"""Ask questions on the command line: check arguments, call the friso function of the command's name, show the answer.
 
-Check the arguments of every command before it runs.
-
-Answer every command: call the friso function of its name and show the answer.
+Arguments of every command are checked before it runs.
 
 The conclusion comes first, then small tables and what to do next. Details follow if they are asked for.
 """

@@ -1,12 +1,9 @@
 """The commands that ask no question.
 
-`friso app`: check a stage live in the browser.
-
-`friso example`: the files that come with friso.
-
-`friso init`: a stage file to start from, or a specification.
-
-`friso schema`: the JSON Schema of the stage file, by which editors complete and check it.
+- `friso app`: check a stage live in the browser.
+- `friso example`: the files that come with friso.
+- `friso init`: a stage file to start from, or a specification.
+- `friso schema`: the JSON Schema of the stage file, by which editors complete and check it.
 """
 
 from __future__ import annotations

@@ -1,14 +1,10 @@
 """Run commands that do more than show an answer.
 
-Run `friso design`; without a design, say which requirement to relax and by how much.
-
-Run `friso identify`: keep what the user said of logs, and ask for what is missing.
-
-Run `friso logs`: report files that cannot be read beside those that can.
-
-Run `friso map`: results go into a store, with the figure and the page beside it.
-
-`friso simulate`: its arguments are a stage file, or the numbers of a cell.
+- `friso design`: without a design, say which requirement to relax and by how much.
+- `friso identify`: keep what the user said of logs, and ask for what is missing.
+- `friso logs`: report files that cannot be read beside those that can.
+- `friso map`: put results into a store, with the figure and the page beside it.
+- `friso simulate`: take a stage file, or the numbers of a cell.
 """
 
 from __future__ import annotations

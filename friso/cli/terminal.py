@@ -1,13 +1,9 @@
-"""The terminal: what is said there, options that commands share, and progress.
+"""Write sentences, tables and progress to the terminal, safely.
 
-Write to the terminal safely.
+Commands without a question share an option, which is declared here.
 
 Texts from files cannot steer the terminal (`friso.errors`); friso's own tables and bars can. Characters that the
 terminal's encoding lacks are spelled out.
-
-Print sentences and tables, and declare the option that commands without a question share.
-
-Show the progress of a computation on the terminal.
 """
 
 from __future__ import annotations

@@ -1,13 +1,11 @@
-"""What is known before a design is searched for; and leaf springs for a joint that is given.
+"""Prepare the stage that a design starts from: an isolator, leaf springs, a specification.
 
-Prepare the stage that a design starts from: an isolator, leaf springs, a specification.
+A rigid stage is split into cart and stage with a joint between them. The friction stays on the cart.
 
-A rigid stage is split into cart and stage with a joint between them; the friction stays on the cart. A first
-specification has ranges around the stage's own numbers, and leaves of sizes that are sold.
+A first specification has ranges around the stage's own numbers, and leaves of sizes that are sold.
 
-Find leaf springs for a joint of given stiffness and stroke.
-
-Of all leaf springs that fit, those are chosen whose first mode that interferes with control lies highest.
+A joint of given stiffness and stroke gets leaf springs. Of all that fit, those are chosen whose first mode that
+interferes with control lies highest.
 """
 
 from __future__ import annotations

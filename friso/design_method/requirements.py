@@ -1,14 +1,10 @@
-"""The requirements of a design, and the choice of leaf springs that meet them.
+"""State the requirements of a design, and choose the leaf springs that meet them.
 
-Define the requirements on leaf springs as ratios, and find which single one to relax.
+Requirements are ratios. Closed forms evaluate many geometries at once. If no leaf springs meet all requirements, the
+least change that suffices is computed for each requirement alone, so that one can be relaxed.
 
-Closed forms evaluate many geometries at once. If no leaf springs meet all requirements, the least sufficient change is
-computed for each.
-
-Find the Pareto front of leaf springs, and choose its softest that meet all requirements.
-
-The front has soft leaf springs whose modes interfere with control at high frequency. Sizes are rounded so that the
-leaves can be made, and the beam model confirms the choice.
+The Pareto front has soft leaf springs whose modes interfere with control at high frequency. The softest on it that meet
+all requirements are chosen. Sizes are rounded so that the leaves can be made, and the beam model confirms the choice.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""The specification of a design, and the geometry that it leaves free.
+"""Declare the specification of a friction isolator, and the leaf springs that it leaves free to choose.
 
-Declare the specification of a friction isolator.
+A specification says what the machine is, what it has to do, and what may be built.
 
-It says what the machine is, what it has to do, and what may be built.
-
-Define the leaf springs that can be built, as numbers to choose from and as mechanisms.
+Leaf springs that can be built are numbers to choose from, and mechanisms.
 """
 
 from __future__ import annotations

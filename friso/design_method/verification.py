@@ -1,20 +1,15 @@
-"""Machines drawn from tolerances, the controller that is chosen for them, and their verification.
+"""Verify a design on machines drawn from its tolerances, and choose its controller.
 
-Build the machines that a specification allows, and find the edge of hunting over them.
+The machines are the corners of the specification's ranges, and machines drawn at random.
 
-The machines are the corners of its ranges, and machines drawn at random. The edge is the highest crossover at which a
-stage hunts. In the corner where it is highest it is located to 1 or 2 %; only this one decides, and a design simulates
-all its moves afterwards.
+The edge of hunting is the highest crossover at which a stage hunts. Only the corner where it is highest decides, so it
+is located there, to 1 or 2 %. The design then simulates all its moves.
 
-Choose a design's controller, and whether more joint damping would help.
+The loop that decides on the controller, and on whether more joint damping would help, has all modes of the leaf springs
+that actuator and sensor both see. The equations of motion contain only one of them.
 
-The loop has all modes of the leaf springs that actuator and sensor both see; the equations of motion contain only one
-of them.
-
-Try a design in simulated moves of machines drawn from the specification.
-
-The joint is free, and locked for comparison. A map over crossover and stroke shows how many corners of the
-specification do not come to rest.
+In the simulated moves the joint is free, and locked for comparison. A map over crossover and stroke shows how many
+corners of the specification do not come to rest.
 """
 
 from __future__ import annotations

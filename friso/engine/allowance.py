@@ -1,10 +1,6 @@
-"""How far a computation may go: its work, and its tolerance.
+"""Limit how far a computation goes: its work, and its relative tolerance.
 
-Limit how much may be computed to answer one question, counted in work.
-
-Work is counted rather than time, so that the answer is equal on every machine.
-
-Check the relative tolerance that a user gives.
+Work is counted rather than time, so that the answer to a question is equal on every machine.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """Run many stages of one structure at once, or one stage with a dense record.
 
-Run many stages of one structure, and return the results chunk by chunk.
+Runs are prepared in NumPy. Each core then computes several at once, one per lane of a vector register. Results come
+chunk by chunk.
 
-Runs are prepared in NumPy. Each core then computes several at once, one per lane of a vector register.
-
-Run many stages that follow one log, sample by sample.
-
-Simulate one run of a stage as a time response.
+Stages that follow one log run sample by sample.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """Write the source of a model's kernel and compile it.
 
-Write a model's module: its step, and functions that prepare and read its runs.
+A model's module has its step, and functions that prepare and read its runs. It needs no SymPy to run, so a warm start
+loads neither the equations nor their derivatives.
 
-A module needs no SymPy to run, so a warm start loads neither the equations nor their derivatives.
-
-Compile models' code, and the loops that run it, in the process that fills the cache.
-
-`friso.engine.builder` starts that process.
+Models and the loops that run them are compiled in the process that fills the cache. `friso.engine.builder` starts it.
 """
 
 from __future__ import annotations

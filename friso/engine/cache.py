@@ -1,16 +1,14 @@
-"""The cache of compiled kernels, and what is removed from it.
-
-Store compiled code on disk, private to the user.
+"""Store compiled code on disk, private to the user.
 
 An entry is a file with machine code and its module. Only code that this user alone can have written is loaded
-(`private.py`); anything else, and a damaged file, is built anew. Locks separate processes that build at the same time.
+(`friso.platform.files`); anything else, and a damaged file, is built anew. Locks separate processes that build at the
+same time.
 
-An entry is named after the generated source, the compiler and the processor; a request, named after the task and
-friso's own sources, gives the name of its entry. So a start of an unchanged friso generates nothing, and a change of
-friso that does not change the generated code compiles nothing. Code that has not been used for long is deleted
-(`prune`).
+An entry is named after the generated source, the compiler and the processor. A request is named after the task and
+friso's own sources; it gives the name of its entry. So a start of an unchanged friso generates nothing, and a change of
+friso that does not change the generated code compiles nothing.
 
-Delete compiled code that has not been used for long.
+Code that has not been used for long is deleted (`prune`).
 """
 
 from __future__ import annotations

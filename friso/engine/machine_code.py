@@ -1,16 +1,12 @@
-"""What machine code is made for: processor, layout of arrays, kinds of compiled functions; and its loading.
+"""Make machine code by LLVM from its language, load object files, and call their functions.
 
-Describe the processor for which code is compiled.
+Code is compiled for one processor, which is described here.
 
-Define argument kinds of compiled loops, and pack arguments as 64-bit words.
+Arguments of compiled loops have declared kinds, and are packed as 64-bit words. The loops are written for
+`friso.engine.scalar_code`.
 
-The loops are written for `friso.engine.scalar_code`.
-
-Lay out the numbers of all runs computed at once in one flat float64 buffer.
-
-The buffer has one row after another. A row has a number of each run, in its lane, side by side.
-
-Make machine code by LLVM from its language, load object files, and call their functions.
+The numbers of all runs computed at once lie in one flat float64 buffer, one row after another. A row has a number of
+each run, in its lane, side by side.
 """
 
 from __future__ import annotations

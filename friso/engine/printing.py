@@ -1,12 +1,8 @@
-"""Sums and products with few operations, and their spelling in NumPy.
+"""Print SymPy expressions and eliminations as code: straight-line Python for the kernels, NumPy elsewhere.
 
-Write Gaussian elimination of a matrix with many zeros as code without loops.
-
-It is known which entries are zero. Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order
-decides how many operations there are, and how long an operation waits for others; it is searched, starting from
-Markowitz's rule.
-
-Print SymPy expressions as straight-line Python for the kernels, and as NumPy elsewhere.
+Gaussian elimination of a matrix with many zeros becomes code without loops, because it is known which entries are zero.
+Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order decides how many operations there are,
+and how long an operation waits for others. It is searched, starting from Markowitz's rule.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
-"""Tasks side by side, and those that a newer one overtakes.
+"""Compute several things at once, end work that nobody waits for, and let urgent work of the app go first.
 
-End work that nobody waits for, and let urgent work of the app go first.
+There are as many threads as cores. Running code releases the interpreter's lock, so the threads do not wait for each
+other.
 
 Whoever asks for work has a flag, which another thread sets to cancel the work. Runs are incomplete once the flag is
 set, so nothing may use them: `Overtaken` is raised at the next batch of runs, and passes through all error handling.
-
-Compute several things at once, in as many threads as there are cores.
-
-Running code releases the interpreter's lock, so the threads do not wait for each other.
 """
 
 from __future__ import annotations

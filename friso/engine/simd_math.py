@@ -1,15 +1,11 @@
-"""Functions that kernels call: elementary ones in the lanes of a register, and roots of cubics.
+"""Functions that kernels call, as straight-line code: elementary ones, random numbers, and zeros of a kink's surface.
 
-Find the first zero of a kink's surface inside a step, as straight-line code.
+`friso.engine.vector_code` compiles them. The code has no calls, branches or tables. Mathematics libraries work on one
+number at a time, so these functions split off the exponent by the bits of the number. Relative errors are below 1e-15
+over the ranges stated; tested against NumPy.
 
-At a kink derivatives jump; its surface is a function of the states that is 0 there. Values at the ends and thirds of
-the step fix a cubic. `friso.engine.vector_code` compiles the code.
-
-Compute exp, log, tanh, powers and random numbers in straight-line code.
-
-The code has no calls, branches or tables. Mathematics libraries work on one number at a time, so these functions split
-off the exponent by the bits of the number. Relative errors are below 1e-15 over the ranges stated; tested against
-NumPy. `friso.engine.vector_code` compiles them.
+At a kink derivatives jump. Its surface is a function of the states that is 0 there. Its first zero inside a step is
+that of a cubic, which values at the ends and thirds of the step fix.
 """
 
 from __future__ import annotations

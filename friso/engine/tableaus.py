@@ -1,19 +1,15 @@
-"""Hold the coefficients of Rosenbrock methods, transformed to avoid matrix products.
-
-The products are those with the Jacobian.
+"""Hold the coefficients of Rosenbrock methods, transformed to avoid products of matrices with the Jacobian.
 
 Hairer & Wanner, Solving ODEs II (1996), Sec. IV.7: stage i solves (1/(gamma h) - J) k_i = f(t + time_i h, x + sum_j
 a_ij k_j) + h rate_i df/dt + sum_j c_ij/h k_j. Stiffly accurate: the last stage adds k to the solution, and this k is
 the error estimate. Between the ends, x(theta) = (1 - theta) x_0 + theta (x_1 + (1 - theta) (d_1 + theta (d_2 + ...)))
 with d_m = sum_j dense_mj k_j.
 
-Rodas4: order 4(3), 6 stages, L-stable, stiffly accurate, dense output of order 3.
+Both methods are L-stable and stiffly accurate:
 
-Hairer & Wanner, Solving ODEs II (1996), Sec. VI.4 and their code RODAS (method 1).
-
-Rodas5P: order 5(4), 8 stages, L-stable, stiffly accurate, dense output of order 4.
-
-Steinebach 2023, doi:10.1007/s10543-023-00967-x.
+- Rodas4: order 4(3), 6 stages, dense output of order 3. Hairer & Wanner, Solving ODEs II (1996), Sec. VI.4 and their
+  code RODAS (method 1).
+- Rodas5P: order 5(4), 8 stages, dense output of order 4. Steinebach 2023, doi:10.1007/s10543-023-00967-x.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""A controller as many times as fast, friction as many times as large, and where it breaks away.
+"""Scale the bandwidth of a controller and the friction of stages, and compute the forces at which a stage breaks away.
 
-Find the bandwidth of a controller, and make the controller faster or slower as a whole.
+A controller becomes faster or slower as a whole. Friction grows or shrinks as a whole too, or static friction alone.
 
-Scale the friction of stages: all of it, or static friction alone.
-
-Compute the forces at which guide and motor break away and slide.
+Guide and motor each have a force at which they break away, and one at which they slide.
 """
 
 from __future__ import annotations

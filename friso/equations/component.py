@@ -1,15 +1,13 @@
-"""Components of a model, and expressions by cases.
+"""Define the building blocks of the model in SymPy symbols: states, kinks, outputs, and expressions by cases.
 
-Define piecewise expressions that keep their conditions as written.
+Kinks are where derivatives jump.
 
-SymPy's own class simplifies conditions in which other piecewise expressions occur, whenever one is made or changed.
-Conditions of a sampled controller with settings against friction depend on each other. For such conditions SymPy takes
-minutes and finds nothing shorter.
+A parameter is a symbol named after its stage-file key. So its value is looked up among the stage's keys, and a
+derivative with respect to it is a sensitivity to that key.
 
-Define the building blocks of the model in SymPy symbols: states, kinks and outputs.
-
-Kinks are where derivatives jump. A parameter is a symbol named after its stage-file key. So its value is looked up
-among the stage's keys, and a derivative with respect to it is a sensitivity to that key.
+Expressions by cases keep their conditions as written. SymPy's own class simplifies conditions in which other piecewise
+expressions occur, whenever one is made or changed. Conditions of a sampled controller with settings against friction
+depend on each other. For such conditions SymPy takes minutes and finds nothing shorter.
 """
 
 from __future__ import annotations

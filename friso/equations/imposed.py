@@ -1,16 +1,13 @@
 """Motions and forces that are imposed on a stage instead of its controller.
 
-Declare a friction law under an imposed sinusoidal motion, for its describing function.
+Sinusoidal motion, for the describing function of a friction law: time counts in periods, so that all runs have equal
+length. The first harmonic of the friction force is integrated as well, to the solver's tolerance, however abruptly the
+force changes.
 
-Time counts in periods, so that all runs have equal length. The first harmonic of the friction force is integrated as
-well, to the solver's tolerance, however abruptly the force changes.
+Measured motion of a body, sample by sample: the friction force does not act back on it. The impulse of the friction
+force is integrated as well. Differences of the impulse give the mean force between samples, for any law.
 
-Declare a friction law on a body that follows a measured motion, sample by sample.
-
-The friction force does not act back on the motion. The impulse of the friction force is integrated as well. Differences
-of the impulse give the mean force between samples, for any law.
-
-Declare a stage that follows a log: reference and external force at every sample.
+Log: a stage follows its reference and external force at every sample.
 """
 
 from __future__ import annotations

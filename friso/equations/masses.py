@@ -1,19 +1,14 @@
 """The masses, the joint between them, and the transmission that drives them.
 
-Masses in a chain: cart, joint, stage, parasitic mass; or one rigid mass.
+Masses form a chain, cart, joint, stage, parasitic mass; or there is one rigid mass (thesis, Fig. 3 and 4).
 
-See Fig. 3 and 4 of the thesis.
+The joint is compliant and has a limiter (thesis, Fig. 3). Table 1 of the thesis prints a series formula for the touched
+limiter. A touching limiter acts in parallel with the leaf springs, so stiffness and damping are added here.
 
-Declare the compliant joint between cart and stage, with its limiter (thesis, Fig. 3).
-
-Table 1 of the thesis prints a series formula for the touched limiter. A touching limiter acts in parallel with the leaf
-springs, so stiffness and damping are added here.
-
-Screw, belt or gear between motor and load: a spring and damper with backlash.
-
-Spring and damper are idle while the backlash is crossed. The motor is a body of its own, its mass and motion taken at
-the load: one turn of the motor moves the load by a lead. Friction at the motor is a friction law of its own, of the
-table [motor_friction].
+The transmission is a screw, belt or gear between motor and load: a spring and damper with backlash. Spring and damper
+are idle while the backlash is crossed. The motor is a body of its own, its mass and motion taken at the load: one turn
+of the motor moves the load by a lead. Friction at the motor is a friction law of its own, of the table
+[motor_friction].
 """
 
 from __future__ import annotations

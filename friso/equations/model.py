@@ -1,14 +1,11 @@
-"""The model of a stage, and its variational equations.
+"""Assemble a stage's equations from parts, and derive their variational equations.
 
-Assemble a stage's equations from parts: states, right-hand side, kinks, outputs.
+The parts give states, right-hand side, kinks and outputs. Kinks are where derivatives jump.
 
-Kinks are where derivatives jump.
-
-Derive the variational equations: how a small deviation from a motion evolves.
-
-Between kinks the deviation obeys the linearised equations. At a kink the right-hand side, its derivative or the state
-itself may jump. The deviation then jumps too, because the neighbouring motion crosses a little earlier or later. The
-jump is the saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
+The variational equations say how a small deviation from a motion evolves. Between kinks it obeys the linearised
+equations. At a kink the right-hand side, its derivative or the state itself may jump. The deviation then jumps too,
+because the neighbouring motion crosses a little earlier or later. The jump is the saltation matrix (Leine, Nijmeijer
+2004, doi:10.1007/978-3-540-44398-8, chapter 7).
 """
 
 from __future__ import annotations

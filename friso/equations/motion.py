@@ -1,13 +1,12 @@
-"""The reference of a motion, and what a motion declares.
+"""Describe a stage's motion: pieces of its reference, standstill, size and start.
 
-Evaluate the reference within a piece: a polynomial and sinusoids ("tones").
+Within a piece the reference is a polynomial and sinusoids ("tones"). They are symbols in the equations, and numbers
+elsewhere.
 
-They are symbols in the equations, and numbers elsewhere. A row of numbers describes a piece. It holds the start [s] and
-the derivatives of the polynomial at the start. With tones it also holds the direction in which the reference moves (1,
--1), and the parameters of each tone: amplitude [m], phase [turns], frequency [Hz] and sweep [Hz/s]. Phases and
-frequencies are given at the start of the piece, so that they stay small.
-
-Describe a stage's motion: pieces of its reference, standstill, size and start.
+A row of numbers describes a piece. It holds the start [s] and the derivatives of the polynomial at the start. With
+tones it also holds the direction in which the reference moves (1, -1), and the parameters of each tone: amplitude [m],
+phase [turns], frequency [Hz] and sweep [Hz/s]. Phases and frequencies are given at the start of the piece, so that they
+stay small.
 """
 
 from __future__ import annotations

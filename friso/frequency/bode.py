@@ -1,11 +1,7 @@
-"""The Bode analysis of a stage: crossovers, and what limits them.
+"""Analyse a stage linearly: limit cases, states between them, bandwidth, crossovers and what limits them, cascades.
 
-Find a loop's bandwidth, and the crossovers with stability and the required margin.
-
-The bandwidth is the highest frequency at which the loop's gain is 1. Ranges in which a condition holds have their ends
-located.
-
-Analyse a stage linearly: limit cases, states between them, highest bandwidth, cascades.
+The bandwidth is the highest frequency at which the loop's gain is 1. Crossovers are sought that are stable and have the
+required margin. Ranges in which a condition holds have their ends located.
 
 The loops of a cascade are each opened where a drive's Bode plot opens them. The plant leads from the commanded force to
 the velocity at the encoder. The velocity loop is cut where the velocity is fed back, with the position loop open. The

@@ -1,10 +1,6 @@
-"""The loops of a stage: their parts, their transfer functions, and the linear cases together.
+"""Build the loop of plant, controller and drive: closed, and cut at the actuator force; for many states at once.
 
-Represent plant and controller of a stage as linear systems, for many states at once.
-
-The friction law has a steady state: stuck under a bias force, or sliding at a speed.
-
-Build the loop of plant, controller and drive: closed, and cut at the actuator force.
+Friction is taken in a steady state: stuck under a bias force, or sliding at a speed.
 
 Sampled loops, at one rate or several, are lifted to their common period. After that period all loops are due again. The
 controller is that of `friso.equations.sampled`, as a drive computes it. Over a period of N samples the loop is a
@@ -15,7 +11,7 @@ Cut at the actuator, it has N characteristic loci. A gain or a phase common to a
 stability where one locus passes -1 (MacFarlane, Postlethwaite 1977, doi:10.1080/00207177708922217). So margins are
 those of a locus. With all loops at one rate, the loci are the loop's response at a frequency and at its aliases.
 
-Return a stage in one of its states as a linear system of python-control (`friso.linear`).
+`friso.linear` gives a stage in one of its states to python-control, as a linear system.
 """
 
 from __future__ import annotations

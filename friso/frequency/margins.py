@@ -1,16 +1,13 @@
-"""The margins of loops, of one machine and of a family of machines.
+"""Compute the margins of loops, of one machine and of a family: the gain, phase or delay that makes a loop unstable.
 
-Compute margins of one loop: the gain, phase or delay that makes it unstable.
+Margins follow Astrom, Murray 2008, Feedback Systems, chapter 9 (stability margins). Van Dijk's tuning rules (thesis,
+Eq. 7 and 8) are applied to the mass that they are meant for.
 
-Astrom, Murray 2008, Feedback Systems, chapter 9 (stability margins). Van Dijk's tuning rules (thesis, Eq. 7 and 8) are
-applied to the mass that they are meant for.
-
-Analyse a family of states of a stage: stuck under any bias force, sliding at any speed.
-
-Friction is an impedance between cart and ground, and the masses are computed once. The masses without friction respond
-to forces on stage and cart by g (2 x 2), and by h with the cart held. With the dynamic stiffness k = s Z of friction on
-the cart, the stage responds by (g_ss + k g_cc h)/(1 + k g_cc). No large numbers are subtracted, and each member (state)
-and frequency takes a few operations.
+A family has the states of a stage: stuck under any bias force, sliding at any speed. Friction is an impedance between
+cart and ground, and the masses are computed once. The masses without friction respond to forces on stage and cart by g
+(2 x 2), and by h with the cart held. With the dynamic stiffness k = s Z of friction on the cart, the stage responds by
+(g_ss + k g_cc h)/(1 + k g_cc). No large numbers are subtracted, and each member (state) and frequency takes a few
+operations.
 """
 
 from __future__ import annotations

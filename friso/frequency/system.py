@@ -1,14 +1,12 @@
-"""The linear systems of a stage about rest and in sliding, and the members of a family of machines.
+"""Linear systems of a stage, many at once, and the states that they belong to: at rest, in sliding, and between.
 
-Represent many linear systems with equal states at once: arrays with one system per row.
+Systems have equal states; arrays hold one system per row. Equations are linearised by their Jacobian, derived in
+symbols and evaluated for many states. The drive between controller and plant is modelled by its hold, delay and current
+loop.
 
-Equations are linearised by their Jacobian, derived in symbols and evaluated for many states. The drive between
-controller and plant is modelled by its hold, delay and current loop.
-
-Define the states of a stage: the thesis's limit cases (Table 1), and those between.
-
-The friction law is linearised in each: a spring before it slides, a steady force and a range of speeds afterwards.
-Springs in series, joint and bearing (Eq. 1) and the touched limiter (Table 1), are those of the thesis.
+The states are the thesis's limit cases (Table 1), and those between. The friction law is linearised in each: a spring
+before it slides, a steady force and a range of speeds afterwards. Springs in series, joint and bearing (Eq. 1), and the
+touched limiter (Table 1) are those of the thesis.
 """
 
 from __future__ import annotations

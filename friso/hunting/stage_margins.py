@@ -1,8 +1,6 @@
-"""Margins of a stage in static friction and in its joint's design, and what follows for advice.
+"""Find the margins of a stage in static friction and in its joint's design, and the bandwidths to advise.
 
-Find the margins of a stage in static friction and in its joint's design.
-
-Choose the bandwidths that are advised to a stage that hunts, at a distance from the edge.
+Bandwidths are advised to a stage that hunts, at a distance from the edge.
 """
 
 from __future__ import annotations

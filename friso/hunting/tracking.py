@@ -1,8 +1,6 @@
-"""References that never stand still: tracking, dwells, ramps that stick and slip.
+"""Measure how a stage follows a moving reference and settles where it stands, and whether it sticks and slips.
 
-Measure how a stage follows a moving reference, and settles where it stands.
-
-Tell whether a stage that is moved at constant speed slides smoothly, or sticks and slips.
+A stage that is moved at constant speed slides smoothly, or sticks and slips.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
-"""Turning points of runs, and how the position swings between them.
+"""Find turning points of runs: peaks, period, and how far the position swings over the last half.
 
-Scan the turning points of many runs for peaks, period, and swing over the last half.
-
-Count peaks, and find periods and swings of runs from their turning points.
-
-These are plain loops over runs. A few runs are scanned by this module as it stands. For many, `friso.hunting.turning`
-compiles it (`friso.engine.scalar_code`).
+The scan is plain loops over runs. A few runs are scanned as Python. For many, the loops are compiled
+(`friso.hunting.build`, `friso.engine.scalar_code`).
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 
 The terminal, pages and programs show one and the same answer.
 
-Turn the numbers of a JSON document into an xarray.Dataset.
-
-Units come from the suffixes of keys, and dimensions from tables with equal keys.
+The numbers of its JSON document become an xarray.Dataset. Units come from the suffixes of keys, and dimensions from
+tables with equal keys.
 """
 
 from __future__ import annotations

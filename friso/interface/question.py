@@ -5,10 +5,8 @@ another package, declares a `Question`. The command, its options, its help, and 
 from it, the function's signature and its docstring. Nothing heavy is imported here, because the list of commands is
 printed before arrays and units are loaded.
 
-Declare once the parameters that several questions share.
-
-They appear in docstrings and in the help of commands. A function names such a parameter in its signature and leaves it
-out of its docstring; `described` adds it.
+Parameters that several questions share are declared once, for docstrings and for the help of commands. A function names
+such a parameter in its signature and leaves it out of its docstring; `described` adds it.
 """
 
 from __future__ import annotations

@@ -1,12 +1,7 @@
-"""Files to start from: stage files, examples, and the schema of the stage file.
+"""Provide what users start from: a stage file to edit, the examples, and JSON Schemas.
 
-Derive JSON Schemas of the stage file and of a specification from their tables.
-
-Editors use the schemas to complete and check files; the reference pages are made from them.
-
-Provide what users start from.
-
-These are a stage file to edit, the examples, and the schemas by which editors complete files.
+The schemas are of the stage file and of a specification, derived from their tables. Editors use them to complete and
+check files; the reference pages are made from them.
 """
 
 from __future__ import annotations

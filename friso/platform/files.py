@@ -1,15 +1,12 @@
-"""Files and folders: paths, files complete or not at all, of bounded size, and of one user alone.
+"""Check paths, read files up to a size, write them completely or not at all, and keep files of one user alone.
 
-Check paths before use: find names that no operating system accepts.
+Names that no operating system accepts are found before use.
 
-Read files that others may have written: only regular ones, and only up to a size.
+Files that others may have written are read only if they are regular ones, and only up to a size.
 
-Write files completely or not at all.
-
-Read and write files that only this user and root can have written.
-
-A folder is checked from the root down: if it belongs to the user or to root and nobody else may write to it, nobody
-else can exchange its contents. A file is opened without following links and checked by its descriptor.
+Private files are those that only this user and root can have written. A folder is checked from the root down: if it
+belongs to the user or to root and nobody else may write to it, nobody else can exchange its contents. A file is opened
+without following links and checked by its descriptor.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
-"""What is installed beside friso: extras, and packages that add to it.
+"""Find what is installed beside friso: optional dependencies ("extras"), and modules that packages add to friso.
 
-List optional dependencies ("extras") of commands, and say how to install them.
+For an extra that a command needs, friso says how to install it.
 
-Find modules that installed packages add to friso by entry points, by group.
-
-Names come from the metadata of packages; a module is imported only when it is needed. A name that is taken, or a module
-that cannot be used, is reported in one sentence and skipped.
+Packages add modules by entry points, by group. Names come from the metadata of packages; a module is imported only when
+it is needed. A name that is taken, or a module that cannot be used, is reported in one sentence and skipped.
 """
 
 from __future__ import annotations

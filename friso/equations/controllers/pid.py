@@ -1,16 +1,10 @@
 """PID controllers, by gains and by van Dijk's rules, and a controller with an observer that is tuned likewise.
 
-Describe the feedforward terms of controllers in tables of gains and in drawings of loops.
+By gains: thesis, Eq. 6, with feedforward of acceleration and friction. By van Dijk's rules: crossover, alpha, beta and
+mass (thesis, Eq. 7 and 8).
 
-Define the base of both ways to give a PID controller, by rules or by gains.
-
-PID by its gains (thesis, Eq. 6), with feedforward of acceleration and friction.
-
-PID by van Dijk's tuning rules: crossover, alpha, beta and mass (thesis, Eq. 7 and 8).
-
-Linear active disturbance rejection: an extended state observer and its feedback.
-
-All that acts on the mass m besides the force F is one disturbance d: e'' = d - F/m for the error e. The observer has a
+The controller with an observer is linear active disturbance rejection: an extended state observer and its feedback. All
+that acts on the mass m besides the force F is one disturbance d: e'' = d - F/m for the error e. The observer has a
 triple pole at -w_o. With the correction c = e - e1, it is
     e1' = e2 + 3 w_o c, e2' = e3 - F/m + 3 w_o^2 c, e3' = w_o^3 c.
 The force F = m (w_c^2 e1 + 2 w_c e2 + e3) takes away e3, the estimate of d, and gives the mass a double pole at -w_c.

@@ -1,12 +1,10 @@
-"""Controllers as rational functions: state space, sections, transfer functions.
-
-Define the common base of controllers given as a transfer function of the error.
+"""Controllers given as a transfer function of the error: by coefficients, by zeros and poles, or by sections.
 
 The transfer function is split into gain k0/(s + p) + gain R(s). The first term is an integral, which may leak at a rate
-p; R(s) is a product of second-order sections. A transfer function in z is converted by the bilinear transform (Tustin).
-A drive with the same sample time converts it back exactly.
+p; R(s) is a product of second-order sections.
 
-A controller given by its coefficients, by its zeros and poles, or by its sections.
+A transfer function in z is converted by the bilinear transform (Tustin). A drive with the same sample time converts it
+back exactly.
 """
 
 from __future__ import annotations

@@ -1,30 +1,24 @@
-"""Friction laws with a bristle: LuGre and those made of it.
-
-Declare what friction laws with one damped bristle have in common.
+"""Friction laws with one damped bristle: LuGre and those made of it.
 
 The laws differ in how fast the bristle deflects; the rest is as in LuGre.
 
-LuGre friction: Canudas de Wit et al. 1995, doi:10.1109/9.376053 (thesis, Eq. 3 to 5).
+LuGre: Canudas de Wit et al. 1995, doi:10.1109/9.376053 (thesis, Eq. 3 to 5).
 
-Elasto-plastic friction: Dupont et al. 2002, doi:10.1109/TAC.2002.1000274.
+Elasto-plastic: Dupont et al. 2002, doi:10.1109/TAC.2002.1000274.
 
-LuGre friction that grows with the force of the drive, as in joints with strain-wave and cycloid gears.
+Growing with the force of the drive, as in joints with strain-wave and cycloid gears: friction of a robot's joint rises
+in proportion to the torque that it transmits (Carvalho Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589).
 
-Carvalho Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589: friction of a robot's joint rises in proportion to the
-torque that it transmits.
+Static friction growing with the time at rest: friction approaches its curve over speed with a delay, as in laws of rate
+and state (Ruina 1983, doi:10.1029/JB088iB12p10359). At rest it does so exponentially in time, which is Kato's law with
+the exponent 1 (Armstrong-Helouvry, Dupont, Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7). Sliding renews the
+contacts over a distance.
 
-LuGre friction whose static friction grows with the time at rest.
-
-Friction approaches its curve over speed with a delay, as in laws of rate and state (Ruina 1983,
-doi:10.1029/JB088iB12p10359), at rest exponentially in time, which is Kato's law with the exponent 1 (Armstrong-
-Helouvry, Dupont, Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7). Sliding renews the contacts over a distance.
-
-Rolling friction: stiffness before gross rolling falls with a power of the force.
-
-The law is due to Dahl 1976, doi:10.2514/3.61511, here with the Stribeck level, bristle damping and viscous friction of
-LuGre. Dahl's exponent i shapes the virgin curve: d(sigma_0 z)/dx = sigma_0 (1 - sigma_0 z/g)^i. From rest, 1 - F/F_s =
-(1 + (i - 1) sigma_0 x/F_s)^(-1/(i - 1)); with i = 1 the law is LuGre. It has a single state, so that a reversal from
-rolling leaves the stiffness 2^i sigma_0. Masing's rule, which ball guideways obey (Al-Bender, Symens 2005,
+Rolling: stiffness before gross rolling falls with a power of the force. The law is due to Dahl 1976,
+doi:10.2514/3.61511, here with the Stribeck level, bristle damping and viscous friction of LuGre. Dahl's exponent i
+shapes the virgin curve: d(sigma_0 z)/dx = sigma_0 (1 - sigma_0 z/g)^i. From rest, 1 - F/F_s = (1 + (i - 1) sigma_0
+x/F_s)^(-1/(i - 1)); with i = 1 the law is LuGre. It has a single state, so that a reversal from rolling leaves the
+stiffness 2^i sigma_0. Masing's rule, which ball guideways obey (Al-Bender, Symens 2005,
 doi:10.1016/j.wear.2004.11.018), needs elements in parallel (`gms`).
 """
 

@@ -1,11 +1,7 @@
-"""What friction laws share: the equations of a direction, and what measurements show.
-
-Describe friction as measurements show it, whatever the law.
+"""What friction laws share: keys, the steady friction level of Eq. 4, and friction as measurements show it.
 
 Measurements show steady friction over speed, the force over displacement from rest until sliding (the virgin curve),
 and damping at rest. Each law's file computes these, and says which of its parameters they leave open.
-
-Define the common parts of friction laws: keys, and the steady friction level of Eq. 4.
 """
 
 from __future__ import annotations

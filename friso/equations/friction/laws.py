@@ -1,21 +1,15 @@
 """Friction laws of their own form: none, Stribeck, Dahl, generalized Maxwell slip.
 
-No friction at all.
+Stribeck: static, with a viscous term, regularised. Armstrong-Helouvry, Dupont, Canudas de Wit 1994,
+doi:10.1016/0005-1098(94)90209-7.
 
-Static Stribeck friction with a viscous term, regularised.
+Dahl: LuGre without Stribeck effect and bristle damping. Dahl 1968 (Aerospace Corp. TOR-0158(3107-18)-1).
 
-Armstrong-Helouvry, Dupont, Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7.
-
-Dahl friction: LuGre without Stribeck effect and bristle damping.
-
-Dahl 1968 (Aerospace Corp. TOR-0158(3107-18)-1).
-
-Generalised Maxwell-slip friction: Al-Bender et al. 2005, doi:10.1109/TAC.2005.858676.
-
-The source's conditions are read as follows. An element sticks until its force *along the motion* reaches its share of
-the level, sgn(v) F_i = alpha_i s(v), and then slips until the velocity passes zero. After a reversal, an element that
-is still bent against the motion goes on sticking, however far s(v) falls below its force. Codes that compare abs(F_i)
-with the level let such an element jump to the other side.
+Generalised Maxwell slip: Al-Bender et al. 2005, doi:10.1109/TAC.2005.858676. The source's conditions are read as
+follows. An element sticks until its force *along the motion* reaches its share of the level, sgn(v) F_i = alpha_i s(v),
+and then slips until the velocity passes zero. After a reversal, an element that is still bent against the motion goes
+on sticking, however far s(v) falls below its force. Codes that compare abs(F_i) with the level let such an element jump
+to the other side.
 """
 
 from __future__ import annotations

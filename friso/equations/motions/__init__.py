@@ -1,27 +1,16 @@
-"""The motions of friso's own; importing this module registers them.
+"""The motions of friso's own; an import of the package registers them.
 
-A reference that swings ever faster, or ever more slowly.
+Planned moves are those of drives: each limit is reached as early as the others allow. There are limits up to the jerk,
+or the snap. A move of a distance D is its step, smoothed by one moving average for each limit. With widths T1 >= T2 +
+T3 + ... of these averages the peaks of its derivatives are D/T1, D/(T1 T2), ...: the widths follow from the limits, the
+innermost first (Lambrechts, Boerlage and Steinbuch 2005, doi:10.1016/j.conengprac.2004.04.010, for the third and fourth
+order).
 
-The reference stays where the stage is.
+Two equal steps go there and back, with bounded acceleration.
 
-A reference that is the sum of several swings.
+A chirp swings ever faster, or ever more slowly. A multisine is the sum of several swings.
 
-Moves as drives plan them: each limit is reached as early as the others allow.
-
-There are limits up to the jerk, or the snap. A move of a distance is its step, smoothed by one moving average for each
-limit. With widths T1 >= T2 + T3 + ... of these averages the peaks of its derivatives are D/T1, D/(T1 T2), ...: the
-widths follow from the limits, the innermost first (Lambrechts, Boerlage and Steinbuch 2005,
-doi:10.1016/j.conengprac.2004.04.010, for the third and fourth order).
-
-The reference moves at constant speed.
-
-The masses begin displaced and are released; the reference stands still.
-
-A reference that swings.
-
-The reference jumps.
-
-Two equal steps, there and back, with bounded acceleration.
+With released masses, the masses begin displaced and the reference stands still.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Rounds of runs that are followed to their attractors: whether they repeat, and the orbits they close.
+"""Run stages in rounds, each longer than the last, until they rest or repeat themselves.
 
-Detect whether swings repeat themselves: after how many swings, and after what time.
-
-Run stages in rounds, each longer than the last, until they rest or repeat themselves.
-
-Close orbits from runs that repeat themselves, after any number of swings.
+A run that repeats itself does so after any number of swings. How many, and after what time, is detected; an orbit is
+then closed from it.
 """
 
 from __future__ import annotations

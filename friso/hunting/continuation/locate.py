@@ -1,10 +1,8 @@
 """Locate where a cycle on a branch loses stability.
 
-Locate where scattered values pass zero or turn, by a cubic with an error bound.
-
-Locate where a cycle on a branch loses stability.
-
 A multiplier passes -1 (flip), 1 (fold) or the unit circle (torus).
+
+Values along a branch scatter. A cubic with an error bound says where they pass zero or turn.
 """
 
 from __future__ import annotations

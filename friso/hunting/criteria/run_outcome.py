@@ -1,15 +1,12 @@
 """Name what a stage does, by its run and by what attracts it, and when it has settled.
 
-Define the settling time for friso check, compare, simulate, sweep, map and tune.
+The settling time is that of friso check, compare, simulate, sweep, map and tune. It runs from the last corner of the
+reference until the deviation stays within a band while the reference stands there. For a motion that stands at several
+places it is the longest of these times. It is infinite if the deviation is outside the band when the reference leaves,
+or when the run ends. So a stage that does not move at all has not settled, although it is in position once the
+reference is back.
 
-The time runs from the last corner of the reference until the deviation stays within a band while the reference stands
-there. For a motion that stands at several places it is the longest of these times. It is infinite if the deviation is
-outside the band when the reference leaves, or when the run ends. So a stage that does not move at all has not settled,
-although it is in position once the reference is back.
-
-State what a run did until its end: it swings, creeps, rests or failed.
-
-An outcome says nothing on what the stage can do.
+The outcome says what a run did until its end, and nothing on what the stage can do. Just one of the four holds:
 
 - *swings*: over the last quarter the deviation goes to and fro by more than twice the band. It does so again and again,
   so it has a period. And it lasts: it is at least half as wide as over the last half of the run, and it turned within
@@ -18,10 +15,10 @@ An outcome says nothing on what the stage can do.
 - *creeps*: it does neither: it is outside the band at its end without swinging. It drifts, sticks there, or dies out.
 - *failed*: the run was not completed.
 
-Just one of the four holds. The band depends on the question: `REST_BAND` for sweeps and maps, the position window of a
-specification, or the user's band for being in position. A swing slower than the run is long looks like creeping.
+The band depends on the question: `REST_BAND` for sweeps and maps, the position window of a specification, or the user's
+band for being in position. A swing slower than the run is long looks like creeping.
 
-The verdict on a stage: by the cycles that attract, and by where its own motion ends.
+The verdict is on the stage: by the cycles that attract, and by where its own motion ends. Just one of them holds:
 
 | verdict | a cycle attracts | the stage's own motion |
 |---|---|---|
@@ -33,9 +30,8 @@ The verdict on a stage: by the cycles that attract, and by where its own motion 
 | failed | | was not completed |
 | none | unknown | has a reference that keeps moving: of a single stage there is no verdict then |
 
-Just one of them holds. A run alone gives no verdict (see `friso.hunting.criteria.run_outcome` for what a run did). What
-attracts is a cycle that was closed as an orbit, or else, and then it is said ("observed"), a swing that long
-simulations do not leave.
+A run alone gives no verdict. What attracts is a cycle that was closed as an orbit, or else, and then it is said
+("observed"), a swing that long simulations do not leave.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""Stages of equal equations that run side by side, their rows, and their states at rest.
+"""Stages of equal equations that run side by side, with the states from which hunting starts.
 
-Base for results of many stages or runs: arrays with one row each, to select from.
+Arrays have one row for each stage or run, to select from.
 
-Represent stages of equal equations, with the reference at zero and any initial state.
-
-Make states of stages at rest or stuck off their reference, from which hunting starts.
+The reference is at zero, and any initial state may be given. Stages start at rest, or stuck off their reference.
 """
 
 from __future__ import annotations

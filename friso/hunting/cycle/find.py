@@ -1,10 +1,7 @@
-"""Find limit cycles of many stages at once, as closed orbits with their multipliers.
+"""Find limit cycles of many stages at once, as closed orbits with their stability.
 
-Compute how deviations from a cycle grow per return.
-
-Floquet multipliers describe small deviations, the slope of the return map finite ones.
-
-Find limit cycles of many stages at once, as closed orbits with their stability.
+Stability is how deviations from a cycle grow per return: Floquet multipliers describe small deviations, the slope of
+the return map finite ones.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """Guess limit cycles from the map of stages that start at rest.
 
-Find the swings of many runs at once, from the turning points about the reference.
+The return map takes the distance at which a stage sticks to how far it then swings to the other side. Guesses are its
+fixed points over half a period or a whole one.
 
-Compute the return map of hunting.
-
-The map takes the distance at which a stage sticks to how far it then swings to the other side.
-
-Guess limit cycles: fixed points of the return map over half a period or a whole one.
+Swings are found from the turning points about the reference, of many runs at once.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
-"""What return maps tell: the cycles that attract, and the fates of kicks and moves.
-
-Find limit cycles of stages by their return maps.
+"""Find the limit cycles of stages by their return maps, and decide which motions swing for ever.
 
 Each attractor of a map is followed by a run, from which an orbit is closed.
 
-Decide which motions swing for ever.
-
-A run shows where a stage lands, that is, comes to stick; the return map predicts what follows.
+For kicks and moves, a run shows where a stage lands, that is, comes to stick. The return map predicts what follows.
 """
 
 from __future__ import annotations
