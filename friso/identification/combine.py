@@ -1,8 +1,7 @@
-"""How wide an estimate is, and estimates of several logs combined.
+"""Compute how wide an estimate is, and combine the estimates of several logs.
 
-Compute the uncertainty of a least-squares fit with correlated residuals.
-
-Combine several estimates of a quantity into one, with the correlations of the combined values.
+Residuals of a least-squares fit are correlated, so its uncertainty is computed for correlated residuals. Estimates of
+one quantity become one value, with the correlations of the combined values.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Define doubts: effects that may be in a log and are not in the model, with the test that detects each.
 
 Each doubt is a row in the table of `friso/identification/doubts/`. It states what it looks at, at which moment of an
-analysis, and which measurement would decide it; its `find` yields findings. A finding is the cause in words, with its
-size and its consequence: wider intervals, or values that are not reported. The analysis applies consequences in this
-module, so that one more effect is one more row.
+analysis, and which measurement would decide it.
 
-Judge a fit of moves: its residual against the noise of the record, and possible causes.
+Its `find` yields findings. A finding is the cause in words, with its size and its consequence: wider intervals, or
+values that are not reported. Consequences are applied here, so that one more effect is one more row.
+
+A fit of moves is judged by its residual against the noise of the record, and gets its possible causes.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Estimates, how they are told, and what would show them.
+"""Define the estimate, write it in words, and say which experiments would show it.
 
-Define the result of an analysis: a value with its 95 % interval, or a range and the reason why there is no value.
-
-Write numbers of an identification with as many digits as their uncertainty allows.
-
-Say which experiments show a key of the stage file.
+An estimate is a value with its 95 % interval, or a range and the reason why there is no value. Its numbers have as many
+digits as their uncertainty allows.
 """
 
 from __future__ import annotations

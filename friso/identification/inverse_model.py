@@ -1,11 +1,11 @@
 """Least squares on the inverse model: force = M a + F_v v + F_c sign(v) + offset, with both sides filtered alike.
 
 The filtering follows Janot, Gautier, Brunot (EMPS benchmark, nonlinearbenchmark.org, 2019) and, for the method,
-Gautier, Janot, Vandanjon 2013, doi:10.1109/TCST.2012.2185697: position through a Butterworth filter of order 4 forward
-and back, at five times the bandwidth of the motion, derivatives by central differences, and all columns and the force
-decimated to 2.5 times the bandwidth by another filter.
+Gautier, Janot, Vandanjon 2013, doi:10.1109/TCST.2012.2185697. A Butterworth filter of order 4 takes the position
+forward and back, at five times the bandwidth of the motion. Central differences give the derivatives. Another filter
+decimates all columns and the force to 2.5 times the bandwidth.
 
-At rest friction is any force, and bristles bend: such samples leave the force and all columns before they are
+At rest friction is any force, and bristles bend. Such samples leave the force and all columns before they are
 decimated, which would spread that force over the rows beside them.
 """
 

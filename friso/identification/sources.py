@@ -1,8 +1,7 @@
-"""Logs and what is said of them as sources of experiments, and what files of logs hold.
+"""Read the given files of logs as sources of experiments, and describe what they hold.
 
-Read the given files: contents, mapping, and kind of experiment of each.
-
-Describe the contents of a log file: channels, proposed roles with reasons, and open questions.
+A source has its contents, its mapping, and its kind of experiment. A description lists channels, proposed roles with
+reasons, and open questions.
 """
 
 from __future__ import annotations

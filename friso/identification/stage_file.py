@@ -1,8 +1,6 @@
-"""The stage file that estimates make, and its keys.
+"""Write the identified stage file: the estimates in the given stage, or in a stage assumed for a log.
 
-Write the identified stage file: the estimates in the given stage, or in a stage assumed for a log.
-
-Choose the estimates that the keys of a stage file can take: within their bounds, and consistent with each other.
+Its keys take only estimates that are within their bounds, and consistent with each other.
 """
 
 from __future__ import annotations

@@ -1,30 +1,25 @@
-"""The mechanisms as beams: their system, their modes, and both models side by side.
+"""Model the mechanism as geometrically exact beams (exudyn), nonlinear over the stroke.
 
-Model the leaves of a mechanism as geometrically exact beams of exudyn.
-
-The module computes forces, stiffness and mass of the nodes. Only this module knows exudyn. A leaf is a chain of equal
+`LeafBeams` computes forces, stiffness and mass of the nodes. No other file knows exudyn. A leaf is a chain of equal
 two-node elements of constant strain. Three corrections keep few elements exact:
 
 - An element misses bending because its moment is taken as constant. That bending is added to its shear flexibility
   (residual bending flexibility: h^2/(12 E I) per force).
 - The bent middle of an element carries mass beyond the straight line between its nodes. That mass is added to its
   rotary inertia (rho A h^2/6).
-- What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the stiffness of the
+- What the leaf has as a plate (mechanism.py) is averaged over the element. The whole leaf then has the stiffness of the
   plate in parallel motion, under a constant torque, and under the torque that a force across the deflected leaf adds.
 
-Compute modes and buckling load of straight leaves and their stage.
+Stiffness and mass of one leaf give the modes and buckling load of straight leaves and their stage. A leaf between held
+ends moves along x, y and z and twists, each independently of the others. Its lowest modes of each kind describe it
+completely, together with the shapes that it takes statically when the stage moves (Craig & Bampton 1968,
+doi:10.2514/3.4741).
 
-Stiffness and mass of one leaf suffice. A leaf between held ends moves along x, y and z and twists, each independently
-of the others. Its lowest modes of each kind describe it completely, together with the shapes that it takes statically
-when the stage moves (Craig & Bampton 1968, doi:10.2514/3.4741).
-
-Model the mechanism as geometrically exact beams (exudyn), nonlinear over the stroke.
-
-The stage is pushed along z. Leaves and stage then move in the x-z plane alone. The stiffness of the deflected mechanism
+The stage is pushed along z, so leaves and stage move in the x-z plane alone. The stiffness of the deflected mechanism
 has all six coordinates: three in the plane (x, z, about y) and three across it (y, about x, about z), which stay
 independent. Nodes between cart and stage are eliminated leaf by leaf.
 
-Evaluate leaf springs by both models at one stroke.
+Beams and closed forms are evaluated side by side, at one stroke.
 """
 
 from __future__ import annotations

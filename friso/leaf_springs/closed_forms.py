@@ -1,16 +1,13 @@
-"""The mechanisms in closed forms, and the joint of a stage that follows from them.
-
-Evaluate the mechanism by closed forms, for one or for a million geometries at once.
+"""Evaluate mechanisms by closed forms, and derive joint stiffness and parasitic mode of the equations of motion.
 
 Sources: Soemers, Design Principles for Precision Mechanisms (2010), ch. 2; Awtar, Slocum & Sevincer (2007),
-doi:10.1115/1.2717231, for the deflected leaf; plate.py for the effect of clamps on a wide leaf. Stiffness in N/m,
-forces in N, lengths in m, frequencies in Hz; arrays of one shape throughout.
+doi:10.1115/1.2717231, for the deflected leaf; mechanism.py for the effect of clamps on a wide leaf.
 
-Evaluate one mechanism at a stroke by closed forms.
+Stiffness in N/m, forces in N, lengths in m, frequencies in Hz. Arrays have one shape throughout, for one or for a
+million geometries at once.
 
-A deflected leaf is a curved beam, whose 6 x 6 stiffness follows from the energy of unit loads (Castigliano).
-
-Derive joint stiffness and parasitic mode of the equations of motion from leaf springs.
+At a stroke, one mechanism is evaluated: a deflected leaf is a curved beam, whose 6 x 6 stiffness follows from the
+energy of unit loads (Castigliano).
 """
 
 from __future__ import annotations

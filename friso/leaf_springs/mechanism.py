@@ -1,25 +1,22 @@
-"""Leaf springs, the mechanisms made of them, and how they are evaluated.
+"""Model one leaf as a plate, and define the parallel leaf-spring mechanism (thesis, Fig. 6) with its results.
 
-Model one leaf as a plate, which is stiffer than a beam of equal section.
+A plate is stiffer than a beam of equal section. A leaf bent along its length curls across it (anticlastic curvature)
+and a twisted leaf warps, unless clamps prevent it; both make the leaf stiffer near the clamps.
 
-A leaf bent along its length curls across it (anticlastic curvature) and a twisted leaf warps, unless clamps prevent it;
-both make the leaf stiffer near the clamps. The deflection is taken as W(x, y) = f(x) + g(x) (y^2/2 - w^2/24), for
-twisting W = theta(x) y; Kirchhoff's energy is least for a function g (and theta) that solves a linear equation with
-constant coefficients, which gives closed forms (Kantorovich's method; Timoshenko & Woinowsky-Krieger, Theory of Plates
-and Shells, 1959, Sec. 82 for the energy). With more functions across the width the solution converges (tests/ritz.py)
-to nearly constant multiples of the closed forms. The width is assumed to be many times the thickness.
+The deflection is taken as W(x, y) = f(x) + g(x) (y^2/2 - w^2/24), for twisting W = theta(x) y. Kirchhoff's energy is
+least for a function g (and theta) that solves a linear equation with constant coefficients, which gives closed forms
+(Kantorovich's method; Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, 1959, Sec. 82 for the energy). With
+more functions across the width the solution converges (tests/ritz.py) to nearly constant multiples of the closed forms.
+The width is assumed to be many times the thickness.
 
-Lengths in m, arrays allowed; s runs along the leaf from its middle, from -L/2 to L/2.
+In a leaf, lengths are in m, arrays allowed; s runs along the leaf from its middle, from -L/2 to L/2.
 
-Represent a parallel leaf-spring mechanism as data (thesis, Fig. 6).
+In a mechanism, x runs along the leaves, from the cart (0) to the stage (L), y along their width, z through their
+thickness, which is the direction of motion. The origin lies between the clamps at the cart, in the middle of the width
+and of the row of leaves. Numbers may be arrays of one shape: many mechanisms at once.
 
-x runs along the leaves, from the cart (0) to the stage (L), y along their width, z through their thickness, which is
-the direction of motion. The origin lies between the clamps at the cart, in the middle of the width and of the row of
-leaves. Numbers may be arrays of one shape: many mechanisms at once.
-
-Collect the results for a mechanism at a stroke, by any model.
-
-Modes are named by the part with the largest fraction of the kinetic energy.
+Results are at a stroke, and any model may give them. Modes are named by the part with the largest fraction of the
+kinetic energy.
 """
 
 from __future__ import annotations

@@ -1,13 +1,11 @@
-"""The catalogue of remedies, with what limits their keys and what their loops must hold.
+"""List the remedies with the keys that they change, the smallest change first.
 
-Cap the speed of the controller that is advised where nobody stated what the machine allows.
+Gains, bandwidth and joint are variables of an optimiser on logarithmic scales. Where nobody stated what the machine
+allows, the speed of the advised controller is capped.
 
-Judge the linear loops of many machines: which are stable, and with which margin.
+Linear loops of many machines are judged at once: which are stable, and with which margin.
 
-List the remedies with the keys that they change, the smallest change first.
-
-Gains, bandwidth and joint are variables of an optimiser on logarithmic scales. The isolator suggested to a rigid stage
-that hunts comes from a survey of a few joints.
+The isolator suggested to a rigid stage that hunts comes from a survey of a few joints.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Machines like the one at hand, drawn within what is known of it.
+"""Draw random machines around a stage file, and define the goal that they must meet.
 
-Draw random machines around a stage file.
-
-Define the goal of tuning, and draw the machines, each with its move, that must meet it.
-
-The goal says which parts may change; changes apply to all machines.
+Each machine is drawn with its move, within what is known of it. The goal says which parts may change; changes apply to
+all machines.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""The method of friso tune, and the least change of what it found.
+"""Run the method of `friso tune`: optimise each remedy, and verify its best points.
 
-Measure how large a change is, and find the smallest change of the bandwidth that meets the goal.
-
-The size of a change counts parts bought, keys changed, and the factor of change.
-
-Run the method of `friso tune`: optimise each remedy, and verify its best points.
+Of what works, the smallest change of the bandwidth that meets the goal is found. The size of a change counts parts
+bought, keys changed, and the factor of change.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
-"""Search along a remedy: trials on the drawn machines.
-
-Try points of a search, one value for each variable, on many machines at once.
-
-Search the best points of one remedy, and survey whether the machines hunt there.
+"""Search the best points of one remedy, and survey whether the machines hunt there.
 
 A point is one value for each variable of the remedy. The search is differential evolution (Storn and Price 1997,
-doi:10.1023/A:1008202821328), as in SciPy. Whole generations of points are simulated at once.
+doi:10.1023/A:1008202821328), as in SciPy. Whole generations of points are simulated at once, each on many machines.
 """
 
 from __future__ import annotations

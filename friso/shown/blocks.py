@@ -1,8 +1,6 @@
-"""The parts of an answer, and the files that are made of them.
+"""Define the block: one part of an answer, which terminal, page, notebook and JSON document show alike.
 
-Define the block: one part of an answer, which terminal, page, notebook and JSON document show alike.
-
-Describe the files of a command: names, and what the files hold.
+The files of a command are described here too: names, and what the files hold.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Motions in words, and the cases of a check beside each other.
+"""Say how a stage follows its reference, and which limits moves do not reach.
 
-Say how a stage follows its reference, and which limits moves do not reach.
-
-Name and colour a stage as given, locked and free alike in figures, sentences and tables.
+A stage as given, locked and free has one name and one colour in figures, sentences and tables.
 """
 
 from __future__ import annotations

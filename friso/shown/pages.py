@@ -1,10 +1,7 @@
-"""Pages in HTML, and the glossary that they explain names by.
+"""Write every page of friso from one skeleton, with the answer first.
 
-Link words on a page to the glossary at its end, each word at its first occurrence.
-
-Write every page of friso from one skeleton, with the answer first.
-
-A command's own template may change parts of the skeleton.
+A command's own template may change parts of the skeleton. Words on a page link to the glossary at its end, each word at
+its first occurrence.
 """
 
 from __future__ import annotations

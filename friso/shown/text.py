@@ -1,19 +1,13 @@
-"""Numbers, keys, loops and machines in words.
+"""Write numbers and keys for readers, and choose the sentences of an answer.
 
-Write numbers for readers: with the SI prefix that suits them, as ranges, in percent.
+Numbers have the SI prefix that suits them, and may be ranges or percentages.
 
-Write keys of a stage file in words.
+Sentences come from a table of conditions and templates, which has one row of alternatives for every sentence. An
+alternative is a condition with a template; the first one whose condition holds is said. Names in braces stand for
+numbers and words, which are computed when said.
 
-Say that a loop is unstable, which matters more than anything that friction does.
-
-Say by how much machines drawn at random differ from each other.
-
-Choose the sentences of an answer from a table of conditions and templates.
-
-A table has one row of alternatives for every sentence of an answer. An alternative is a condition with a template; the
-first one whose condition holds is said. Names in braces stand for numbers and words, which are computed when said.
-
-Say on which unknown values an answer rests.
+An unstable loop has its own sentence, because it matters more than anything that friction does. Other sentences say on
+which unknown values an answer rests, and by how much machines drawn at random differ from each other.
 """
 
 from __future__ import annotations

@@ -1,12 +1,7 @@
-"""What functions of friso take: kinds of arguments, and stages by their file, tables or text.
+"""Check the arguments of functions by their annotations, and load and save stage files.
 
-Check the types of arguments by their annotations.
-
-A wrong type gives an InputError that names the argument.
-
-Load and save stage files.
-
-List controllers and friction laws from outside friso, for `--help` and reports.
+A wrong type gives an InputError that names the argument. A stage may come as its file, as tables or as text. For
+`--help` and reports, controllers and friction laws from outside friso are listed.
 """
 
 from __future__ import annotations

@@ -2,9 +2,7 @@
 
 Any controller may have the keys against friction.
 
-The tables [[controller.filters]]: transfer functions of up to second order.
-
-They are in the order of the signal.
+The tables [[controller.filters]] are transfer functions of up to second order, in the order of the signal.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""The tables of the machine as built, and [motion].
+"""Declare the tables of the real drive and the machine's surroundings, and [motion].
 
-Declare what every motion of the reference has: the table [motion].
-
-Each kind of motion is a class in `friso/equations/motions/`, or comes from a package.
-
-Declare the tables of a stage file for the real drive and the machine's surroundings.
+The table [motion] has what every motion of the reference has. Each kind of motion is a class in
+`friso/equations/motions/`, or comes from a package.
 """
 
 from __future__ import annotations

@@ -1,20 +1,15 @@
-"""Tables of a stage file and their keys: sections, arrays, and kinds that other packages add.
+"""Define the base of all stage-file tables: strict keys, errors, rules, and variants.
 
-Define keys that take an array: of values, or of tables.
+A key may take an array of values, or of tables: `element_stiffness = ["40 N/um", "30 N/um"]` and
+`[[controller.filters]]`. In `Stage.flat` every element has a key of its own, numbered from 1, such as
+friction.element_stiffness.2. A table in an array has such a key for each of its own keys, such as
+controller.filters.2.frequency.
 
-Examples are `element_stiffness = ["40 N/um", "30 N/um"]` and `[[controller.filters]]`. In `Stage.flat` every element
-has a key of its own, numbered from 1, such as friction.element_stiffness.2. A table in an array has such a key for each
-of its own keys, such as controller.filters.2.frequency.
+Sections may come from other packages and files. Friso's own are named here. Installed packages name theirs in entry
+points, which are read if a name in a stage file is not friso's own.
 
-Register sections from other packages and files, and find them again in another process.
-
-Friso's own sections are named here. Installed packages name theirs in entry points, which are read if a name in a stage
-file is not friso's own.
-
-A kernel is built in a separate process, which gets the plug-ins with its task. A plug-in is a friction law or a
-controller from another package, from one file, or from the script that runs.
-
-Define the base of all stage-file tables: strict keys, errors, rules, and variants.
+A kernel is built in a separate process, which gets the plug-ins with its task and finds them again there. A plug-in is
+a friction law or a controller from another package, from one file, or from the script that runs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Draw machines within their uncertainties, and levels of friction.
+"""Judge an uncertain stage by the verdicts on many stages drawn at random from it.
 
-Judge an uncertain stage by the verdicts on many stages drawn at random from it.
-
-Ask for which friction a stage would hunt whose own friction nobody knows.
+For a stage whose friction nobody knows, the answer is for which friction it would hunt.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""What was measured shown by other friction laws: their keys, and the verdicts with them.
+"""Judge a stage under each friction law that keeps its measured friction.
 
-Convert a friction law to another that keeps what was measured, and report the losses.
-
-Hysteresis loops over a slow motion to and fro, before sliding, are among what is compared.
-
-Judge a stage under each friction law that keeps its measured friction.
+A law is converted to another that keeps what was measured, and the losses are reported. Hysteresis loops over a slow
+motion to and fro, before sliding, are among what is compared.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Read and write files of a store safely, with a record of each block, and its folder.
+"""Read and write the files of a store safely: its folder, and a record of each block.
 
 A store may come from others, so only regular files of the store itself are read, and none larger than friso writes
 them.

@@ -1,10 +1,7 @@
-"""Run a sweep: its cells by threads, processes or a scheduler, into memory or a store.
+"""Run parameter studies into an xarray Dataset, or into a store that can be resumed.
 
-Compute the blocks of a study: in threads, in processes, or on a Dask cluster.
-
-On a cluster each block is a task. Processes on this machine talk over private pipes, so no port is opened.
-
-Run parameter studies into an xarray Dataset, or into a store that can be resumed.
+Blocks of cells run in threads, in processes, or on a Dask cluster, where each block is a task. Processes on this
+machine talk over private pipes, so no port is opened.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""Run the drive as built, and tell its response.
+"""Run a stage with its real drive many times at once, and record what the drive would log.
 
-Run a stage with its real drive many times at once, and record what the drive would log.
-
-Compute the time response of a stage with its real drive, for `friso simulate`.
-
-The surroundings are included.
+The surroundings are included. `friso simulate` gets its time response from here.
 """
 
 from __future__ import annotations

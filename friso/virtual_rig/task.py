@@ -1,10 +1,7 @@
-"""What the drive as built is given: its task and its surroundings.
+"""Define the task of a drive, and build its surroundings as tables.
 
-Define the task of a drive: a reference and an injected force.
-
-Build the surroundings of the drive as tables.
-
-Friction and motor constant are tables over position; floor and injected force are tables over time.
+A task is a reference and an injected force. Friction and motor constant are tables over position; floor and injected
+force are tables over time.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Channels of files, and logs with their signals.
+"""Define the channels that a reader returns, and the log that an analysis takes.
 
-Define the result of a reader: channels, each with its own time, and single numbers.
-
-Define the log: measured signals by role, in SI units, on one even time base.
+A channel has its own time. A reader returns channels and single numbers. A log has measured signals by role, in SI
+units, on one even time base.
 """
 
 from __future__ import annotations

@@ -1,16 +1,13 @@
 """Read files of logs: unpacked, within limits, by their format.
 
-Unpack files that are packed by gzip, bzip2 or xz, or alone in a ZIP archive.
+The content of a file tells its format, not its name. Every format gives a table of channels. `FORMATS` is the registry
+of formats; some need optional libraries.
 
-Read binary logs in a separate process, in which a damaged or hostile file can crash only its own reader.
+Files may be packed by gzip, bzip2 or xz, or be alone in a ZIP archive.
 
-Some formats need optional libraries.
+Binary logs are read in a separate process, in which a damaged or hostile file can crash only its own reader.
 
-Take a sample of a large text: its beginning, middle and end, in a file of their own.
-
-Define what a log format declares, and the registry of formats.
-
-Read a file by its content, not by its name; every format gives a table of channels.
+A sample of a large text is its beginning, middle and end, in a file of their own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Roles of channels, and the mapping that the user gives.
+"""Assign roles to channels, and store what the user says of a log.
 
-Assign roles to channels: as the user said, or by name or unit with a reason; ambiguous roles stay open.
-
-Store the user's statements about a log, such as channels of roles and their units, in a file beside the log.
+A role is as the user said, or follows from a name or unit with a reason. Ambiguous roles stay open. The user's
+statements, such as channels of roles and their units, are stored in a file beside the log.
 """
 
 from __future__ import annotations

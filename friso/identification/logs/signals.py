@@ -1,12 +1,11 @@
-"""Signals of a log, and roles by their physics.
+"""Turn channels into signals, and find force and motion among channels by mechanics.
 
-Find force and motion among channels by mechanics: a force accelerates a mass and overcomes its friction.
+A force accelerates a mass and overcomes its friction. So each pair of channels is read as force and position, and as
+force and velocity: force = M a + F_v v + F_c sign(v) + offset is fitted at several time scales. It needs no units,
+because a factor changes nothing. With the right channels, the fit leaves little of the force on any scale, and inertia
+and friction have equal signs.
 
-Each pair of channels is read as force and position, and as force and velocity: force = M a + F_v v + F_c sign(v) +
-offset is fitted at several time scales, without units, because a factor changes nothing. With the right channels, the
-fit leaves little of the force on any scale, and inertia and friction have equal signs.
-
-Convert a channel with a role: instants in seconds, values in the unit of the role.
+A signal has its instants in seconds and its values in the unit of its role.
 """
 
 from __future__ import annotations

@@ -1,11 +1,10 @@
-"""How a text is written: its numbers, columns and headings.
+"""Find how a text is written: its numbers, and the layout of its table.
 
-Read numbers as they are written: with one decimal sign, and one sign between groups of three digits.
+A number has one decimal sign, and one sign between groups of three digits. A number such as 1.234 has one value with a
+decimal point and another with grouped thousands. A cell alone does not tell them apart, but the other cells of its file
+may.
 
-A number such as 1.234 has one value with a decimal point and another with grouped thousands: a cell alone does not tell
-them apart, but the other cells of its file may.
-
-Find the layout of a text file from its first lines: encoding, delimiter, first row of numbers.
+The first lines tell the layout: encoding, delimiter, first row of numbers.
 """
 
 from __future__ import annotations

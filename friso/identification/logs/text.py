@@ -1,10 +1,7 @@
-"""Tables of text: cells, preambles and headings, channels.
+"""Read CSV, TSV and TXT with one table of numbers: any delimiter, decimal sign and encoding.
 
-Read the cells of a text with one table of numbers, all of them in one number format.
-
-Read the lines above a table: the sampling interval, and the units of its columns.
-
-CSV, TSV and TXT with one table of numbers: any delimiter, decimal sign and encoding; lines before the table.
+All cells of the table have one number format. The lines above it may state the sampling interval, and the units of its
+columns.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Units of channels, and lists of words for them.
+"""Convert unit texts of files and options to SI where possible, by lists of words.
 
-Load the word lists by which channels and units are recognised, from the TOML files beside this module.
-
-Convert unit texts of files and options to SI where possible.
+The TOML files beside this one have the words by which channels and units are recognised.
 """
 
 from __future__ import annotations

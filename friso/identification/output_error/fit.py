@@ -1,13 +1,10 @@
-"""Fits of simulated motion to logs: refined, repeated, and moved by what the model leaves out.
+"""Fit simulated motion to logs, and estimate how far a fit may be off.
 
-Refine many starts at once by Levenberg-Marquardt; the runs of all starts are simulated side by side.
+A fit of the whole model simulates a thousand starts, refines the best few, and iterates the best to the end.
+Levenberg-Marquardt refines them, with the runs of all starts simulated side by side.
 
-Fit the whole model: simulate a thousand starts, refine the best few side by side, and iterate the best to the
-end.
-
-Estimate how far a force that the model leaves out would move a fit, by one linear step.
-
-Estimate the error of a fit by repeating it on simulated logs of the fitted machine, whose true values are known.
+A fit is moved by a force that the model leaves out: one linear step estimates how far. Its error is estimated by
+repeating it on simulated logs of the fitted machine, whose true values are known.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Which numbers a log shows, and over which motion.
+"""Decide which parameters a log determines, and fit those.
 
-Determine what the motion of a record can show: steady speeds for the Stribeck effect, sticking for the bristles.
-
-Decide which parameters a log determines.
+The motion of a record shows only some of them: steady speeds show the Stribeck effect, sticking shows the bristles.
 
 Parameters that any motion shows are fitted first, then all. Parameters that need special motion are profiled: one is
 moved, and all others are refitted.

@@ -1,15 +1,12 @@
-"""Friction over speed: its curve, its parameters, and friction that is stamped unevenly.
+"""Read friction over velocity: Coulomb, viscous and, if it shows, Stribeck.
 
-Fit a Stribeck curve to friction at constant speeds, with profile intervals.
+Stretches of constant velocity show friction. At uneven instants, regression on local polynomials of motion and force
+gives mass and friction.
 
 At a given Stribeck velocity and exponent the curve is linear in all other parameters. Least squares are therefore
 computed over a grid of both, and an interval contains every value that explains the forces within chance, for any
 exponent (profile likelihood). A linearised interval at the best fit is much too narrow, because another exponent with
 another velocity may fit as well.
-
-Read friction over velocity from stretches of constant velocity: Coulomb, viscous and, if it shows, Stribeck.
-
-Mass and friction from motion and force at uneven instants, by regression on local polynomials.
 """
 
 from __future__ import annotations

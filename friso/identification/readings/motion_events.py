@@ -1,20 +1,18 @@
-"""What happens in slow motion: slips, passes, ramps, and the rate of a force.
+"""Find what happens in slow motion: slips, passes at constant velocity, and force ramps up to break-away.
 
-Find the starts of slips of a sticking body, where its speed stands out of the noise.
+A slip of a sticking body starts where its speed stands out of the noise.
 
-Stretches of constant velocity in a log, from which friction is read: force without inertia.
+A pass shows friction, because its force is without inertia.
 
-Find force ramps from rest until the body moves off, and read the friction at the start of motion.
+A force ramp runs from rest until the body moves off, and shows friction at the start of motion. A maximum over noise
+reads high, by up to about sqrt(2 ln n) deviations of n independent values. A smoothed peak reads low, by the rise of
+the force within the smoothing. The smoothing minimises the sum of both errors.
 
-A maximum over noise reads high, by up to about sqrt(2 ln n) deviations of n independent values; a smoothed peak reads
-low, by the rise of the force within the smoothing. The smoothing minimises the sum of both errors.
-
-Estimate static friction from break-away forces, which fall with the rate of the force.
-
-While the force rises at a rate R the bristles creep at a speed v with F = g(v) (1 - R/(sigma_0 v)), from LuGre with
-dz/dt = R/sigma_0; break-away is the largest F over all speeds. It lies below F_s by a part that grows as R^(2/3) while
-it is small (g expanded to second order in v/v_s) and depends on R/(sigma_0 v_s) and F_c/F_s only. Inertia, left out
-here, only delays: break-away is no lower (Canudas de Wit et al. 1995, doi:10.1109/9.376053, Fig. 3).
+Static friction follows from break-away forces, which fall with the rate of the force. While the force rises at a rate R
+the bristles creep at a speed v with F = g(v) (1 - R/(sigma_0 v)), from LuGre with dz/dt = R/sigma_0; break-away is the
+largest F over all speeds. It lies below F_s by a part that grows as R^(2/3) while it is small (g expanded to second
+order in v/v_s) and depends on R/(sigma_0 v_s) and F_c/F_s only. Inertia, left out here, only delays: break-away is no
+lower (Canudas de Wit et al. 1995, doi:10.1109/9.376053, Fig. 3).
 """
 
 from __future__ import annotations

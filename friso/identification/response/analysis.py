@@ -5,9 +5,8 @@ The limit cases of a stage (thesis, Table 1 and Fig. 7) are named in the words o
 cart that is "sliding" shows the mass line of cart and stage, and with a free joint an antiresonance and a resonance,
 above which the mass line of the stage alone follows. A touched limiter is recognised by its frequencies.
 
-Detect closed loops in records, and find the crossovers of a measured open loop.
-
-Find where a measured response leaves a linear model at low frequency.
+Records also show whether a loop is closed, and a measured open loop shows its crossovers. A measured response may leave
+a linear model at low frequency; the frequency where it does is found.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Fit modes to a frequency response.
+"""Find the modes of a response: resonances and antiresonances with their damping, by a rational fit over frequency.
 
-Fit a model to responses by weighted least squares, with the uncertainty of its parameters.
-
-Modes of a response: resonances and antiresonances with their damping, by a rational fit in the frequency domain.
+Models are fitted by weighted least squares, which gives the uncertainty of their parameters.
 """
 
 from __future__ import annotations

@@ -1,16 +1,11 @@
-"""Frequency responses from records: periods, estimators, and their intervals.
+"""Estimate frequency responses from records: complex values on lines, with their uncertainty.
 
-Define the frequency response of a record: complex values on lines, with their uncertainty.
+A periodic input has a period in samples, and only whole periods become spectra, period by period.
 
-Find the period of an input in samples, and the samples of whole periods.
-
-Turn records of a periodic experiment into spectra, period by period.
-
-Estimate responses from periodic excitation, with noise and distortion separated, and from any other.
-
-For periodic excitation, the robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4:
-noise differs from period to period, nonlinear distortion from one random-phase realisation to another. With an external
-reference (closed loop, indirect) both spectra are taken relative to it, which makes them comparable.
+For periodic excitation, noise and distortion are separated by the robust method of Pintelon, Schoukens, System
+Identification (2nd ed., 2012), chapter 4: noise differs from period to period, nonlinear distortion from one
+random-phase realisation to another. With an external reference (closed loop, indirect) both spectra are taken relative
+to it, which makes them comparable. Any other excitation gives a response without that separation.
 """
 
 from __future__ import annotations

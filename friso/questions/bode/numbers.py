@@ -1,10 +1,7 @@
-"""The states of a Bode analysis, and their numbers.
+"""Name the states of a linear analysis, and write their numbers for the table.
 
-Name and colour the states of a linear analysis alike in every figure, sentence and table.
-
-Write the numbers of a linear analysis as texts for the table.
-
-Each row names a quantity and has its text for each state.
+A state has one name and one colour in every figure, sentence and table. Each row of the table names a quantity and has
+its text for each state.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""The Bode analysis in words, and its blocks.
+"""Say where the controller is stable, why not elsewhere, and how fast it may be.
 
-Say in sentences where the controller is stable, why not elsewhere, and how fast it may be.
-
-Give the one block of `friso bode`: stability, margins and Bode plots.
+The one block of `friso bode` holds these sentences, with stability, margins and Bode plots.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Margins, and an isolator, in words.
+"""Say how far static friction, stroke or stiffness may change before the verdict does.
 
-Say how far static friction, stroke or stiffness may change before the verdict does.
-
-Say what an isolator would do for a rigid stage.
+For a rigid stage, sentences say what an isolator would do.
 """
 
 from __future__ import annotations

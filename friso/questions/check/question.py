@@ -1,8 +1,7 @@
 """Check whether the stage hunts: as given, and with its joint locked and free.
 
-Say for which friction a stage would hunt whose stage file states none.
-
-Give the blocks of a check: the cases, an isolator, the machines drawn, and other friction laws.
+A stage file may state no friction; the answer then says for which friction the stage would hunt. Its blocks show the
+cases, an isolator, the machines drawn, and other friction laws.
 """
 
 from __future__ import annotations

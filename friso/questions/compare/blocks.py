@@ -1,8 +1,7 @@
-"""The comparison in blocks, and its figures.
+"""Say which stage brings the machines to rest, and how soon.
 
-Draw how soon machines settle with each stage, and how many do not come to rest.
-
-Say which stage brings the machines to rest, and how soon; and give the table, the picture and the machines.
+The figures show how soon machines settle with each stage, and how many do not come to rest. Blocks hold the table, the
+picture and the machines.
 """
 
 from __future__ import annotations

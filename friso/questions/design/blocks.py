@@ -1,8 +1,6 @@
-"""The steps of a design, and its blocks.
+"""Explain a design step by step: what was decided, with which numbers, and why.
 
-Explain a design step by step: what was decided, with which numbers, and why.
-
-Give the one block of `friso design`, and its stage files.
+`friso design` has one block, and writes stage files.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""A design in words, with the windows of its crossover.
+"""Describe a design and its outcome in words that terminal, page and messages share.
 
-Compute the range of allowed crossovers of a design, and which bounds limit it.
-
-Describe a design and its outcome in words that terminal, page and messages share.
+Among them is the range of allowed crossovers, with the bounds that limit it.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""The controller as it leaves friso: its verdict in words, a run as built, and all that goes with it.
+"""Put together what leaves friso with a controller: its equations, a test, and the verdict on its stage.
 
-Say with which verdict a controller leaves friso, and what was written.
-
-Run a stage as built, and keep what its controller read and commanded at each sample.
-
-Put together what leaves friso with a controller: its equations, a test, and the verdict on its stage.
+The test is a run of the stage as built, which keeps what the controller read and commanded at each sample.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""The figures of leaf springs, and their drawing.
+"""Draw leaf springs: to scale, with their stiffness over the deflection, and their modes.
 
-Draw a leaf-spring mechanism to scale, from the side and from above, with its dimensions.
-
-Draw leaf springs: force and support stiffness over the deflection, and the modes.
+The drawing shows the mechanism from the side and from above, with its dimensions. Force and support stiffness are drawn
+over the deflection.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Leaf springs in numbers, in words and in blocks.
+"""Describe leaf springs: their properties, the crossover and stroke they allow, and dangers.
 
-Write the table of leaf springs: the name of each quantity, and its text for each model.
-
-Describe leaf springs: their properties, the crossover and stroke they allow, and dangers.
-
-Give the one block of `friso flexure`, with the drawing of the leaf springs.
+The table names each quantity, and has its text for each model. `friso flexure` has one block, with the drawing of the
+leaf springs.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
-"""What was identified in words, figures and blocks, and a stage against its logs.
+"""Write an identification in words, figures and blocks, for the terminal and the page.
 
-Write an identification in words for the terminal and the page.
+A stage is also judged against its logs: whether a log contradicts the verdict, and which single change would explain
+it.
 
-Say whether a log contradicts the verdict on a stage, and which single change would explain it.
-
-Draw an identification: all intervals, each experiment, and the logs predicted.
-
-Give the blocks of `friso identify`, and the files beside its page: the stage and its correlations.
+Figures show all intervals, each experiment, and the logs predicted. Beside the page stand the stage and its
+correlations as files.
 """
 
 from __future__ import annotations

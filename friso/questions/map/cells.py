@@ -1,12 +1,7 @@
-"""The cells of a map, their places, and the verdicts on them.
+"""Prepare the cells of a map for drawing, and draw its verdicts as regions.
 
-Mark machines in a figure over two keys, at the values that they have.
-
-Prepare the cells of a map for drawing.
-
-Axes are put in order, numbers are scaled, and cells without a number get the reason.
-
-Draw a map of verdicts as regions with words in them, the edge of hunting, and the way from a stage to it.
+Axes are put in order, numbers are scaled, and cells without a number get the reason. Machines are marked at the values
+that they have. Regions have words in them, the edge of hunting, and the way from a stage to it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""What a map finds, in words and as a document.
-
-Say in which part of a map the stage swings or hunts.
-
-Build the JSON document of `friso map`.
-"""
+"""Say in which part of a map the stage swings or hunts, in words and in the JSON document of `friso map`."""
 
 from __future__ import annotations
 

@@ -1,10 +1,7 @@
 """Sweep keys over ranges and map where a stage hunts.
 
-Results stay in memory, or go into a store from which an interrupted study is resumed.
-
-Build the study of a sweep, and write the files beside its store.
-
-A study that is too large is refused with an estimate of its cost.
+Results stay in memory, or go into a store from which an interrupted study is resumed. Files of a map stand beside its
+store. A study that is too large is refused with an estimate of its cost.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """Simulate one run: the response of a stage to its motion, or a cell of a study.
 
-Say in one sentence what a run does.
-
-Give the one block of `friso simulate`, and the files of a time response.
+One sentence says what the run does, and one block of `friso simulate` shows it. A time response is written into files.
 """
 
 from __future__ import annotations

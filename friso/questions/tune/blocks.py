@@ -1,10 +1,6 @@
-"""The answer of friso tune in blocks, its gains in words, and its figures.
+"""Show the remedies that `friso tune` found: their gains in the terms of drives, figures, and blocks.
 
-Write the gains of the remedies that work in the terms of drives.
-
-Draw remedies: the same move before and after, settling times of machines, and loops.
-
-Give the blocks of `friso tune`, and a stage file for every remedy.
+Figures show the same move before and after, the settling times of machines, and loops. Every remedy gets a stage file.
 """
 
 from __future__ import annotations

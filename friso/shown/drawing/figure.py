@@ -1,16 +1,8 @@
-"""Figures as data, with their colours and phases.
-
-Name the colours of lines, points and areas in figures.
-
-Describe a figure as plain data, before it is drawn.
+"""Describe a figure as plain data, before it is drawn, with its colours and phases.
 
 An analysis answers with a `Figure`, and a renderer draws it. All data are in the unit of their axis, which is an SI
 unit when the figure is made. `friso.shown.drawing.drawable` chooses the prefix and thins the lines, once for both
-renderers.
-
-Lay out the phases of complex responses for drawing.
-
-Map numbers to colours, with one scale for both renderers.
+renderers. Both map numbers to colours by one scale.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
-"""Draw figures, and maps, with matplotlib.
-
-Draw maps and clouds on paper, colour bars, and legend and note of every figure.
-
-Draw figures on paper with matplotlib: PNG, SVG and PDF, with equal bytes on every run.
+"""Draw figures on paper with matplotlib: PNG, SVG and PDF, with equal bytes on every run.
 
 The user's matplotlibrc does not matter: everything is drawn under matplotlib's defaults and the style below. Texts are
 drawn as they stand: a dollar sign in a stage's name starts no formula.
+
+Maps and clouds have colour bars, and every figure has its legend and note.
 """
 
 from __future__ import annotations

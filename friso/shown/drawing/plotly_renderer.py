@@ -1,14 +1,10 @@
-"""Draw figures, and maps, with plotly.
-
-Compress the contents of a page, which a browser unpacks.
-
-Draw maps and clouds on a page, colour bars, and legend and note beneath every figure.
-
-Draw figures on a page: interactive HTML through plotly, readable without a network.
+"""Draw figures on a page: interactive HTML through plotly, readable without a network.
 
 A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`). Their elements are
 named after the figure, so that equal figures give equal bytes. Both are compressed; `page.js` unpacks and draws them in
 the browser.
+
+Maps and clouds have colour bars, and every figure has its legend and note beneath.
 """
 
 from __future__ import annotations
