@@ -112,7 +112,7 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
         return None, np.zeros(stages.count, bool)
     mapped = map_stages(stages, settings.sketched_starts, 1, SKETCH_RTOL, sparse=True)
     resolved = MapSurvey(mapped, (), np.zeros(stages.count, bool)).resolved
-    quiet = [not (one.attractors or stages.chatters) for one in mapped.maps]
+    quiet = [not (found or stages.chatters) for found in mapped.attractors]
     return mapped, resolved & (mapped.surely_attract | quiet)
 
 

@@ -90,9 +90,9 @@ def survey_maps(stages: Ensemble, rtol: float = CYCLE_RTOL) -> MapSurvey:
         mapped = mapped.gone_on(runs, most)
         _close(mapped, np.arange(before, len(mapped.owners)), rtol, motions, repelling)
     lengths, undecided = stages.length, np.zeros(stages.count, bool)
-    for stage, landing_map in enumerate(mapped.maps):
+    for stage, found in enumerate(mapped.attractors):
         own = [motion for motion in motions if motion.stage == stage]
-        for attractor in landing_map.attractors:
+        for attractor in found:
             undecided[stage] |= not any(is_motion(attractor, motion, float(lengths[stage])) for motion in own)
     return MapSurvey(mapped, tuple(motions), undecided)
 
@@ -123,8 +123,8 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
     left out.
     """
     proposals = []
-    for stage, landing_map in enumerate(mapped.maps):
-        for attractor in landing_map.attractors:
+    for stage, (landing_map, found) in enumerate(zip(mapped.maps, mapped.attractors, strict=True)):
+        for attractor in found:
             basin = attractor.basin
             ending = basin[landing_map.final[basin] & ~mapped.continued[landing_map.run[basin]]]
             if not ending.size:
@@ -237,12 +237,8 @@ def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tup
         before, last = (
             landed.distances[rows, at] / stages.length[left] for at in (np.maximum(landed.count - 1, 0), landed.count)
         )
-        fates = np.array(
-            [
-                landing_map.goes_on(last * share)
-                for share in (1 - settings.unsure_landing_share, 1.0, 1 + settings.unsure_landing_share)
-            ]
-        )
+        shares = np.array([[1 - settings.unsure_landing_share], [1.0], [1 + settings.unsure_landing_share]])
+        fates = landing_map.goes_on((last * shares).ravel()).reshape(3, -1)
         foretold = np.abs(landing_map.foretold(before) / last) - 1
         sure = (
             (fates == fates[1]).all(axis=0)

@@ -16,6 +16,9 @@ from friso.hunting.return_map.settings import settings
 REST_COORDINATE, FIRST_COORDINATE = -1e6, -1e9
 """Coordinate on the map that stands for a stage that rests, or has diverged; and one before all others."""
 
+NEGATIVE_SIDE_SHIFT = 1e3
+"""Shift of a landing's coordinate on the map, its log distance, on the negative side."""
+
 TERMS = 4
 """Coefficients of a cubic."""
 

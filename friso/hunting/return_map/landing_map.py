@@ -5,7 +5,7 @@ The map takes one landing, the distance at which the stage sticks, to the next.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.return_map.curve import (
     FIRST_COORDINATE,
+    NEGATIVE_SIDE_SHIFT,
     REST_COORDINATE,
     Cubics,
     at_rest,
@@ -23,11 +24,9 @@ from friso.hunting.return_map.curve import (
     join,
     piece_about,
 )
+from friso.hunting.return_map.iterated import MapLine, beside, repeats_after, side_by_side
 from friso.hunting.return_map.landings import Landings
 from friso.hunting.return_map.settings import settings as return_map_settings
-
-NEGATIVE_SIDE_SHIFT = 1e3
-"""Shift of a landing's coordinate on the map, its log distance, on the negative side."""
 
 BISECTIONS = 40
 """Halvings of an interval of coordinates, after which it is as exact as `repeated_share`."""
@@ -143,21 +142,15 @@ class LandingMap:
         goes = np.isfinite(after) & (after != 0)
         return _place(self.before[points]), np.where(goes, _place(np.where(goes, after, 1.0)), -np.inf)
 
-    def next(self, places: np.ndarray) -> np.ndarray:
-        """Return the coordinates of the landings that follow landings at `places`, both (count,).
-
-        Coordinates are logarithms of distance (see `_place`), between which the map is interpolated.
-        """
-        after, near = self._curve(places), self._nearest
-        after[(after < near) | ((after > NEGATIVE_SIDE_SHIFT / 2) & (after < NEGATIVE_SIDE_SHIFT + near))] = (
-            REST_COORDINATE
-        )
-        return after
+    @cached_property
+    def _line(self) -> MapLine:
+        """Return the map as one that may be iterated."""
+        return MapLine(self._curve)
 
     def _repeated(self, places: np.ndarray) -> np.ndarray:
         """Return the coordinates after as many landings as there are sides, which bring a simple cycle back."""
         for _ in self.sides:
-            places = self.next(places)
+            places = self._line.next(places)
         return places
 
     def fixed_points(self) -> Iterator[FixedPoint]:
@@ -180,38 +173,13 @@ class LandingMap:
                 fit = fitted(places[near], after[near], place)
                 one = float((fit.slope if fit.good[0] else self._curve.slope(place))[0])
                 slope, error = slope * one, float(np.hypot(error * one, slope * fit.error[0]))
-                scatter, place = max(scatter, float(np.nan_to_num(fit.scatter[0]))), self.next(place)
+                scatter, place = max(scatter, float(np.nan_to_num(fit.scatter[0]))), self._line.next(place)
             yield FixedPoint(float(_distance(np.array([at]))[0]), slope, error, scatter)
-
-    def _moved_on(self, at: np.ndarray) -> np.ndarray:
-        """Move coordinates along where every second landing hardly moves: half-way to a cycle, or away from it.
-
-        Two landings later, a small distance x to a cycle has become s x. Where s is near 1, coordinates move on by
-        x / 2, the way that landings go, so that they reach or leave the cycle soon, but no farther than in the most
-        landings that may be passed over.
-        """
-        after = self.next(at)
-        slope = self._curve.slope(at) * self._curve.slope(after)
-        step = self.next(after) - at
-        with np.errstate(all="ignore"):
-            times = np.minimum(0.5 / np.abs(1 - slope), return_map_settings.most_passed_landings / 2)
-        return np.where(
-            (times > 1) & (at > REST_COORDINATE) & (np.abs(step) < return_map_settings.slow_move_log),
-            at + times * step,
-            at,
-        )
-
-    @cached_property
-    def _nearest(self) -> float:
-        """Return the coordinate of the nearest landing that is told from rest."""
-        return float(np.log(survey_settings.least_swing))
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
         """Return the map's attractors, in which a stage swings for ever, from any of its points."""
-        goes = np.isfinite(self.after) & (self.after != 0)
-        at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST_COORDINATE)
-        return tuple(self._told_apart(self._followed(at)))
+        return attractors_of((self,))[0]
 
     @cached_property
     def surely_attracts(self) -> bool:
@@ -221,51 +189,24 @@ class LandingMap:
         motions that go on may come from gaps between points.
         """
         sure = return_map_settings.sure_errors
-        return any(abs(point.slope) + sure * point.error < 1 for point in self.fixed_points()) or any(
+        return any(
             one.periodic
             and len(one.distances) == len(self.sides)
             and one.basin.size >= return_map_settings.least_arriving_points
             and self.slope(one) <= return_map_settings.hardly_attracting_share
             for one in self.attractors
-        )
-
-    def _followed(self, at: np.ndarray) -> np.ndarray:
-        """Iterate the map from coordinates until they are on attractors; return their last landings.
-
-        The result holds coordinates (see `_place`), shape (points, landings).
-        """
-        landings = 2 * survey_settings.most_repeating_swings + 1
-        paths, left = np.tile(at[:, None], landings), np.flatnonzero(at > REST_COORDINATE)
-        before, iterations = np.zeros(len(at)), return_map_settings.map_iterations
-        for _ in range(return_map_settings.iteration_doublings):
-            at = paths[left, -1]
-            for number in range(iterations):
-                if number % return_map_settings.move_on_landings == 0:
-                    if np.all(at <= REST_COORDINATE):
-                        break
-                    at = self._moved_on(at)
-                at = self.next(at)
-            for k in range(landings):
-                paths[left, k], at = at, self.next(at)
-            strays = _strays(paths[left])
-            slow = (strays > before[left]) | (strays < return_map_settings.same_attractor_share)
-            before[left] = strays
-            left = left[slow & (strays > return_map_settings.arrived_share)]
-            if not left.size:
-                break
-            iterations *= 2
-        return paths
+        ) or any(abs(point.slope) + sure * point.error < 1 for point in self.fixed_points())
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
         """Predict the landings that follow landings at signed distances, (count,); 0 for rest.
 
         All distances are in the unit of the map, deflections of the loop by the break-away force.
         """
-        return _distance(self.next(self._places(distances)))
+        return _distance(self._line.next(self._places(distances)))
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
         """Return which landings, as signed distances, lead to swinging for ever, (count,)."""
-        return np.all(self._followed(self._places(distances)) > REST_COORDINATE, axis=1)
+        return np.all(self._line.followed(self._places(distances)) > REST_COORDINATE, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """Return the coordinates on the map (see `_place`) of landings at signed distances."""
@@ -279,9 +220,7 @@ class LandingMap:
         Paths are coordinates on the map (see `_place`), shape (points, landings).
         """
         left = np.all(paths > REST_COORDINATE, axis=1)
-        swings = np.array(
-            [_repeats_after(path, self.symmetric) if goes else 0 for path, goes in zip(paths, left, strict=True)]
-        )
+        swings = repeats_after(paths, self.symmetric)
         while left.any():
             number = int(np.flatnonzero(left)[0])
             first, count = paths[number], int(swings[number])
@@ -330,6 +269,15 @@ class LandingMap:
         return worst
 
 
+def attractors_of(maps: Sequence[LandingMap]) -> list[tuple[MapAttractor, ...]]:
+    """Return the attractors of each of several maps, which are iterated together from their points."""
+    paths = MapLine(side_by_side([one._curve for one in maps])).followed(
+        np.concatenate([beside(one._places(one.after), k) for k, one in enumerate(maps)])
+    )
+    parts = np.split(paths, np.cumsum([one.after.size for one in maps[:-1]]))
+    return [tuple(one._told_apart(beside(part, -k))) for k, (one, part) in enumerate(zip(maps, parts, strict=True))]
+
+
 def _place(distances: np.ndarray) -> np.ndarray:
     """Return coordinates on the map: logarithms of distances, shifted where they are negative."""
     return np.log(np.abs(distances)) + NEGATIVE_SIDE_SHIFT * (distances < 0)
@@ -355,29 +303,6 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
     kept_first = np.argsort(~kept, axis=1, kind="stable")
     left = kept.sum(axis=1)
     return np.where(order < left[:, None], distances[rows, kept_first], np.nan), left - 1
-
-
-def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return how far paths are from repeating, in coordinates on the map, shape (points,).
-
-    Every landing is compared with the one some swings earlier, and the number of swings that fits best counts. Paths
-    are coordinates on the map, shape (points, landings).
-    """
-    return np.min(
-        [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, survey_settings.most_repeating_swings + 1)],
-        axis=0,
-    )
-
-
-def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
-    """Return after how many swings the landings on a path repeat, 0 if they do not.
-
-    `path`, shape (landings,), has coordinates on the map. Landings of a `symmetric` stage may repeat on the other side.
-    """
-    for swings in range(1 if symmetric else 2, survey_settings.most_repeating_swings + 1, 1 if symmetric else 2):
-        if np.all(np.abs(path[swings:] - path[:-swings]) < return_map_settings.same_landing_share):
-            return swings
-    return 0
 
 
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:

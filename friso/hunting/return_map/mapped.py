@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import Ensemble, spread_over, stuck
-from friso.hunting.return_map.landing_map import LandingMap
+from friso.hunting.return_map.landing_map import LandingMap, MapAttractor, attractors_of
 from friso.hunting.return_map.landings import LANDING_RTOL, Landings, find_landings
 from friso.hunting.return_map.settings import settings as return_map_settings
 from friso.stage.controllers import FORCE_LIMIT
@@ -45,10 +45,18 @@ class Mapped:
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
         return LandingMap.of(self.landings.take(which), length, symmetric).renumbered(which)
 
+    @cached_property
+    def attractors(self) -> tuple[tuple[MapAttractor, ...], ...]:
+        """Return the attractors of each stage's map; maps whose attractors are not known yet are iterated together."""
+        if new := [one for one in self.maps if "attractors" not in vars(one)]:
+            for one, found in zip(new, attractors_of(new), strict=True):
+                vars(one)["attractors"] = found
+        return tuple(one.attractors for one in self.maps)
+
     @property
     def surely_attract(self) -> np.ndarray:
         """Return which stages have an attractor on their map that can be trusted, shape (count,)."""
-        return np.array([landing_map.surely_attracts for landing_map in self.maps], bool)
+        return np.array([one.surely_attracts for one, _ in zip(self.maps, self.attractors, strict=True)], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
         """Select the stages with these numbers, none of them twice, and their runs."""

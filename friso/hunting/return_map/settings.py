@@ -100,11 +100,12 @@ class ReturnMapSettings(Settings):
     fitted_scatter_log: float = setting(0.01, "")
     """Scatter of landings about a fitted cubic beyond which the map goes through the landings themselves."""
 
-    map_iterations: int = setting(100, "landings")
-    """Iterations of the map in which most starts reach an attractor."""
+    quick_iterations: tuple[int, ...] = setting((8, 24), "landings")
+    """Iterations of the map, in rounds, in which most starts reach an attractor."""
 
-    iteration_doublings: int = setting(3, "")
-    """Doublings of the iterations for maps that leave a cycle slowly."""
+    map_iterations: tuple[int, ...] = setting((100, 200, 400), "landings")
+    """Iterations, in further rounds, for starts that leave a cycle slowly. One that strays no more after a round than
+    after the one before is irregular."""
 
     move_on_landings: int = setting(4, "landings")
     """Landings after which distances that hardly change are moved on."""

@@ -1,0 +1,119 @@
+"""Iterate return maps to where they lead: those of many stages together, side by side on one line.
+
+Coordinates are logarithms of distance, shifted on the negative side (see `friso.hunting.return_map.landing_map`), and
+from stage to stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.attractors.settings import settings as survey_settings
+from friso.hunting.return_map.curve import FIRST_COORDINATE, NEGATIVE_SIDE_SHIFT, REST_COORDINATE, Cubics, at_rest, join
+from friso.hunting.return_map.settings import settings
+
+STAGE_SHIFT = 4 * NEGATIVE_SIDE_SHIFT
+"""Shift of coordinates from one stage to the next, which leaves room for both sides of each."""
+
+
+def beside(places: np.ndarray, stages: int) -> np.ndarray:
+    """Return coordinates shifted by a number of stages; those of rest stay."""
+    return np.where(places > REST_COORDINATE, places + STAGE_SHIFT * stages, REST_COORDINATE)
+
+
+def side_by_side(curves: Sequence[Cubics]) -> Cubics:
+    """Return the curves of several maps as one, that of stage k shifted by k stages."""
+    parts = [at_rest(FIRST_COORDINATE)]
+    for k, one in enumerate(curves):
+        begins = np.clip(one.begins, -STAGE_SHIFT / 2, STAGE_SHIFT / 2) + STAGE_SHIFT * k
+        parts.append(Cubics(begins, np.vstack([beside(one.terms[0], k), one.terms[1:]])))
+    return join(parts)
+
+
+@dataclass(frozen=True)
+class MapLine:
+    """Return map of one stage, or of several side by side, as a function of coordinates."""
+
+    curve: Cubics
+
+    def next(self, places: np.ndarray) -> np.ndarray:
+        """Return the coordinates of the landings that follow landings at `places`, both (count,)."""
+        after = self.curve(places)
+        distance = after - NEGATIVE_SIDE_SHIFT * np.rint(after / NEGATIVE_SIDE_SHIFT)
+        after[distance < np.log(survey_settings.least_swing)] = REST_COORDINATE
+        return after
+
+    def _moved_on(self, at: np.ndarray) -> np.ndarray:
+        """Move coordinates along where every second landing hardly moves: half-way to a cycle, or away from it.
+
+        Two landings later, a small distance x to a cycle has become s x. Where s is near 1, coordinates move on by
+        x / 2, the way that landings go, so that they reach or leave the cycle soon, but no farther than in the most
+        landings that may be passed over.
+        """
+        after = self.next(at)
+        slope = self.curve.slope(at) * self.curve.slope(after)
+        step = self.next(after) - at
+        with np.errstate(all="ignore"):
+            times = np.minimum(0.5 / np.abs(1 - slope), settings.most_passed_landings / 2)
+        return np.where(
+            (times > 1) & (at > REST_COORDINATE) & (np.abs(step) < settings.slow_move_log), at + times * step, at
+        )
+
+    def followed(self, at: np.ndarray) -> np.ndarray:
+        """Iterate the map from coordinates until they are on attractors; return their last landings.
+
+        The result holds coordinates, shape (points, landings).
+        """
+        landings = 2 * survey_settings.most_repeating_swings + 1
+        paths, left = np.tile(at[:, None], landings), np.flatnonzero(at > REST_COORDINATE)
+        before = np.zeros(len(at))
+        for iterations in (*settings.quick_iterations, *settings.map_iterations):
+            at = paths[left, -1]
+            for number in range(iterations):
+                if number % settings.move_on_landings == 0:
+                    goes = at > REST_COORDINATE
+                    paths[left[~goes]] = REST_COORDINATE
+                    left, at = left[goes], at[goes]
+                    if not left.size:
+                        return paths
+                    at = self._moved_on(at)
+                at = self.next(at)
+            for k in range(landings):
+                paths[left, k], at = at, self.next(at)
+            strays = _strays(paths[left])
+            slow = strays > settings.arrived_share
+            if iterations in settings.map_iterations:
+                slow &= (strays > before[left]) | (strays < settings.same_attractor_share)
+                before[left] = strays
+            left = left[slow]
+            if not left.size:
+                break
+        return paths
+
+
+def _strays(paths: np.ndarray) -> np.ndarray:
+    """Return how far paths are from repeating, in coordinates on the map, shape (points,).
+
+    Every landing is compared with the one some swings earlier, and the number of swings that fits best counts. Paths
+    are coordinates on the map, shape (points, landings).
+    """
+    return np.min(
+        [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, survey_settings.most_repeating_swings + 1)],
+        axis=0,
+    )
+
+
+def repeats_after(paths: np.ndarray, symmetric: bool) -> np.ndarray:
+    """Return after how many swings the landings on each of several paths repeat, 0 if they do not.
+
+    `paths`, shape (points, landings), have coordinates on the map. Landings of a `symmetric` stage may repeat on the
+    other side.
+    """
+    least, found = 1 if symmetric else 2, np.zeros(len(paths), np.int64)
+    for swings in range(least, survey_settings.most_repeating_swings + 1, least):
+        again = np.all(np.abs(paths[:, swings:] - paths[:, :-swings]) < settings.same_landing_share, axis=1)
+        found[again & (found == 0)] = swings
+    return found
