@@ -390,8 +390,8 @@ def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Resul
     return Results(
         statistics=np.zeros((runs, len(STATISTICS))),
         statuses=np.zeros(runs, np.int64),
-        turn_times=np.zeros((runs, capacity)),
-        turn_values=np.zeros((runs, capacity)),
+        turn_times=np.empty((runs, capacity)),
+        turn_values=np.empty((runs, capacity)),
         turn_counts=np.zeros(runs, np.int64),
         samples=np.full((runs, samples, outputs), np.nan),
         ends=np.full((runs, outputs), np.nan),
