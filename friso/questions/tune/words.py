@@ -46,7 +46,7 @@ from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.tables import leading_friction
 
-COLUMNS = ("Works", "95 % settle within", "Largest {effort}", "Modulus margin", "Set to")
+COLUMNS = ("Set to", "Works", "95 % settle within", "Largest {effort}", "Modulus margin")
 
 ABSENT = "never"
 
@@ -525,12 +525,12 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     """Return the remedies with settings side by side, the stage as it is first."""
     table = [("as it is", _row(tuning.present, tuning, NOTHING, "no" if tuning.needed else "yes"))]
     if "bandwidth" in tuning.unmet:
-        table[0][1][0] = "no"  # no machine meets a limit that its controller breaks
+        table[0][1][1] = "no"  # no machine meets a limit that its controller breaks
     for outcome in tuning.outcomes:
         if outcome.measured is not None and outcome.stage is not None:
             works = _WORKS.get(verdict := _verdict(outcome, tuning), verdict)
             row = _row(outcome.measured, tuning, _set_to(tuning.stage, outcome.stage), works)
-            row[0] = row[0] if outcome.remedy.verifiable else works
+            row[1] = row[1] if outcome.remedy.verifiable else works
             table.append((outcome.remedy.name, row))
     return table
 
@@ -552,11 +552,11 @@ def _row(measured: Performance, tuning: Advice, set_to: str, works: str) -> list
     goal = tuning.goal
     moves = "" if works == "yes" or measured.held_moves(goal) is None else f", for {held_range(measured, goal)}"
     return [
+        set_to,
         f"{works}: {share_with_interval(measured.share(goal))}{moves}",
         slowest_time(measured, goal),
         with_unit(measured.force(goal), "N"),
         f"{measured.least_margin(goal):.2f}",
-        set_to,
     ]
 
 
