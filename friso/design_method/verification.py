@@ -33,7 +33,15 @@ from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
-from friso.frequency.bode import COMFORTABLE_MARGIN, Range, ranges_below, searched_crossovers, settled_members, shared
+from friso.frequency.bode import (
+    COMFORTABLE_MARGIN,
+    SEARCH_DENSITY,
+    Range,
+    ranges_below,
+    searched_crossovers,
+    settled_members,
+    shared,
+)
 from friso.frequency.margins import (
     Tuning,
     controller_response,
@@ -355,7 +363,7 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
     """Return angular frequencies that show the loop at all crossovers, and every mode."""
     ends = [
-        frequency_grid(faster(flat, np.array(end / bandwidth(flat))), frequency_settings.search_density)
+        frequency_grid(faster(flat, np.array(end / bandwidth(flat))), SEARCH_DENSITY)
         for end in searched_crossovers(flat)
     ]
     zeta = float(leaves.mechanism.damping_ratio)
