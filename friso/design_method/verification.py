@@ -25,9 +25,8 @@ from scipy.stats import qmc
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.engine.arrays import ArrayColumns
-from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.batch import FIRST_TURNING_POINTS, RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.engine.settings import room_settings
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.equations.motion import last_corner
@@ -629,7 +628,7 @@ def _followed_moves(
         window=1 - settings.last_share,
         record_from=np.inf,
         least_swing=window / 4,
-        room=round(room_settings.first_turning_points * time / settings.followed_time),
+        room=round(FIRST_TURNING_POINTS * time / settings.followed_time),
         chunk=settings.runs_per_report,
     )
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
