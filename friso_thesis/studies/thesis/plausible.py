@@ -28,7 +28,7 @@ from friso_thesis.studies.thesis.claims import (
 )
 from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
-from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
+from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
 from friso_thesis.studies.thesis.space import DRAW_SEED, FORCE_NOISE, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
@@ -50,6 +50,9 @@ DRAW_RTOL = 1e-5
 
 CHANCE_PROBABILITY = 0.05
 """Probability of a chance separation above which it is not reported, for all values of a claim together."""
+
+Findings = dict[str, Finding]
+"""Findings by name, such as that of a claim."""
 
 PARTS = {**NEEDS, **EXPERIMENTS}
 """Parts of the evidence besides maps and responses."""
@@ -220,8 +223,8 @@ def plausible(
     by_claim: dict[str, ClaimInSpace] = {}
 
     def judged(one: Draw, group: Mapping[str, Registered]) -> Findings:
-        about = ("draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
-        by_name = kept.findings(about, partial(_judged, group, one))
+        about = ("findings", "draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
+        by_name = kept.result(about, Findings, partial(_judged, group, one))
         tally.add(_work(group), f"{one.name} of {draws}" if one in drawn else "friso's own choice")
         return by_name
 
