@@ -18,7 +18,6 @@ import friso
 from friso.cli.app import COMMANDS, command_line
 from friso.identification.doubt import DOUBTS
 from friso.interface.question import TOPICS
-from friso.settings import settings_classes
 
 WIDTH = 100
 """Columns of the help of a command."""
@@ -31,7 +30,6 @@ def write_reference(folder: Path) -> None:
         "stage_file": schema_page("stage"),
         "specification": schema_page("specification"),
         "commands": commands_page(),
-        "settings": settings_page(),
         "doubts": doubts_page(),
     }
     for name, text in pages.items():
@@ -40,30 +38,12 @@ def write_reference(folder: Path) -> None:
             path.write_text(text, encoding="utf-8")
 
 
-def settings_page() -> str:
-    """Every setting of every room, with its value, unit and reason."""
-    lines = []
-    for settings in settings_classes():
-        room = settings.__module__.removesuffix(".settings")
-        lines += [f"## {settings.__name__} (`{room}`)", "", "| setting | value | unit | why |", "|---|---|---|---|"]
-        lines += [f"| `{row.name}` | {_shown(row.value)} | {row.unit} | {row.reason} |" for row in settings.rows()]
-        lines.append("")
-    return "\n".join(lines)
-
-
 def doubts_page() -> str:
     """Every doubt about logs: the effect, what is looked at, what follows, and what would decide it."""
     lines = ["| effect | looked at | consequence | decided by |", "|---|---|---|---|"]
     for name, doubt in DOUBTS.items():
         lines.append(f"| {DOUBTS.one_line(name)} | {doubt.looks_at} | {doubt.consequence} | {doubt.decided_by} |")
     return "\n".join(lines)
-
-
-def _shown(value: Any) -> str:
-    """A value of a setting in four digits; the values of a tuple one after the other."""
-    if isinstance(value, tuple):
-        return ", ".join(map(_shown, value))
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def schema_page(of: str) -> str:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from variants import VARIANTS
 
-from friso.engine.allowance import Exhausted, allowance
+from friso.engine.allowance import BATCH_WORK, Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import CALL_WORK, OPERATION_WORK, STEP_WORK, kernel
-from friso.engine.settings import WorkSettings
 from friso.equations.structure import structure
 from friso.stage import Stage
 
@@ -42,7 +41,7 @@ def test_work_is_counted_alike_on_every_processor(locked: Stage) -> None:
     work = kernel(structure(locked.flat())).work
     with allowance() as single:
         (steps,) = runs_of(locked, 1)
-    assert single.used == WorkSettings().batch_work + 8 * work * steps
+    assert single.used == BATCH_WORK + 8 * work * steps
 
 
 def test_a_step_is_as_dear_as_the_operations_in_it() -> None:

@@ -18,7 +18,7 @@ from systems import posix
 
 from friso.engine import building, cache
 from friso.engine import cache as prune
-from friso.engine.cache import SECONDS_OF_A_DAY
+from friso.engine.cache import KEPT_TIME, SECONDS_OF_A_DAY
 from friso.engine.settings import BuildSettings
 from friso.platform import files
 from friso.platform.files import PARTIAL
@@ -163,11 +163,11 @@ def test_what_has_not_been_used_for_long_is_deleted_when_something_is_built(copi
     """And requests for it with it; an entry that was built long ago and is in use stays."""
     (old,) = entries(copied)
     (request,) = (copied / "kernels").glob("*.request")
-    aged(BuildSettings().kept_time + SECONDS_OF_A_DAY, old, request)
+    aged(KEPT_TIME + SECONDS_OF_A_DAY, old, request)
     assert not built(copied)  # its use is recorded
     assert built(copied, "another", STAND_IN_ENDS_WITH=" + 0.0")
     assert not built(copied)
-    aged(BuildSettings().kept_time + SECONDS_OF_A_DAY, old, request)
+    aged(KEPT_TIME + SECONDS_OF_A_DAY, old, request)
     assert built(copied, "third", STAND_IN_ENDS_WITH=" + 1.0 - 1.0")
     assert not old.exists()
     assert not request.exists()

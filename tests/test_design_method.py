@@ -12,6 +12,7 @@ import friso
 from friso.design_method.method import NoDesign, leaves
 from friso.design_method.prepare import prepared, with_leaves
 from friso.design_method.requirements import (
+    MODEL_RESERVE,
     PARASITIC,
     Candidate,
     LeafTask,
@@ -25,6 +26,7 @@ from friso.design_method.requirements import (
 from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Geometry, Sheet, Spec, box, load_spec, mechanisms, sheets, sizes_of
 from friso.design_method.verification import (
+    VERIFIED_RTOL,
     MachineOutcomes,
     Modal,
     Population,
@@ -133,7 +135,7 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     bent, twisted = 195e9 * 20e-3 * 0.3e-3**3 / 12, 75e9 * 20e-3 * 0.3e-3**3 / 3
     across = 1 / (2 * 9.23 * np.sqrt(bent * twisted) / 60e-3**2)  # J of a strip; 1 % less for its finite width
     assert excess["safety.buckling"] == pytest.approx(
-        DesignSettings.current().model_reserve * 3 * ((5 + weight) / result.buckling + across), rel=0.01
+        MODEL_RESERVE * 3 * ((5 + weight) / result.buckling + across), rel=0.01
     )
     assert result.interfering is not None
     assert excess["safety.parasitic"] == pytest.approx(480 / result.interfering.frequency, rel=1e-6)
@@ -142,12 +144,8 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     root = -(closed_forms.stage_stiffness(replace(item, leaves=1.0)) @ moved)[5] + 60e-3 * 0.5
     assert root == pytest.approx(0.5 * 60e-3, rel=1e-6)
     stress = 1.5 * (root * 10e-3 / (0.3e-3 * 20e-3**3 / 12) + (5 + weight) / 2 / (20e-3 * 0.3e-3))
-    assert excess["safety.fatigue"] == pytest.approx(
-        DesignSettings.current().model_reserve * 1.3 * (1 / result.fatigue_margin + stress / 1.3e9)
-    )
-    assert excess["safety.strength"] == pytest.approx(
-        DesignSettings.current().model_reserve * 1.5 * (result.clamp_stress + stress) / 1.3e9
-    )
+    assert excess["safety.fatigue"] == pytest.approx(MODEL_RESERVE * 1.3 * (1 / result.fatigue_margin + stress / 1.3e9))
+    assert excess["safety.strength"] == pytest.approx(MODEL_RESERVE * 1.5 * (result.clamp_stress + stress) / 1.3e9)
 
 
 @pytest.mark.slow
@@ -317,7 +315,7 @@ def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
         assert result.tried == 1
         assert (result.words[0] == "swings") == hunts
     both_ends = {"joint.locked": False, "motion.return_at": "15.06 s", "motion.duration": "30.12 s"}
-    within, _ = measured_run(rig.replace(both_ends), DesignSettings.current().verified_rtol).settling_time
+    within, _ = measured_run(rig.replace(both_ends), VERIFIED_RTOL).settling_time
     assert result.settling[0] == pytest.approx(within[0], rel=0.02)
 
 

@@ -27,8 +27,7 @@ import friso as friso_api
 from benchmarks.trust.damage import exchange, flip
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
-from friso.studies.settings import StudySettings
-from friso.studies.store import Store, _sum_at, read_store
+from friso.studies.store import LARGEST_STORED_BLOCK, SURVEYED_BLOCK, Store, _sum_at, read_store
 from friso.studies.study import Request, Study, study_of
 from friso.studies.sweep import local_crew, run_in_store, sweep
 
@@ -271,7 +270,7 @@ def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path
     path, axes = tmp_path / "large.zarr", {**AXES, "masses.stage": "0.4 kg..0.5 kg:2"}
     study = Request(rig, {key: f"{ends.split(':')[0]}:20000" for key, ends in axes.items()}).study()
     store = Store(path, study)
-    assert np.prod(store.blocks) <= StudySettings().largest_stored_block
+    assert np.prod(store.blocks) <= LARGEST_STORED_BLOCK
     with Store.opened(path, study):
         size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
     assert size < 3e6  # the axes themselves
@@ -678,7 +677,7 @@ def test_a_store_stays_where_the_one_in_its_place_cannot_be_made(
 def test_where_what_attracts_is_surveyed_blocks_are_small(rig: Stage, tmp_path: Path) -> None:
     axes = {"controller.crossover": "4 Hz..16 Hz:41", "joint.stroke": "0 m..1 mm:41"}
     store = Store(tmp_path / "a.zarr", Request(rig, axes).study(["verdict"]))
-    assert np.prod(store.blocks) <= StudySettings().surveyed_block
+    assert np.prod(store.blocks) <= SURVEYED_BLOCK
 
 
 def test_a_store_of_samples_has_their_values_as_coordinates(rig: Stage, tmp_path: Path) -> None:

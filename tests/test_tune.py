@@ -33,10 +33,21 @@ from friso.hunting.measures import measured_run
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.words import unseen
 from friso.remedies import verified
-from friso.remedies.catalogue import BANDWIDTH, Remedy, SpeedCap, of_key, remedies, speed_cap, suggestion
+from friso.remedies.catalogue import (
+    BANDWIDTH,
+    FASTER_THAN_LEAST,
+    FASTEST_UNASKED,
+    Remedy,
+    SpeedCap,
+    of_key,
+    remedies,
+    speed_cap,
+    suggestion,
+)
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
 from friso.remedies.method import Advice, ChangeSize, change_size, least_factors, pairs, tune
 from friso.remedies.search import (
+    LOOKING_WORK,
     Attraction,
     Budget,
     Moves,
@@ -47,14 +58,14 @@ from friso.remedies.search import (
     moves_of_points,
     quantile,
 )
-from friso.remedies.settings import RemedySettings, settings
+from friso.remedies.settings import RemedySettings
+from friso.remedies.verified import MOVE_RTOL
 from friso.stage.controllers import controller_of
 from friso.stage.correlations import Correlations
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AS_IS = partial(Remedy.settled_on, "")
 ONE_POINT = np.zeros((1, 0))
-MOVE_RTOL = RemedySettings.current().move_rtol
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6, further=74)
 
 
@@ -459,7 +470,7 @@ def test_looking_further_ends_where_it_takes_too_much_work(
 
     with allowance() as once:
         next(points())
-    with RemedySettings(search_work=5 * once.used / RemedySettings().looking_work).in_use():
+    with RemedySettings(search_work=5 * once.used / LOOKING_WORK).in_use():
         assert len([*search.looked_at(points())]) == 5
         assert (
             search.cut
@@ -771,7 +782,7 @@ def test_no_gain_goes_beyond_the_cap_whatever_is_turned(rigid: Stage) -> None:
     gains = {"kind": "pid", "kp": "1.4 kN/m", "ki": "11 kN/(m*s)", "kd": "85 N*s/m", "tau": "5 ms"}
     stage = rigid.replace({"controller": gains})
     before = stage.flat()
-    most = sped_up(before, settings.fastest_unasked)
+    most = sped_up(before, FASTEST_UNASKED)
     for remedy in remedies(stage, Goal()):
         corners = np.array([*product((0.0, 1.0), repeat=len(remedy.variables))])
         changed = remedy.changes(corners)
@@ -781,7 +792,7 @@ def test_no_gain_goes_beyond_the_cap_whatever_is_turned(rigid: Stage) -> None:
 
 
 def test_once_a_speed_works_others_stay_near_it_and_a_stated_limit_stands() -> None:
-    assert SpeedCap(4.0, "unknown").above(2.0) == SpeedCap(2.0 * settings.faster_than_least, "least")
+    assert SpeedCap(4.0, "unknown").above(2.0) == SpeedCap(2.0 * FASTER_THAN_LEAST, "least")
     assert SpeedCap(2.1, "mode").above(2.0) == SpeedCap(2.1, "least")
     assert SpeedCap(10.0, "stated").above(2.0) == SpeedCap(10.0, "stated")
 

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from friso.app.machine import Machine
-from friso.app.settings import app_settings
 from friso.equations.bandwidth import bandwidth, sped_up
 from friso.errors import InputError
 from friso.hunting import Case
@@ -211,9 +210,13 @@ def with_log(figure: Figure, log: Log, reference: np.ndarray, time: np.ndarray) 
     return replace(figure, panels=tuple(map(over, figure.panels)))
 
 
+BEGUN_SHARE = 0.01
+"""Share of its range by which a quantity leaves its first value when a move begins. Noise of a log is smaller."""
+
+
 def _begin(values: np.ndarray) -> int:
     """Return the index of the last value before a quantity leaves its first value."""
-    away = np.abs(values - values[0]) > app_settings.begun_share * np.ptp(values)
+    away = np.abs(values - values[0]) > BEGUN_SHARE * np.ptp(values)
     return max(int(away.argmax()) - 1, 0)
 
 

@@ -26,7 +26,6 @@ from friso.app.maps import (
     with_other_joint,
     without_own,
 )
-from friso.app.settings import app_settings
 from friso.app.work import KeptAnswers, Work, figure_on_page
 from friso.axis import speaking_of
 from friso.equations.motion import rests
@@ -362,10 +361,14 @@ def _spacing(options: Mapping[str, Any]) -> str:
     return ":log" if options.get("log") else ""
 
 
+MOST_VALUES = 40
+"""Largest number of values along the slider of a key. A page asks for eleven."""
+
+
 def tracks(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict at values [SI] along the sliders of keys; none for a stage without a verdict."""
     stage, said = asked.machine.stage, asked.options.get("values")
-    most, columns = app_settings.most_values, said.values() if isinstance(said, Mapping) else [None]
+    most, columns = MOST_VALUES, said.values() if isinstance(said, Mapping) else [None]
     if not all(isinstance(one, list) and len(one) <= most and all(map(_is_number, one)) for one in columns):
         raise InputError("values", "something else", f"at most {most} values by key")
     fields, sought = numeric_keys(stage.flat()), rests(stage.flat())

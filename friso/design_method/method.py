@@ -51,6 +51,10 @@ from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
 
+PRESENT_SHARE = 1e-3
+"""Relative difference of a limit from the present crossover up to which it is that crossover, rounded in a
+template."""
+
 
 @dataclass(frozen=True)
 class Need:
@@ -75,7 +79,7 @@ class Need:
     @property
     def limit_is_present(self) -> bool:
         """Tell whether the limit is merely the present crossover, as a template fills it in."""
-        return bool(np.isclose(self.spec.limit, self.present, rtol=settings.present_share))
+        return bool(np.isclose(self.spec.limit, self.present, rtol=PRESENT_SHARE))
 
 
 class NoDesign(Exception):
@@ -105,6 +109,10 @@ class LeavesAndCrossover:
     choice: ChosenLeaves
     stage: Stage
     comfortable: tuple[Range, ...]
+
+
+SLOW_SHARE = 0.05
+"""Fraction of the moves that may take longer than specified. Less would need ten times the moves."""
 
 
 @dataclass(frozen=True)
@@ -144,10 +152,10 @@ class Design:
         If more joint damping allows a higher crossover, it comes first. Moves that do not come to rest are reported by
         the verification itself.
         """
-        limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(settings.slow_share)
+        limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(SLOW_SHARE)
         if limit is None or settling <= limit or not np.isfinite(settling):
             return ()
-        name = f"{percent(1 - settings.slow_share)} of the moves settle in time"
+        name = f"{percent(1 - SLOW_SHARE)} of the moves settle in time"
         later = Relaxation(name, "position.settling_time", float(limit), settling, "s")
         return (self.damped, later) if self.damped else (later,)
 
@@ -155,7 +163,7 @@ class Design:
     def meets(self) -> bool:
         """Tell whether all moves come to rest, and settle in the time specified."""
         limit, free = self.spec.position.settling_time, self.verification.free
-        return not free.missed and (limit is None or free.slower_than(settings.slow_share) <= limit)
+        return not free.missed and (limit is None or free.slower_than(SLOW_SHARE) <= limit)
 
     @property
     def need(self) -> Need:
@@ -213,6 +221,16 @@ class NotNeeded(Exception):
         self.so_far = so_far
 
 
+LOWEST_EDGE = 1 / 40
+"""Lowest crossover of the search, over the machine's limit. Slower loops hunt with any joint."""
+
+HIGHEST_EDGE = 3.0
+"""Highest crossover of the search, over the machine's limit. Faster loops are unstable."""
+
+ABOVE_CROSSOVER = 2.0
+"""Factor on the chosen crossover above which an edge does not matter."""
+
+
 def design(stage: Stage, spec: Spec, progress: Progress = silent, anyway: bool = True) -> Design:
     """Design leaf springs, stroke and controller of an isolator.
 
@@ -227,7 +245,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, anyway: bool =
 
     def over(there: dict[str, float], highest: float, above: float, label: str) -> Corners:
         """Return the edges of hunting at each corner, between fractions of the crossover `highest` [Hz]."""
-        low, high = settings.lowest_edge * highest, above * highest
+        low, high = LOWEST_EDGE * highest, above * highest
         return edges_over(there, population, low, high, settings.edge_steps, progress, label)
 
     def fitted() -> tuple[LeavesAndCrossover, list[Candidate]] | NoDesign:
@@ -238,7 +256,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, anyway: bool =
             return failure
 
     label = "hunting without isolator"
-    without, outcome = both(partial(over, rigid(flat), limit, settings.highest_edge, label), fitted)
+    without, outcome = both(partial(over, rigid(flat), limit, HIGHEST_EDGE, label), fitted)
     need = Need(without, spec, by_rules(stage).flat()[CROSSOVER])
     if isinstance(outcome, NoDesign):
         raise outcome.of(need)
@@ -255,9 +273,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, anyway: bool =
 
     label, edges = "hunting with isolator", None
     try:
-        edges, (by_beams, control, edges_map) = both(
-            partial(over, worst, crossover, settings.above_crossover, label), examined
-        )
+        edges, (by_beams, control, edges_map) = both(partial(over, worst, crossover, ABOVE_CROSSOVER, label), examined)
         _does_not_hunt(fit, edges, need)
         softening = fit.task.load / fit.choice.beams.buckling
         tried, (damped, faster) = both(
@@ -269,6 +285,10 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, anyway: bool =
     return Design(spec, stage, *results)
 
 
+ACCEPTED_CROSSOVER = 0.98
+"""Fraction of the possible crossover that is enough; softer leaves are then preferred."""
+
+
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """Return the joint damping with which margins no longer limit the crossover.
 
@@ -278,15 +298,19 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """
     flat, spec = fit.stage.flat(), fit.task.spec
     target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
-    if flat[CROSSOVER] >= settings.accepted_crossover * target:
+    if flat[CROSSOVER] >= ACCEPTED_CROSSOVER * target:
         return None, target
     for damping in dampings(flat)[1::2]:
         ranges = Modal.of({**flat, "joint.damping": damping}, fit.choice.beams).comfortable
         best = comfortable_below(ranges, target)
-        if best is not None and best >= settings.accepted_crossover * target:
+        if best is not None and best >= ACCEPTED_CROSSOVER * target:
             name = f"crossover of up to {best:.3g} Hz with a modulus margin of 0.5"
             return Relaxation(name, "joint.damping", flat["joint.damping"], float(damping), "N*s/m"), best
     return None, target
+
+
+TRIED_STROKES = 4
+"""Strokes tried over a range in the specification. Each takes a design."""
 
 
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
@@ -298,7 +322,7 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
     """
     stroke, choices = spec.leaves.stroke, []
     several = stroke.high > stroke.low
-    strokes = np.geomspace(stroke.high, stroke.low, settings.tried_strokes).tolist() if several else [stroke.high]
+    strokes = np.geomspace(stroke.high, stroke.low, TRIED_STROKES).tolist() if several else [stroke.high]
     for size in strokes:
         task = LeafTask(spec, size, spec.limit, friction, flat)
         if candidates := front(task):
@@ -322,24 +346,32 @@ def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
 
+DESIGN_ROUNDS = 12
+"""Most rounds of adapting leaves and crossover to each other."""
+
+LOWER_CROSSOVER = 0.97
+"""Factor by which the crossover is lowered in a round. Smaller steps need more rounds; larger ones waste crossover.
+"""
+
+
 def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
     """Choose the softest leaves for the highest crossover that leaves and margins allow.
 
     The two are adapted to each other in rounds. Raises NoDesign if none of the `candidates` fits.
     """
     target = min(task.spec.limit, allowed_crossover(task, candidates))
-    for _ in range(settings.design_rounds):
+    for _ in range(DESIGN_ROUNDS):
         task = replace(task, crossover=target)
         choice = chosen(task, candidates)
         if choice is None:
-            target *= settings.lower_crossover
+            target *= LOWER_CROSSOVER
             continue
         stage = with_leaves(base, choice.geometry, task.stroke)
         ranges = comfortable(stage, choice.beams, population)
         best = comfortable_below(ranges, target)
         if best is None:
             raise NoDesign(f"up to {target:.3g} Hz there is no crossover with a modulus margin of 0.5")
-        if best >= settings.accepted_crossover * target:
+        if best >= ACCEPTED_CROSSOVER * target:
             return LeavesAndCrossover(task, choice, stage.replace({CROSSOVER: f"{_down(best):.6g} Hz"}), ranges)
         target = best
     raise NoDesign(

@@ -21,6 +21,7 @@ from friso.axis import LINEAR
 from friso.design_method.requirements import (
     BREAKAWAY,
     PARASITIC,
+    SIZE_STEP,
     LeafTask,
     bears,
     evaluate_geometries,
@@ -28,7 +29,6 @@ from friso.design_method.requirements import (
     evolved,
     requirements,
 )
-from friso.design_method.settings import settings
 from friso.design_method.spec import SIZES, Geometry, Sheet, Spec, box, mechanisms, moved_along, read_spec, sheets
 from friso.equations.bandwidth import least_breakaway
 from friso.equations.controllers.pid import CROSSOVER, TUNED_MASS, controller_table
@@ -51,13 +51,30 @@ STEEL_MODULUS = 190e9
 """Young's modulus of spring steel [Pa], the default for leaves and stops."""
 
 
+STAGE_MASS_SHARE = 0.3
+"""Fraction of the mass on the joint if the stage file has one mass. The thesis's rig has 0.29."""
+
+
 def split(flat: Mapping[str, Any]) -> dict[str, float]:
     """Return the masses of cart and stage [kg]; a stage file with one mass has it divided."""
     masses = {key: flat[key] for key in ("masses.cart", "masses.stage") if key in flat}
     if len(masses) == 2:
         return masses
     (whole,) = masses.values()
-    return {"masses.cart": (1 - settings.stage_mass_share) * whole, "masses.stage": settings.stage_mass_share * whole}
+    return {"masses.cart": (1 - STAGE_MASS_SHARE) * whole, "masses.stage": STAGE_MASS_SHARE * whole}
+
+
+FIRST_FORCE_SHARE = 0.5
+"""Force at the stroke over static friction from which a search starts. At 1 the cart moves before the joint."""
+
+STOP_STIFFNESS = 0.1
+"""Stiffness of the stop over Young's modulus times the stroke. The thesis's limiter has 0.105."""
+
+FIRST_DAMPING = 0.05
+"""Damping ratio from which a search starts, that of leaf springs with a little grease."""
+
+STOP_DAMPING = 0.016
+"""Damping ratio of the stop, that of the thesis's limiter with its stage."""
 
 
 def isolated(stage: Stage, stroke: float = FIRST_STROKE, young: float = STEEL_MODULUS) -> Stage:
@@ -71,16 +88,16 @@ def isolated(stage: Stage, stroke: float = FIRST_STROKE, young: float = STEEL_MO
         return free
     flat = stage.flat()
     masses = split(flat)
-    stiffness = settings.first_force_share * float(least_breakaway(flat)) / stroke
-    stop = settings.stop_stiffness * young * stroke
+    stiffness = FIRST_FORCE_SHARE * float(least_breakaway(flat)) / stroke
+    stop = STOP_STIFFNESS * young * stroke
     numbers = {
         **masses,
         **as_tuned(flat),
         "joint.stiffness": stiffness,
-        "joint.damping": 2 * settings.first_damping * (stiffness * masses["masses.stage"]) ** 0.5,
+        "joint.damping": 2 * FIRST_DAMPING * (stiffness * masses["masses.stage"]) ** 0.5,
         "joint.stroke": stroke,
         "joint.limiter_stiffness": stop,
-        "joint.limiter_damping": 2 * settings.stop_damping * (stop * masses["masses.stage"]) ** 0.5,
+        "joint.limiter_damping": 2 * STOP_DAMPING * (stop * masses["masses.stage"]) ** 0.5,
     }
     whole = stage.with_numbers({key: float(f"{value:.10g}") for key, value in numbers.items()})
     return whole.replace({"joint.locked": False}) if stage.joint else whole
@@ -206,6 +223,16 @@ COMMENT = "   # "
 SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscous")
 
 
+FRICTION_SPREAD = 0.3
+"""Relative spread of friction, as in catalogues of bearings of one type."""
+
+MASS_SPREAD = 0.05
+"""Relative spread of masses, that of usual payloads."""
+
+SHORTEST_MOVE = 0.1
+"""Shortest move over the longest."""
+
+
 def outline(stage: Stage) -> str:
     """Return the text of a specification with comments.
 
@@ -216,12 +243,8 @@ def outline(stage: Stage) -> str:
     check_designable(stage)
     flat = stage.flat()
     limit = f"{by_rules(stage).flat()[CROSSOVER]:.4g}"
-    friction = [
-        _line(stage, f"friction.{name}", settings.friction_spread) for name in SPREAD if flat.get(f"friction.{name}")
-    ]
-    masses = [
-        _line(stage, f"masses.{name}", settings.mass_spread) for name in ("cart", "stage") if f"masses.{name}" in flat
-    ]
+    friction = [_line(stage, f"friction.{name}", FRICTION_SPREAD) for name in SPREAD if flat.get(f"friction.{name}")]
+    masses = [_line(stage, f"masses.{name}", MASS_SPREAD) for name in ("cart", "stage") if f"masses.{name}" in flat]
     both = masses if len(masses) == 2 else [f"# {line}; to be divided, unless both are given" for line in masses]
     travel, acceleration = _move(stage)
     own = flat.get("joint.stroke")
@@ -239,8 +262,8 @@ def outline(stage: Stage) -> str:
             *both,
             "",
             "[moves]",
-            f'travel = "{settings.shortest_move * travel:g} m .. {travel:g} m"',
-            f'acceleration = "{settings.shortest_move * acceleration:g} m/s^2 .. {acceleration:g} m/s^2"',
+            f'travel = "{SHORTEST_MOVE * travel:g} m .. {travel:g} m"',
+            f'acceleration = "{SHORTEST_MOVE * acceleration:g} m/s^2 .. {acceleration:g} m/s^2"',
             "",
             "[position]",
             'window = "1 um"   # in position: stays this close to the reference',
@@ -345,6 +368,28 @@ def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
     return {key: exactly(place, "m") for key, place in moved_along(flat, geometry.length).items()}
 
 
+LEAVES_GENERATIONS = 60
+"""Generations of the search for leaves. Fewer have not converged."""
+
+LEAVES_SEED = 36
+"""Seed of the search for leaves. A fixed one gives equal leaves for equal joints."""
+
+LEAVES_POINTS = 20
+"""Points for each of the three variables of a search for leaves. Fewer stay at the first thickness."""
+
+HIGHEST_MODE = 1e6  # [Hz]
+"""Frequency of leaves without a mode that both actuator and sensor see."""
+
+WORST_COST = 1e3
+"""Cost above that of any leaves that meet the requirements."""
+
+WIDTH_STEPS = 5
+"""Steps that adapt the width to the stiffness, to within a percent under any load."""
+
+STIFFNESS_ERROR = 0.01
+"""Relative error of the stiffness allowed for whole sizes."""
+
+
 class _Search:
     """Search over the leaves' length, spacing and sheet; the width follows from the stiffness."""
 
@@ -367,7 +412,7 @@ class _Search:
         def cost(x: np.ndarray) -> np.ndarray:
             return self.cost(np.exp(x[:2]).T, [self.bought[int(k)] for k in x[2]])
 
-        minimum = evolved(cost, ends, settings.leaves_generations, settings.leaves_seed, settings.leaves_points)
+        minimum = evolved(cost, ends, LEAVES_GENERATIONS, LEAVES_SEED, LEAVES_POINTS)
         return np.asarray(minimum.x)
 
     def cost(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
@@ -378,13 +423,13 @@ class _Search:
         """
         sizes = self.with_width(spans, bought)
         worst = self.broken(sizes, bought)
-        frequency = np.minimum(first_interfering(mechanisms(self.task.flat, sizes, bought)), settings.highest_mode)
-        return np.where(worst > 0, settings.worst_cost + worst, -np.log(frequency))
+        frequency = np.minimum(first_interfering(mechanisms(self.task.flat, sizes, bought)), HIGHEST_MODE)
+        return np.where(worst > 0, WORST_COST + worst, -np.log(frequency))
 
     def with_width(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
         """Return lengths, widths and spacings [m], (count, 3), of leaves of the required stiffness."""
         sizes = np.insert(spans, 1, self.high[1], axis=1)
-        for _ in range(settings.width_steps):
+        for _ in range(WIDTH_STEPS):
             built = mechanisms(self.task.flat, sizes, bought)
             sizes[:, 1] *= 1 + (self.stiffness - loaded_drive_stiffness(built)) / drive_stiffness(built)
         return sizes
@@ -397,7 +442,7 @@ class _Search:
         scores = evaluate_geometries(self.task, self.needs, sizes, bought)
         space = np.stack([self.low[1] / sizes[:, 1], sizes[:, 1] / self.high[1]], axis=1)
         worst = np.log(np.concatenate([scores.excess, space], axis=1)).max(axis=1)
-        return np.where(np.isfinite(worst), worst, settings.worst_cost)
+        return np.where(np.isfinite(worst), worst, WORST_COST)
 
     def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
         """Return leaf springs in whole sizes next to `best`, (3,), with the stiffness required.
@@ -406,20 +451,14 @@ class _Search:
         with control has the highest frequency.
         """
         sheet = self.bought[int(best[2])]
-        near = [
-            np.round(np.exp(size) / settings.size_step + side) * settings.size_step
-            for side in (-1, 0, 1)
-            for size in best[:2]
-        ]
+        near = [np.round(np.exp(size) / SIZE_STEP + side) * SIZE_STEP for side in (-1, 0, 1) for size in best[:2]]
         spans = np.array([*product(near[::2], near[1::2])])
         bought = [sheet] * len(spans)
         sizes = self.with_width(spans, bought)
-        sizes[:, 1] = np.round(sizes[:, 1] / settings.size_step) * settings.size_step
+        sizes[:, 1] = np.round(sizes[:, 1] / SIZE_STEP) * SIZE_STEP
         built = mechanisms(self.task.flat, sizes, bought)
-        inside = np.all(
-            (sizes > self.low - settings.size_step / 2) & (sizes < self.high + settings.size_step / 2), axis=1
-        )
-        right = np.abs(loaded_drive_stiffness(built) / self.stiffness - 1) < settings.stiffness_error
-        fits = inside & right & (self.broken(sizes, bought) <= np.log(1 + settings.size_step))
+        inside = np.all((sizes > self.low - SIZE_STEP / 2) & (sizes < self.high + SIZE_STEP / 2), axis=1)
+        right = np.abs(loaded_drive_stiffness(built) / self.stiffness - 1) < STIFFNESS_ERROR
+        fits = inside & right & (self.broken(sizes, bought) <= np.log(1 + SIZE_STEP))
         order = np.argsort(-np.asarray(first_interfering(built)))
         return [Geometry.of(sizes[k], sheet) for k in order if fits[k]]

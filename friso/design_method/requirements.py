@@ -100,6 +100,10 @@ def safety_factor(key: str, value: float) -> RelaxableKey:
 BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first interfering frequency"
 
 
+MODEL_RESERVE = 1.015
+"""Reserve for the error of closed forms (docs/evidence/flexure.md), so that the beam model confirms the result."""
+
+
 def requirements(task: LeafTask) -> list[Requirement]:
     """Return all requirements except those on space and sheets."""
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
@@ -109,9 +113,7 @@ def requirements(task: LeafTask) -> list[Requirement]:
     def fatigue(mechanism: Mechanism) -> Any:
         strength = np.where(np.isnan(mechanism.fatigue), np.inf, mechanism.fatigue)
         swing = mechanism.stress_concentration * closed_forms.max_stress(mechanism, stroke) / strength
-        return (
-            settings.model_reserve * safety.fatigue * (swing + load_stress(mechanism, task) / mechanism.yield_strength)
-        )
+        return MODEL_RESERVE * safety.fatigue * (swing + load_stress(mechanism, task) / mechanism.yield_strength)
 
     return [
         Requirement(
@@ -126,16 +128,14 @@ def requirements(task: LeafTask) -> list[Requirement]:
             "yield strength under stroke and load",
             (safety_factor("safety.strength", safety.strength),),
             lambda mechanism: (
-                settings.model_reserve * safety.strength * static_stress(mechanism, task) / mechanism.yield_strength
+                MODEL_RESERVE * safety.strength * static_stress(mechanism, task) / mechanism.yield_strength
             ),
         ),
         Requirement(
             "buckling under load",
             (safety_factor("safety.buckling", safety.buckling), *_lighter(task)),
             lambda mechanism: (
-                settings.model_reserve
-                * safety.buckling
-                * buckling_share(mechanism, task, closed_forms.buckling_load(mechanism))
+                MODEL_RESERVE * safety.buckling * buckling_share(mechanism, task, closed_forms.buckling_load(mechanism))
             ),
         ),
         Requirement(
@@ -285,6 +285,10 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
     return excess
 
 
+RELAXED_BEYOND = 3.0
+"""Factor by which space and sheets may exceed the specification in a proposal."""
+
+
 @dataclass(frozen=True)
 class _Trials:
     """Leaf springs in more space than allowed, given by variables of a search.
@@ -311,9 +315,7 @@ class _Trials:
     def bounds(self) -> list[tuple[float, float]]:
         """Return the bounds of each variable, somewhat beyond the space allowed."""
         low, high = box(self.task.spec)
-        ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(
-            settings.relaxed_beyond
-        ) * np.array([-1, 1])
+        ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(RELAXED_BEYOND) * np.array([-1, 1])
         return [*map(tuple, ends), (0, len(self.kinds) - 1e-9)]
 
     def built(self, x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
@@ -341,26 +343,42 @@ def evolved(
     return differential_evolution(objective, apart, maxiter=generations, popsize=population, rng=seed, **several)
 
 
+RELAXED_RESERVE = 0.01
+"""Reserve of other requirements in a relaxation, because sizes are made in whole steps."""
+
+UNMET_PENALTY = 10.0
+"""Penalty of unmet requirements, the logarithm of a factor beyond all relaxation."""
+
+RELAXED_SEED = 5
+"""Seed of the search for relaxations. A fixed one gives equal proposals for equal specifications."""
+
+RELAXED_POPULATION = 16
+"""Population of the search for relaxations. A smaller one misses a requirement that alone stands in the way."""
+
+RELAXED_MORE = 1.03
+"""Factor on a relaxed requirement, because sizes are made in whole steps."""
+
+
 def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
     """Yield the least changes of keys that relax requirement `k` so that all others can be met."""
     of_sheets = np.array([requirement.keys[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))
-    spare = np.where(of_sheets, 0.0, settings.relaxed_reserve)  # sizes of sheets are met exactly
+    spare = np.where(of_sheets, 0.0, RELAXED_RESERVE)  # sizes of sheets are met exactly
 
     def objective(x: np.ndarray) -> np.ndarray:
         many = mechanisms(task.flat, *trials.built(x))
         excess = np.log([np.broadcast_to(requirement.excess(many), x.shape[1]) for requirement in needs])
         others = np.delete(excess + spare[:, None], k, axis=0).max(axis=0)
-        return np.where(others <= 1e-9, excess[k], settings.unmet_penalty + others)
+        return np.where(others <= 1e-9, excess[k], UNMET_PENALTY + others)
 
-    search = settings.relaxed_generations, settings.relaxed_seed, settings.relaxed_population
+    search = settings.relaxed_generations, RELAXED_SEED, RELAXED_POPULATION
     with np.errstate(divide="ignore"):  # a requirement of nothing divides by 0
         minimum = evolved(objective, trials.bounds, *search)
-    if minimum.fun >= settings.unmet_penalty:
+    if minimum.fun >= UNMET_PENALTY:
         return
     (sizes,), (sheet,) = trials.built(minimum.x[:, None])
     for relaxable in needs[k].keys:
-        needed = relaxable.needed(settings.relaxed_more * float(np.exp(max(minimum.fun, 0.0))))
+        needed = relaxable.needed(RELAXED_MORE * float(np.exp(max(minimum.fun, 0.0))))
         if needed is not None and not np.isclose(needed, relaxable.value, rtol=1e-6):
             yield Relaxation(
                 needs[k].name, relaxable.key, relaxable.value, needed, relaxable.unit, Geometry.of(sizes, sheet)
@@ -379,6 +397,10 @@ class Candidate:
     frequency: float
 
 
+FRONT_SEED = 34
+"""Seed of the front. A fixed one gives equal fronts for equal specifications."""
+
+
 def front(task: LeafTask) -> list[Candidate]:
     """Return the Pareto front by rising stiffness (NSGA-II, doi:10.1109/4235.996017).
 
@@ -395,9 +417,7 @@ def front(task: LeafTask) -> list[Candidate]:
     if start is None:
         return []
     low, high = _ends(task)
-    first = low + (high - low) * np.random.default_rng(settings.front_seed).random(
-        (settings.front_population, len(low))
-    )
+    first = low + (high - low) * np.random.default_rng(FRONT_SEED).random((settings.front_population, len(low)))
     first[: len(first) // 4] = start  # from there the search reaches others, however little room there is
     variation = {"sampling": first, "crossover": SBX(prob=0.9, eta=10), "mutation": PM(eta=10)}
     algorithm = NSGA2(pop_size=settings.front_population, **variation)
@@ -406,7 +426,7 @@ def front(task: LeafTask) -> list[Candidate]:
             _problem(task, needs),
             algorithm,
             ("n_gen", settings.front_generations),
-            seed=settings.front_seed,
+            seed=FRONT_SEED,
             verbose=False,
         )
     if result.X is None or result.F is None:
@@ -448,6 +468,10 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
     return Leaves(n_var=len(low), n_obj=2, n_ieq_constr=len(needs), xl=low, xu=high)
 
 
+START_GENERATIONS = 60
+"""Generations in which a geometry that meets all requirements is found, if there is one."""
+
+
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     """Return the leaf springs that meet the requirements with the largest reserve, or None.
 
@@ -462,7 +486,7 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
 
     low, high = _ends(task)
     bounds = zip(low, high, strict=True)
-    minimum = evolved(objective, bounds, settings.start_generations, settings.front_seed)
+    minimum = evolved(objective, bounds, START_GENERATIONS, FRONT_SEED)
     return minimum.x if minimum.fun <= 0 else None
 
 
@@ -567,6 +591,10 @@ def bears(task: LeafTask, by_beams: Evaluation) -> bool:
     return bool(lasts and safety.buckling * buckling_share(by_beams.mechanism, task, by_beams.buckling) <= 1)
 
 
+SIZE_STEP = 1e-4  # [m]
+"""Step of sizes that a workshop makes."""
+
+
 def _in_order(
     task: LeafTask, needs: list[Requirement], candidates: Sequence[Candidate]
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
@@ -577,9 +605,7 @@ def _in_order(
     """
     enough = task.spec.safety.parasitic * task.crossover
     near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]
-    sizes = list(
-        {geometry: None for start in near for geometry in round_geometries(task.spec, start, settings.size_step)}
-    )
+    sizes = list({geometry: None for start in near for geometry in round_geometries(task.spec, start, SIZE_STEP)})
     if not sizes:
         return
     judgement = evaluate_geometries(task, needs, sizes_of(sizes), [geometry.sheet for geometry in sizes])

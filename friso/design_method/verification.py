@@ -25,15 +25,22 @@ from scipy.stats import qmc
 from friso.design_method.settings import settings
 from friso.design_method.spec import Spec
 from friso.engine.arrays import ArrayColumns
-from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.batch import FIRST_TURNING_POINTS, RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.engine.settings import room_settings
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
-from friso.frequency.bode import COMFORTABLE_MARGIN, Range, ranges_below, searched_crossovers, settled_members, shared
+from friso.frequency.bode import (
+    COMFORTABLE_MARGIN,
+    SEARCH_DENSITY,
+    Range,
+    ranges_below,
+    searched_crossovers,
+    settled_members,
+    shared,
+)
 from friso.frequency.margins import (
     Tuning,
     controller_response,
@@ -110,6 +117,10 @@ def _falls(population: Population, flat: Mapping[str, Any]) -> None:
         raise InputError("friction.static", text, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
 
 
+POPULATION_SEED = 6
+"""Seed of the machines. A fixed one draws equal machines for equal specifications."""
+
+
 def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
     """Draw machines and moves at random (Sobol) from the ranges of the specification.
 
@@ -118,7 +129,7 @@ def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: 
     """
     ranges = _friction(spec, flat) | _masses(spec)
     names = [*ranges, "stiffness", "travel", "acceleration"]
-    sequence = qmc.Sobol(len(names), rng=settings.population_seed).random_base2(int(np.ceil(np.log2(count))))[:count]
+    sequence = qmc.Sobol(len(names), rng=POPULATION_SEED).random_base2(int(np.ceil(np.log2(count))))[:count]
     shares = dict(zip(names, sequence.T, strict=True))
     population = _population(ranges, {name: shares[name] for name in ranges}, flat, count)
     moves = _moves(spec, shares["travel"], shares["acceleration"])
@@ -134,6 +145,10 @@ def typical_move(spec: Spec) -> dict[str, Any]:
     return {"motion.kind": "there_and_back", **{key: float(value) for key, value in keys.items()}}
 
 
+RETURN_AFTER = 5.0  # [s]
+"""Time of the return, as in the thesis's path."""
+
+
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
     """Return keys of moves there and back, at fractions from 0 to 1 of the ranges specified.
 
@@ -144,7 +159,7 @@ def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str
         for interval, share in ((spec.moves.travel, travel), (spec.moves.acceleration, acceleration))
     )
     time = np.sqrt(distance / rate)
-    back = np.maximum(settings.return_after, 2 * time + settings.return_after / 2)
+    back = np.maximum(RETURN_AFTER, 2 * time + RETURN_AFTER / 2)
     return {"motion.acceleration": rate, "motion.acceleration_time": time, "motion.return_at": back}
 
 
@@ -260,6 +275,10 @@ def edges_over(
     return Corners(population, edges, (low, high), int(unsure.any(axis=0).sum()))
 
 
+ORBIT_RTOL = 1e-7
+"""Tolerance of orbits. Multipliers are needed to a percent."""
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tell which corners hunt or may hunt at certain crossovers, and whether that is certain.
@@ -267,7 +286,7 @@ def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarra
     `which` are indices of corners, and `crossover` the logarithm of a crossover for each.
     """
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
-    attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)
+    attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), ORBIT_RTOL)
     return attracted.attracts | ~attracted.decided, attracted.certain
 
 
@@ -355,7 +374,7 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
     """Return angular frequencies that show the loop at all crossovers, and every mode."""
     ends = [
-        frequency_grid(faster(flat, np.array(end / bandwidth(flat))), frequency_settings.search_density)
+        frequency_grid(faster(flat, np.array(end / bandwidth(flat))), SEARCH_DENSITY)
         for end in searched_crossovers(flat)
     ]
     zeta = float(leaves.mechanism.damping_ratio)
@@ -366,6 +385,10 @@ def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming
 
 DAMPING_RATIOS = np.geomspace(0.02, 0.7, 9)
 """Joint dampings that are tried, as damping ratios of the stage on the joint."""
+
+
+ENOUGH_MARGIN = 0.95
+"""Fraction of the best modulus margin beyond which more damping is not worth its trouble."""
 
 
 @dataclass(frozen=True)
@@ -384,7 +407,7 @@ class Damping:
 
         Index 0 is the stage's own damping.
         """
-        return int(np.flatnonzero(self.margins >= settings.enough_margin * self.margins.max())[0])
+        return int(np.flatnonzero(self.margins >= ENOUGH_MARGIN * self.margins.max())[0])
 
 
 @dataclass(frozen=True)
@@ -460,6 +483,17 @@ THERE_AND_BACK = {
 """A motion with placeholder numbers, which each machine replaces."""
 
 
+LAST_SHARE = 0.25
+"""Final part of the run in which a stage must stay in its window, longer than the slowest period of hunting seen.
+"""
+
+FOLLOWED_TIME = 15.0  # [s]
+"""Time for which a move is followed, as in the thesis's path."""
+
+LONGER_FACTOR = 10.0
+"""Factor on that time for machines not in position by then: they creep or hunt."""
+
+
 @dataclass(frozen=True)
 class MachineOutcomes(ArrayColumns):
     """Outcomes of machines after their moves, as arrays of shape (count,).
@@ -515,8 +549,8 @@ class MachineOutcomes(ArrayColumns):
 
     def followed(self, number: int) -> float:
         """Return for how long [s] the machine with this number was simulated after its move."""
-        soon = self.settling[number] <= (1 - settings.last_share) * settings.followed_time
-        return settings.followed_time if soon else settings.longer_factor * settings.followed_time
+        soon = self.settling[number] <= (1 - LAST_SHARE) * FOLLOWED_TIME
+        return FOLLOWED_TIME if soon else LONGER_FACTOR * FOLLOWED_TIME
 
     @property
     def worst(self) -> int:
@@ -547,6 +581,11 @@ class Verification:
         return self.free.take(slice(len(self.locked.words)))
 
 
+COMPARED_MOVES = 1000
+"""Number of these moves that are also made with the joint locked, which shows a fraction to three percent of all.
+Where the joint is needed many of them swing, and are followed ten times as long."""
+
+
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
     """Try the design in machines and moves drawn from the specification; the first ones with a locked joint, too.
 
@@ -562,7 +601,7 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Progress)
         return move_machines(keys, count, window, progress, f"moves, {name}")
 
     free = moved(machines.count, "joint free", False)
-    locked = moved(min(settings.compared_moves, machines.count), "joint locked", True)
+    locked = moved(min(COMPARED_MOVES, machines.count), "joint locked", True)
     return Verification(machines, free, locked, _worst_stage(stage, machines.of(free.worst), free.followed(free.worst)))
 
 
@@ -579,7 +618,7 @@ def move_machines(
     If `patient`, stages stand at the far end as long as at the near one, so that both ends decide, and machines that
     are not in position are simulated again for longer. `window` is the position window [m].
     """
-    first = _followed_moves(flat, count, window, settings.followed_time, progress, label, patient)
+    first = _followed_moves(flat, count, window, FOLLOWED_TIME, progress, label, patient)
     again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
@@ -587,7 +626,7 @@ def move_machines(
             keys,
             again.size,
             window,
-            settings.longer_factor * settings.followed_time,
+            LONGER_FACTOR * FOLLOWED_TIME,
             progress,
             f"{label}, those not at rest for longer",
         )
@@ -595,6 +634,13 @@ def move_machines(
         for name in ("words", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
     return first
+
+
+VERIFIED_RTOL = 1e-5
+"""Tolerance of the moves, which gives settling times to a few percent."""
+
+RUNS_PER_REPORT = 512
+"""Runs between progress reports, about a second."""
 
 
 def _followed_moves(
@@ -616,20 +662,20 @@ def _followed_moves(
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
     options = RunOptions(
-        rtol=settings.verified_rtol,
+        rtol=VERIFIED_RTOL,
         bands=(window, 10 * window),
-        window=1 - settings.last_share,
+        window=1 - LAST_SHARE,
         record_from=np.inf,
         least_swing=window / 4,
-        room=round(room_settings.first_turning_points * time / settings.followed_time),
-        chunk=settings.runs_per_report,
+        room=round(FIRST_TURNING_POINTS * time / FOLLOWED_TIME),
+        chunk=RUNS_PER_REPORT,
     )
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
     for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
         numbers = runs.numbers
         end = run_ends(runs, turns_of(runs, corner[numbers]), "inner")
-        words = outcomes(end, window, hold=settings.last_share * end.ended)
+        words = outcomes(end, window, hold=LAST_SHARE * end.ended)
         settling = np.maximum(end.outside - corner[numbers], 0.0)
         if both_ends:
             settling = settling_of_runs(runs.part(keys), runs, "inner")
@@ -671,6 +717,10 @@ class HuntingMap:
     share: np.ndarray
 
 
+MAP_REACH = ((1 / 30, 2.0), (1 / 30, 3.0))
+"""Range of the map relative to the design. It shows both edges of hunting of the thesis's rig."""
+
+
 def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
     """Compute the map of corners not in position, over crossover and stroke, around a design.
 
@@ -681,7 +731,7 @@ def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
         np.geomspace(low * flat[key], high * flat[key], count)
         for key, (low, high), count in zip(
             (CROSSOVER, "joint.stroke"),
-            settings.map_reach,
+            MAP_REACH,
             (settings.map_crossovers, settings.map_strokes),
             strict=True,
         )

@@ -26,7 +26,6 @@ from friso.drives.program import (
     straight,
     with_values,
 )
-from friso.drives.settings import settings
 from friso.engine.printing import Constants
 from friso.equations.as_built import COMMANDED, PLACES, RATED, TIMES, AsBuilt, as_built
 from friso.equations.component import STEADY, Piecewise, Switch, state
@@ -168,6 +167,17 @@ class MachineRun:
     tolerance: float
 
 
+MACHINE_STEPS = (1, 4, 16)
+"""Steps in a sample for which the difference of a machine from friso is told; sixteen take seconds."""
+
+USUAL_STEPS = 4
+"""Steps in a sample of a machine as a plant: with one, the contact of a limiter is a few steps long."""
+
+MACHINE_ROUNDING = 1e-9
+"""Difference between a machine in C and in Python that rounding explains, relative to the largest position. Kinks
+magnify rounding."""
+
+
 def machine_run(
     machine: PlantCode, flat: Mapping[str, Any], outputs: np.ndarray, positions: np.ndarray, held: float
 ) -> MachineRun:
@@ -175,7 +185,7 @@ def machine_run(
 
     The run begins with the output `held`; `flat` has the keys of the stage with its drive.
     """
-    per_newton, ways = flat[str(PER_NEWTON)], settings.machine_steps
+    per_newton, ways = flat[str(PER_NEWTON)], MACHINE_STEPS
     runs: dict[int, list[float]] = {}
     for steps in ways:
         running = Running(machine, float(positions[0]), held / per_newton, steps)
@@ -183,11 +193,11 @@ def machine_run(
         for output in outputs.tolist():
             runs[steps].append(running.position)
             running.sample(output / per_newton)
-    own = runs[settings.usual_steps]
+    own = runs[USUAL_STEPS]
     rows = [(held, float(positions[0])), *zip(outputs.tolist(), own, strict=True)]
     differences = {steps: float(np.abs(np.array(one) - positions).max()) for steps, one in runs.items()}
-    tolerance = settings.machine_rounding * float(np.abs(positions).max())
-    return MachineRun(machine, settings.usual_steps, rows, differences, per_newton, tolerance)
+    tolerance = MACHINE_ROUNDING * float(np.abs(positions).max())
+    return MachineRun(machine, USUAL_STEPS, rows, differences, per_newton, tolerance)
 
 
 class Running:

@@ -14,7 +14,6 @@ from typing import Any
 
 from friso.drives.ask import Ask, moving_mass
 from friso.drives.drive import FORMATS, TOLD, AsStage, AxisParameters, DriveFormat
-from friso.drives.settings import drive_settings
 from friso.errors import InputError, one_line, shortened
 from friso.platform.files import flaw_of
 from friso.quantities import quoted
@@ -102,10 +101,17 @@ _GAIN = re.compile(rf"(?<![\w.])({_NAME_OF_A_GAIN})[\"' ]{{0,3}}[:=>, \t]{{1,9}}
 """Pattern of what looks like a gain and its value."""
 
 
+CHARACTERS_LOOKED_AT = 100_000
+"""Longest part of a file of another kind that is looked at for gains. Parameter files have fewer characters."""
+
+GAINS_SAID = 6
+"""Largest number of what may be gains that is said of a file of another kind. More fill the screen."""
+
+
 def _numbers_of(text: str) -> str:
     """Say which numbers of a text look like gains; "" for none."""
-    numbers = dict(_GAIN.findall(text[: drive_settings.characters_looked_at]))
-    said = ", ".join(f"{one_line(name)} = {value}" for name, value in [*numbers.items()][: drive_settings.gains_said])
+    numbers = dict(_GAIN.findall(text[:CHARACTERS_LOOKED_AT]))
+    said = ", ".join(f"{one_line(name)} = {value}" for name, value in [*numbers.items()][:GAINS_SAID])
     return f", in which {said} may be gains" if said else ""
 
 

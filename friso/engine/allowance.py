@@ -13,12 +13,22 @@ from typing import NoReturn
 
 import numpy as np
 
-from friso.engine.settings import work_settings
 from friso.errors import InputError
 
 
 class Exhausted(Exception):
     """Error: the allowed work does not suffice for the requested runs."""
+
+
+COUNTED_LANES = 8
+"""Runs that count as computed side by side, whatever the processor. A processor with fewer lanes takes longer, but
+stops at equal work."""
+
+FAIR_SHARE_FACTOR = 2.0  # [of an equal part]
+"""Largest part of the remaining work for each of several runs. With less, the longest run stops early."""
+
+BATCH_WORK = 1e5
+"""Work to prepare a batch of runs, which Python does."""
 
 
 @dataclass
@@ -48,7 +58,7 @@ class Allowance:
         left = self.left
         if left <= 0:
             self.exhaust()
-        return left / step * min(1 / work_settings.counted_lanes, work_settings.fair_share_factor / runs)
+        return left / step * min(1 / COUNTED_LANES, FAIR_SHARE_FACTOR / runs)
 
     def exhaust(self) -> NoReturn:
         """Raise Exhausted, because the allowance, or one around it, does not suffice."""
@@ -64,8 +74,8 @@ class Allowance:
 
         A single run counts as much as eight, because eight are computed side by side.
         """
-        longest = work_settings.counted_lanes * float(np.max(steps, initial=0.0))
-        work = work_settings.batch_work + step * max(float(np.sum(steps)), longest)
+        longest = COUNTED_LANES * float(np.max(steps, initial=0.0))
+        work = BATCH_WORK + step * max(float(np.sum(steps)), longest)
         at: Allowance | None = self
         while at is not None:
             at.used += work

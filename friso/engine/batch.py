@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from friso.engine.allowance import checked_rtol, current_allowance
 from friso.engine.arrays import STATISTICS, Batch, BatchOptions, Results, Status, new_queue
 from friso.engine.kernel import Kernel, columns, empty_results, kernel
 from friso.engine.machine_code import LANES
-from friso.engine.settings import room_settings, step_settings
 from friso.engine.side_by_side import cores_to_use, current_flag, go_on, results_of
 from friso.equations import motion
 from friso.equations.motion import moved_on
@@ -31,6 +30,10 @@ from friso.version import VERSION
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+FIRST_TURNING_POINTS = 512
+"""Turning points stored for a run at first; runs with more are repeated with more room."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class RunOptions:
     window: float = 0.75
     record_from: float = 0.0
     least_swing: float | np.ndarray = 0.0
-    room: int = field(default_factory=lambda: room_settings.first_turning_points)
+    room: int = FIRST_TURNING_POINTS
     interval: float | None = None
     budget: int = 2_000_000
     threads: int | None = None
@@ -98,6 +101,14 @@ def run_chunks(
         yield from _run_with_room(kernel, flat, numbers, options.room, options, starts)
 
 
+FIRST_STEP = 1e-3  # [1/natural frequencies]
+"""First step, also after a corner of the reference. A longer one may be rejected many times; a shorter one costs
+some steps."""
+
+LONGEST_STEP_SHARE = 1 / 200  # [of the duration]
+"""Longest step. A longer one could pass over an event."""
+
+
 def prepare(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, options: RunOptions, starts: np.ndarray | None = None
 ) -> Batch:
@@ -115,8 +126,8 @@ def prepare(
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
     starts = kernel.with_modes(starts, segments[:, 0, 1:].T, values)
     modes = np.ascontiguousarray(kernel.modes(starts.T, 0.0, segments[:, 0, 1:].T, values).T)
-    first_steps = np.ascontiguousarray(step_settings.first_step / rates)
-    longest = np.broadcast_to(step_settings.longest_step_share * segments[:, -1, 0], (runs,)).copy()
+    first_steps = np.ascontiguousarray(FIRST_STEP / rates)
+    longest = np.broadcast_to(LONGEST_STEP_SHARE * segments[:, -1, 0], (runs,)).copy()
     clocks = columns(kernel.module.clock(values), runs) if kernel.layout.clocked else np.zeros((1, 2))
     least = np.full(runs, options.least_swing, dtype=float)
     tolerances = options.rtol * scales
@@ -157,6 +168,10 @@ def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.nda
     return segments, windows.astype(np.int64)
 
 
+MOST_TURNING_POINTS = 1 << 20
+"""Most turning points of a run, limited by memory."""
+
+
 def _run_with_room(
     kernel: Kernel,
     flat: Mapping[str, Any],
@@ -180,7 +195,7 @@ def _run_with_room(
     results = empty_results(len(numbers), room, samples, kernel.sample_size)
     _run_within_allowance(kernel, batch, options, results)
     crowded = results.turn_counts > room
-    if room >= room_settings.most_turning_points:
+    if room >= MOST_TURNING_POINTS:
         results.statuses[crowded] = Status.FULL
         results.turn_counts[crowded] = room
         crowded[:] = False
@@ -190,9 +205,14 @@ def _run_with_room(
     if not crowded.all():
         yield Runs(numbers[~crowded], Results(*(array[~crowded] for array in results)))
     del results, batch
-    repeated, fewer = numbers[crowded], max(1, options.chunk * room_settings.first_turning_points // (4 * room))
+    repeated, fewer = numbers[crowded], max(1, options.chunk * FIRST_TURNING_POINTS // (4 * room))
     for first in range(0, len(repeated), fewer):
         yield from _run_with_room(kernel, flat, repeated[first : first + fewer], 4 * room, options, starts)
+
+
+REPEATED_BUDGET_FACTOR = 2
+"""Factor on the step budget of a run that is repeated because it used up its budget. With a smaller one, runs are
+repeated too often."""
 
 
 def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, results: Results) -> None:
@@ -208,7 +228,7 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
     which, part, steps = np.arange(len(batch.starts)), results, 0
     while which.size:
         before, steps = steps, int(min(options.budget, allowance.most_steps(len(which), kernel.work)))
-        if steps < room_settings.repeated_budget_factor * before:
+        if steps < REPEATED_BUDGET_FACTOR * before:
             allowance.exhaust()
         run_batch(kernel, _batch_of(batch, which), options_of(replace(options, budget=steps)), part, options.threads)
         allowance.charge(part.statistics[:, STATISTICS.index("attempted")], kernel.work)
@@ -319,6 +339,16 @@ class DrivenRuns:
     statuses: np.ndarray
 
 
+DRIVEN_STEPS_PER_SAMPLE = 200
+"""Steps that a run along a log may take per sample on average. A run that needs more chatters."""
+
+DRIVEN_SAMPLES = 4e6  # [samples]
+"""Samples of all runs along logs that are computed at once, limited by memory."""
+
+DRIVEN_RUNS = (16, 256)
+"""Fewest and most runs along logs that are computed at once."""
+
+
 def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[DrivenRuns]:
@@ -333,11 +363,11 @@ def run_driven(
         bands=(0.0, 0.0),
         record_from=np.inf,
         least_swing=np.inf,
-        budget=room_settings.driven_steps_per_sample * count,
+        budget=DRIVEN_STEPS_PER_SAMPLE * count,
     )
     size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
     settings = options_of(replace(options, interval=inputs.sample_time))
-    at_once = int(np.clip(room_settings.driven_samples / count, *room_settings.driven_runs))
+    at_once = int(np.clip(DRIVEN_SAMPLES / count, *DRIVEN_RUNS))
     for first in range(0, runs, at_once):
         numbers = np.arange(first, min(first + at_once, runs))
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
@@ -394,9 +424,17 @@ def simulate(stage: Stage, rtol: float = SIMULATION_RTOL, sample_time: float | N
     return _dataset(stage, shape, flat, runs, time, rtol)
 
 
+SAMPLES_BY_DEFAULT = 20_000
+"""Sampling intervals of a run for which no sample time is given: enough to see each peak of a swing."""
+
+
 def usual_interval(duration: float) -> float:
     """Return the interval between samples [s] of a run of a duration [s] for which none is given."""
-    return duration / room_settings.samples_by_default
+    return duration / SAMPLES_BY_DEFAULT
+
+
+MOST_SAMPLES = 20_000_000
+"""Most sampling intervals of a run, whose states and outputs take a few gigabytes."""
 
 
 def checked_interval(interval: float, duration: float) -> float:
@@ -404,7 +442,7 @@ def checked_interval(interval: float, duration: float) -> float:
 
     Raises InputError if the run would have too many samples, or none.
     """
-    least = duration / room_settings.most_samples
+    least = duration / MOST_SAMPLES
     if not least <= interval <= duration:
         text, expected = f"{interval:g} s", f"from {least:g} s to the duration, {duration:g} s"
         raise InputError("sample_time", text, expected, "1 ms")

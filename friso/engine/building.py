@@ -16,8 +16,7 @@ from pathlib import Path
 from threading import Lock, Semaphore, Thread
 
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, leave_cache, logger, prune
-from friso.engine.settings import build_settings
-from friso.engine.side_by_side import ASKER, go_on
+from friso.engine.side_by_side import ASKER, WAITING_INTERVAL, go_on
 from friso.platform.helper_process import HelperProcess
 from friso.platform.system import usable_cores
 from friso.progress import WORK_CLOCK
@@ -96,7 +95,7 @@ def _wait(jobs: list[_Job]) -> None:
     waiting = {job.met for job in jobs}
     while waiting:
         go_on()
-        done, waiting = wait(waiting, build_settings.waiting_interval, FIRST_EXCEPTION)
+        done, waiting = wait(waiting, WAITING_INTERVAL, FIRST_EXCEPTION)
         for job in jobs:
             job.announce()
         for met in done:

@@ -324,6 +324,10 @@ def _module(name: str, source: str, compiled: CodeType) -> ModuleType:
     return module
 
 
+KEPT_TIME = 60 * 86_400.0  # [s]
+"""Time after which unused code is deleted."""
+
+
 def prune(folder: Path) -> None:
     """Delete compiled code that has not been used for long, and leftovers of killed processes.
 
@@ -336,11 +340,7 @@ def prune(folder: Path) -> None:
                 size += length
                 age = now - used
                 unfinished = file.suffix == PARTIAL and age > SECONDS_OF_A_DAY
-                if (
-                    unfinished
-                    or age > build_settings.kept_time
-                    or (age > SECONDS_OF_A_DAY and size > build_settings.kept_size)
-                ):
+                if unfinished or age > KEPT_TIME or (age > SECONDS_OF_A_DAY and size > build_settings.kept_size):
                     _delete(file)
     except (Timeout, OSError) as error:  # another process is pruning, too
         logger.debug("old kernels are left: %s", error)

@@ -131,6 +131,10 @@ def cores_to_use() -> int:
     return beside.cores if beside else usable_cores()
 
 
+WAITING_INTERVAL = 0.1  # [s]
+"""Time between checks whether a result is still needed: shorter than a person notices."""
+
+
 def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
     """Wait for jobs and return their results in order; an error is raised at once.
 
@@ -138,7 +142,7 @@ def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
     interrupts no wait on Windows.
     """
     while any(not job.done() for job in jobs):
-        for job in wait(jobs, build_settings.waiting_interval, FIRST_EXCEPTION).done:
+        for job in wait(jobs, WAITING_INTERVAL, FIRST_EXCEPTION).done:
             job.result()
         go_on()
     return [job.result() for job in jobs]

@@ -14,7 +14,6 @@ import sympy as sp
 
 from friso.engine.machine_code import AXES, ROW, SCALARS, Layout
 from friso.engine.printing import Constants, Rename, eliminate, print_scalar, reciprocals
-from friso.engine.settings import step_settings
 from friso.engine.tableaus import Tableau
 from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
@@ -60,6 +59,31 @@ class Block:
 
         lines = [f"{inner[symbol]} = {print_scalar(expr, named)}" for symbol, expr in self._shared]
         return lines + [f"{name}{suffix} = {print_scalar(e, named)}" for name, e in self._named.items()]
+
+
+KINK_HYSTERESIS = 3e-3  # [of the tolerance]
+"""Distance beyond a kink at which it counts as crossed. A run that has crossed a kink is then clear of it, and
+rounding noise crosses nothing."""
+
+SURFACE_ROUNDING = 2e-15  # [of the terms of a surface]
+"""Least hysteresis: nine units in the last place of the terms. With less, rounding noise crosses kinks."""
+
+STEP_AFTER_KINK = 0.25  # [of the proposed step]
+"""Step after a kink, behind which the motion may be much faster."""
+
+NARROW_PEAK_WIDTHS = 3.0  # [widths of the narrow peak about a kink]
+"""Distance of a step's start from a kink from which it may pass over the peak, because all of its stages may lie
+beyond. Such a step is repeated up to the kink if it crosses the kink and ends beyond the peak, or on this side
+again."""
+
+STEP_SAFETY = 0.77
+"""Factor on the step that the error estimate would allow. Larger values reject more steps than they save."""
+
+DIVERGED_DEVIATION = 1e6  # [length scales of the motion]
+"""Deviation at which a run ends as diverged. A smaller one would end runs that come back."""
+
+LEAST_TURNING_RATE = 1e-6  # [of the velocity's tolerance]
+"""Rate below which a deviation turns only by rounding."""
 
 
 class StepWriter:
@@ -365,7 +389,7 @@ class StepWriter:
         The code sets `fraction` to the fraction of the step at which it lies, or 1 if there is none. It sets `astray`
         to true if a run is on the other side of a kink than its mode says.
         """
-        clear, rounding = step_settings.kink_hysteresis, step_settings.surface_rounding
+        clear, rounding = KINK_HYSTERESIS, SURFACE_ROUNDING
         lines = []
         for point, theta in enumerate(THIRDS_OF_A_STEP):
             states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
@@ -428,7 +452,7 @@ class StepWriter:
             "proposed = h * factor",
             "proposed = min(proposed, 0.5 * h) if astray else proposed",
             "proposed = min(proposed, fraction * h) if passed_over else proposed",
-            f"proposed = {step_settings.step_after_kink!r} * proposed if good & cut else proposed",
+            f"proposed = {STEP_AFTER_KINK!r} * proposed if good & cut else proposed",
             "trial = max(proposed, trial) if good & (factor >= 1.0) else proposed",
         ]
 
@@ -440,7 +464,7 @@ class StepWriter:
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
-                far = f"(guess{k} <= earliest) & (near{k} > {step_settings.narrow_peak_widths!r} * narrow{k}__s)"
+                far = f"(guess{k} <= earliest) & (near{k} > {NARROW_PEAK_WIDTHS!r} * narrow{k}__s)"
                 within = f"(last{k} >= -narrow{k}__s) & (last{k} <= 0.0)"
                 lines.append(f"passed_over = passed_over | ({far} & (not ({within})))")
         return lines
@@ -466,11 +490,11 @@ class StepWriter:
         """
         lines = ["root8 = sqrt(sqrt(sqrt(square + 1e-20)))"]
         if self.tableau.order == 4:
-            return [*lines, f"factor = {step_settings.step_safety!r} / root8"]
+            return [*lines, f"factor = {STEP_SAFETY!r} / root8"]
         return [
             *lines,
             "root16 = sqrt(root8)",
-            f"factor = {step_settings.step_safety!r} / (root16 * sqrt(root16))",
+            f"factor = {STEP_SAFETY!r} / (root16 * sqrt(root16))",
         ]
 
     def _statistics(self) -> list[str]:
@@ -485,7 +509,7 @@ class StepWriter:
             f"happened = good & ({'' if self.model.clock else '(now >= next_sample) | '}(t_n >= stop))",
             f"within = {'False' if self.model.clock else INSIDE}",
             "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
-            f"diverged = abs(deviation_n) * rtol > {step_settings.diverged_deviation!r} * tol{self._position}",
+            f"diverged = abs(deviation_n) * rtol > {DIVERGED_DEVIATION!r} * tol{self._position}",
             "event = 2.0 if within else (1.0 if happened | failed else 0.0)",
             "event = 3.0 if diverged else event",
             "fraction = fraction if good else 0.0",
@@ -510,7 +534,7 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
-            f"least = {step_settings.least_turning_rate!r} * tol{self._velocity}",
+            f"least = {LEAST_TURNING_RATE!r} * tol{self._velocity}",
             "swing = max(abs(turning_s), abs(turning_n)) > least",
             # other turning points change no result
             "turned = turned & swing & ((now >= record_from) | (off <= outer))",

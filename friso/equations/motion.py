@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.equations.motions.settings import settings
 from friso.stage.rig import DURATION, QUADRATIC, ReferenceForm, Stand, Tone, motion_of
 
 if TYPE_CHECKING:
@@ -165,13 +164,18 @@ def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], du
     return np.array([np.concatenate([part, np.repeat(part[-1:], most - len(part), axis=0)]) for part in parts])
 
 
+SAMPLES_PER_PERIOD = 32.0
+"""Samples in a period of the fastest sinusoid, among which reversals are sought. With fewer, two reversals close
+together are missed, and between them feedforward by direction has the wrong sign. More take longer."""
+
+
 def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     """Return the pieces of one run's reference with sinusoids, cut also where it reverses.
 
     `rows`, shape (pieces, 1 + inputs), are pieces up to the time `end` [s], whose sinusoids have their phases at time
     0. The result has as many columns.
     """
-    starts, first, per_period = rows[:, 0], form.degree + 3, settings.samples_per_period
+    starts, first, per_period = rows[:, 0], form.degree + 3, SAMPLES_PER_PERIOD
     tones = rows[0, first:].reshape(-1, 4)
     fastest = np.max(np.maximum(np.abs(tones[:, 2]), np.abs(tones[:, 2] + tones[:, 3] * end)))
     bare = rows.copy()

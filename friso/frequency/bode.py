@@ -152,9 +152,13 @@ def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, 
     return tuple(pair for pair in pairs if pair[0] < pair[1])
 
 
+END_PRECISION = 4e-6
+"""Relative accuracy of the ends of ranges, beyond the digits that are shown."""
+
+
 def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
     """Return the zero of the function `excess` between two arguments, from its values there."""
-    precise = settings.end_precision * np.log(at[-1] / at[0])
+    precise = END_PRECISION * np.log(at[-1] / at[0])
     while np.log(at[-1] / at[0]) > precise:
         with np.errstate(invalid="ignore"):
             zero = np.nan_to_num(values[0] / (values[0] - values[-1]), nan=0.5)
@@ -199,6 +203,10 @@ class Limits:
         return self.highest_stable == self.searched[1]
 
 
+CROSSOVER_NUDGE = 1e-5
+"""Relative distance from the end of a range at which a crossover is certainly beyond it."""
+
+
 def limits(flat: Mapping[str, Any]) -> Limits:
     """Find the crossovers at which a stage is stable, and those with a comfortable margin.
 
@@ -210,7 +218,7 @@ def limits(flat: Mapping[str, Any]) -> Limits:
     close = ranges_below(search.at, lambda f: COMFORTABLE_MARGIN - search.distance(f).min(axis=1))
     comfortable = shared(close, stable)
     highest, calm = (range_end(ranges, crossover) for ranges in (stable, comfortable))
-    above, beyond = (np.array([end * (1 + settings.crossover_nudge) if end else crossover]) for end in (highest, calm))
+    above, beyond = (np.array([end * (1 + CROSSOVER_NUDGE) if end else crossover]) for end in (highest, calm))
     return Limits(
         ends,
         stable,
@@ -239,6 +247,13 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
     return below[-1] if below else None
 
 
+LOWEST_CROSSOVER = 0.1  # [Hz]
+"""Lowest crossover of the search. Slower loops settle after the moves of any stage."""
+
+HIGHEST_CROSSOVER = 1e4  # [Hz]
+"""Highest crossover of the search, beyond the sampling of any drive."""
+
+
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
     """Return the range of crossovers [Hz] that is searched.
 
@@ -248,7 +263,7 @@ def searched_crossovers(flat: Mapping[str, Any]) -> Range:
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
         return 1 / 100.0, 1000.0
-    return settings.lowest_crossover, min(settings.highest_crossover, 0.999 * drive.highest / (2 * np.pi))
+    return LOWEST_CROSSOVER, min(HIGHEST_CROSSOVER, 0.999 * drive.highest / (2 * np.pi))
 
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
@@ -290,6 +305,10 @@ def _stated(flat: Mapping[str, Any]) -> float:
 
 def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
     return faster(flat, crossover / _stated(flat))
+
+
+SEARCH_DENSITY = 60  # [1/decade]
+"""Frequencies per decade of the search. Fewer miss the peak of a resonance."""
 
 
 @dataclass(frozen=True)
@@ -334,7 +353,7 @@ class _Search:
         The function takes the keys of a stage with any controller, and returns its loops at the frequencies. The
         frequencies do not depend on the crossover, so that the distance from -1 is a smooth function of it.
         """
-        grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
+        grids = [frequency_grid(_at(self.flat, np.array(end)), SEARCH_DENSITY) for end in self.ends]
         omega = np.unique(np.concatenate(grids))
         return omega, bare_loops(self.flat, self.members, omega)
 
@@ -427,13 +446,18 @@ def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -
     )
 
 
+UNSEEN_POLE = 1e-7
+"""Largest pole, relative to the fastest, that counts as 0. It belongs to the position or its integral, which the
+velocity loop does not affect."""
+
+
 def _seen(rates: Complex) -> np.ndarray:
     """Return which poles of a velocity loop its feedback can move, shape (n,).
 
     `rates` are the poles [rad/s], shape (1, n).
     """
     sizes = np.abs(rates[0])
-    return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)
+    return sizes > UNSEEN_POLE * sizes[np.isfinite(sizes)].max(initial=0.0)
 
 
 def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
@@ -585,6 +609,10 @@ class Bode:
         return min(states, key=lambda state: state[1].modulus_margin)
 
 
+CURVE_POINTS = 1200
+"""Points of a curve. Fewer show corners on a screen; more make the page larger."""
+
+
 def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     """Return the linear analysis of a stage.
 
@@ -602,7 +630,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
         closed_loop_poles(keys, Members.joined(limit_cases(keys).values()))
     together = Members.joined(limit_cases(flat).values())
     resonant = [closed_loop_poles(flat, together), plant_poles(flat, together)]
-    omega = with_resonances(np.geomspace(low, high, settings.curve_points) * 2 * np.pi, resonant)
+    omega = with_resonances(np.geomspace(low, high, CURVE_POINTS) * 2 * np.pi, resonant)
     return Bode(
         stage=stage,
         omega=omega,
@@ -635,6 +663,10 @@ def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Me
     return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
 
 
+SHOWN_BEYOND = 5.0
+"""Factor by which curves extend beyond crossovers and resonances."""
+
+
 def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
     """Return a range of frequencies [Hz] that shows all crossovers and resonances of a stage.
 
@@ -646,8 +678,8 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
         [*(f for case_margins in all_margins for f in case_margins.crossovers), *resonances[resonances > 1e-3]]
     )
     places = places if places.size else np.ones(1)
-    return float(places.min()) / settings.shown_beyond, min(
-        float(places.max()) * settings.shown_beyond, DriveTiming.of(flat).highest / (2 * np.pi)
+    return float(places.min()) / SHOWN_BEYOND, min(
+        float(places.max()) * SHOWN_BEYOND, DriveTiming.of(flat).highest / (2 * np.pi)
     )
 
 

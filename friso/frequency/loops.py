@@ -34,7 +34,6 @@ from friso.equations.roles import Role
 from friso.equations.sampled import counter, sampled_controller
 from friso.equations.structure import ControllerForm, Structure, shared_structure
 from friso.errors import InputError
-from friso.frequency.settings import settings
 from friso.frequency.system import (
     FORWARD,
     Complex,
@@ -480,6 +479,10 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     )
 
 
+SLOW_POLE_SHARE = 1e-6
+"""Relative frequency below which sampling and delay do not change poles."""
+
+
 @dataclass(frozen=True)
 class Poles:
     """Poles of the `closed` loop, and of the loop `cut` open, in many states of a stage.
@@ -509,8 +512,8 @@ class Poles:
         if not step:
             return _real_parts(self.closed).max(axis=1)
         closed, bare = self.in_s, self.continuous
-        fast = np.where(np.abs(closed) > settings.slow_pole_share / step, _real_parts(closed), -np.inf)
-        slow = np.where(np.abs(bare) <= settings.slow_pole_share / step, _real_parts(bare), -np.inf)
+        fast = np.where(np.abs(closed) > SLOW_POLE_SHARE / step, _real_parts(closed), -np.inf)
+        slow = np.where(np.abs(bare) <= SLOW_POLE_SHARE / step, _real_parts(bare), -np.inf)
         return np.maximum(fast.max(axis=1), slow.max(axis=1))
 
     def distance(self, omega: np.ndarray) -> np.ndarray:
@@ -640,11 +643,15 @@ def _shut(loop: System) -> Complex:
     return np.linalg.eigvals(loop.a - loop.b @ loop.c).astype(complex)
 
 
+UNDAMPED_RATIO = 1e-9
+"""Damping ratio below which poles are on the imaginary axis, within rounding."""
+
+
 def _real_parts(poles: Complex) -> np.ndarray:
     """Return real parts of poles, (members, n), 0 on the imaginary axis up to rounding."""
     size = np.abs(poles)
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)
-    edge = np.where(poles.imag != 0, settings.undamped_ratio * size, 0.0) + ROUNDING * fastest
+    edge = np.where(poles.imag != 0, UNDAMPED_RATIO * size, 0.0) + ROUNDING * fastest
     return np.where(np.abs(poles.real) <= edge, 0.0, poles.real)
 
 

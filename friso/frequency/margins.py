@@ -40,8 +40,17 @@ from friso.frequency.loops import (
     response,
     samples_controller,
 )
-from friso.frequency.settings import settings
-from friso.frequency.system import Complex, DriveTiming, Members, System, law_of, limit_cases, member, resonances
+from friso.frequency.system import (
+    LIGHT_DAMPING,
+    Complex,
+    DriveTiming,
+    Members,
+    System,
+    law_of,
+    limit_cases,
+    member,
+    resonances,
+)
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import numeric_keys
 
@@ -102,19 +111,33 @@ def margins(flat: Mapping[str, Any], member: Members) -> Margins:
     return margins_of(response(flat, member, drive), flat, member, poles(flat, member, drive))
 
 
+MARGIN_DENSITY = 250  # [1/decade]
+"""Frequencies per decade for margins. Fewer step over two crossings that lie close together."""
+
+ALIAS_SHARE = 1e-3
+"""Distance from the rate of the slowest loop, relative to it, within which rounding spoils a locus."""
+
+
 def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_poles: Poles) -> Margins:
     """Return the margins of one loop of a stage from its response, `at`, and its poles."""
     drive, closed = loop_poles.drive, loop_poles.in_s[0]
     resonant = [closed, drive.to_s(loop_poles.cut[0]), *([loop_poles.continuous] if drive.period > 1 else [])]
-    omega, aside = frequencies(flat, member, drive, settings.margin_density, resonant), 1.0
+    omega, aside = frequencies(flat, member, drive, MARGIN_DENSITY, resonant), 1.0
     if drive.period > 1:
         apart = 2 * np.pi / (drive.sample_time * drive.period)
         omega, aside = (
-            omega[np.abs(omega / apart - np.maximum(np.round(omega / apart), 1)) > settings.alias_share],
-            1 - settings.alias_share,
+            omega[np.abs(omega / apart - np.maximum(np.round(omega / apart), 1)) > ALIAS_SHARE],
+            1 - ALIAS_SHARE,
         )
     ends = [*_at_rest(at, omega[0]), *([at(np.array([drive.highest * aside]))[0]] if drive.sample_time else [])]
     return of_loop(at, closed[np.isfinite(closed)], float(loop_poles.abscissa[0]), omega, np.array(ends, complex))
+
+
+NEGLIGIBLE_POLE = 1e-12
+"""Pole over the fastest that is 0 within rounding."""
+
+FREQUENCIES_BEYOND = 100.0
+"""Factor beyond the poles up to which crossings are searched; beyond it loops only fall."""
 
 
 def frequencies(
@@ -126,8 +149,8 @@ def frequencies(
     the poles `resonant`.
     """
     size = np.concatenate([np.abs(poles(flat, kind, DriveTiming(0.0, 0.0)).closed).ravel() for kind in members.kinds])
-    size = size[size > settings.negligible_pole * size.max(initial=0.0)] if size.any() else np.ones(1)
-    low, high = size.min() / settings.frequencies_beyond, min(size.max() * settings.frequencies_beyond, drive.highest)
+    size = size[size > NEGLIGIBLE_POLE * size.max(initial=0.0)] if size.any() else np.ones(1)
+    low, high = size.min() / FREQUENCIES_BEYOND, min(size.max() * FREQUENCIES_BEYOND, drive.highest)
     return with_resonances(np.geomspace(low, high, int(density * np.log10(high / low)) + 2), resonant)
 
 
@@ -141,15 +164,19 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
 
+REST_FREQUENCY = 1e-6
+"""Frequency, relative to the loop's, below which a finite loop no longer changes."""
+
+
 def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
     """Return the loop at frequency 0 in a list, which is empty if it is not finite there.
 
     The loop counts as finite if it is real and constant towards 0. `slow` is a low frequency [rad/s].
     """
-    low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)
-    flat = np.abs(low - lower) < settings.rest_frequency * np.abs(lower) and np.abs(
-        lower.imag
-    ) < settings.rest_frequency * np.abs(lower.real)
+    low, lower = at(np.array([2 * REST_FREQUENCY, REST_FREQUENCY]) * slow)
+    flat = np.abs(low - lower) < REST_FREQUENCY * np.abs(lower) and np.abs(lower.imag) < REST_FREQUENCY * np.abs(
+        lower.real
+    )
     return [complex(lower.real)] if flat else []
 
 
@@ -189,6 +216,10 @@ def _decades(loop: Complex) -> np.ndarray:
     return np.log(np.maximum(np.abs(loop), np.finfo(float).tiny))
 
 
+JUMP_SHARE = 1e-3
+"""Remaining value of a function at a sign change, relative to its values, above which it jumps there."""
+
+
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the frequencies [rad/s], (n,), at which a function passes zero.
 
@@ -201,8 +232,15 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
         brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)) for k in passes
     ]
     sizes = np.maximum(np.abs(values[passes]), np.abs(values[passes + 1]))
-    crossings = {at for at, size in zip(zeros, sizes, strict=True) if abs(function(at)) <= settings.jump_share * size}
+    crossings = {at for at, size in zip(zeros, sizes, strict=True) if abs(function(at)) <= JUMP_SHARE * size}
     return np.array(sorted({*crossings, *omega[values == 0].tolist()}))
+
+
+REAL_SHARE = 1e-9
+"""Imaginary over real part that may be rounding."""
+
+VANISHING_LOOP = 1e-8
+"""Magnitude of a loop that is only rounding: a mass behind a hold at half the sampling frequency."""
 
 
 def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
@@ -212,10 +250,10 @@ def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Comp
     the sampling frequency. The result is empty if L is nowhere real and negative.
     """
     # leave out rounding
-    clear = np.where(np.abs(gains.imag) > settings.real_share * np.abs(gains.real), gains.imag, np.nan)
+    clear = np.where(np.abs(gains.imag) > REAL_SHARE * np.abs(gains.real), gains.imag, np.nan)
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)
     at = np.concatenate([response(real) if real.size else np.empty(0), ends])
-    return -1 / at.real[at.real < -settings.vanishing_loop]
+    return -1 / at.real[at.real < -VANISHING_LOOP]
 
 
 def _closest(response: LoopResponse, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
@@ -308,6 +346,13 @@ BESIDE_RESONANCE = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Frequencies about a closed-loop resonance at which it is evaluated, in half widths."""
 
 
+FAMILY_DENSITY = 35  # [1/decade]
+"""Frequencies per decade for a family. They find the states closest to -1, whose margins are then exact."""
+
+CLOSEST_MEMBERS = 16
+"""Members computed exactly, the nearest to -1 on the coarse grid."""
+
+
 @dataclass(frozen=True)
 class Scan:
     """Stability of a stage in many states, its members, as arrays of shape (members,).
@@ -336,7 +381,7 @@ class Scan:
         It is computed at common frequencies and near each state's closed-loop resonances. For the states that come
         closest to -1 it is exact.
         """
-        omega = frequency_grid(self.flat, settings.family_density)
+        omega = frequency_grid(self.flat, FAMILY_DENSITY)
 
         def shared(which: np.ndarray) -> np.ndarray:
             return distance_to_lines(loops(self.flat, self.members[which], omega))
@@ -344,7 +389,7 @@ class Scan:
         parts = _split(np.arange(len(self.members)))
         distance = np.concatenate(side_by_side([partial(shared, part) for part in parts]))
         distance = np.minimum(distance, self.by_poles.resonant)
-        for k in np.argsort(np.where(self.stable, distance, np.inf))[: settings.closest_members]:
+        for k in np.argsort(np.where(self.stable, distance, np.inf))[:CLOSEST_MEMBERS]:
             exact = margins(self.flat, self.members[k]).modulus_margin
             distance[k] = distance[k] if np.isnan(exact) else exact
         return distance
@@ -427,7 +472,7 @@ def about_resonances(system: Poles) -> np.ndarray:
     if system.drive.period > 1:  # its poles do not show which alias resonates
         return np.full((len(system.closed), 1), np.nan)
     closed = system.in_s
-    light = (closed.imag > 0) & (np.abs(closed.real) < settings.light_damping * closed.imag)
+    light = (closed.imag > 0) & (np.abs(closed.real) < LIGHT_DAMPING * closed.imag)
     omega = (
         np.where(light, closed.imag, np.nan)[:, :, None]
         + BESIDE_RESONANCE * np.where(light, closed.real, np.nan)[:, :, None]
@@ -517,6 +562,10 @@ def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> 
     return lambda keys: (seen * _channels(keys, omega)).sum(axis=-1)
 
 
+MEMBERS_SOLVED_WHOLE = 16
+"""Members for which all frequencies are solved at once, limited by memory."""
+
+
 def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """Return the measured signals over the force, shape (members, k, 2), from the whole plant.
 
@@ -526,7 +575,7 @@ def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.nd
     second = RATED if DriveTiming.of(flat).sample_time else VELOCITY
     answers = np.empty((len(members), len(omega), 2), complex)
     for mask in (members.stuck, ~members.stuck):
-        for part in np.array_split(np.flatnonzero(mask), -(-int(mask.sum()) // settings.members_solved_whole) or 1):
+        for part in np.array_split(np.flatnonzero(mask), -(-int(mask.sum()) // MEMBERS_SOLVED_WHOLE) or 1):
             machine = plant(flat, members[part]).take((FORCE,), (STAGE, second)) if len(part) else None
             if machine is not None:
                 answers[part] = machine.at(1j * omega)[..., 0]
@@ -577,5 +626,9 @@ def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Compl
     return total
 
 
+MEMBERS_TOGETHER = 256
+"""Members computed together. Larger arrays leave the processor's cache."""
+
+
 def _split(numbers: np.ndarray) -> list[np.ndarray]:
-    return np.array_split(numbers, -(-len(numbers) // settings.members_together)) if len(numbers) else []
+    return np.array_split(numbers, -(-len(numbers) // MEMBERS_TOGETHER)) if len(numbers) else []

@@ -26,7 +26,6 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction, friction_alone, solve_linear
 from friso.equations.structure import shared_structure, structure
 from friso.errors import InputError
-from friso.frequency.settings import settings
 from friso.stage.arguments import check_arguments
 from friso.stage.rig import LOOPS
 from friso.stage.stage import declared_keys
@@ -132,6 +131,10 @@ SCALED_NORM = 0.5
 """Norm to which matrices are scaled for the exponential, whose relative error is then below 1e-16."""
 
 
+MOST_DELAY_SAMPLES = 64
+"""Most samples of a delay. More make the state of a sampled drive too large for eigenvalues."""
+
+
 @dataclass(frozen=True)
 class DriveTiming:
     """Timing of a drive.
@@ -156,16 +159,14 @@ class DriveTiming:
         slow = {key: flat[key] for key in SLOW_LOOPS if key in flat}
         key = max(slow, key=lambda key: slow[key], default="")
         period = round(slow[key] / sample_time) if slow else 1
-        if period > settings.most_delay_samples:
+        if period > MOST_DELAY_SAMPLES:
             text = f"{slow[key]:g} s, {period} samples of {sample_time:g} s"
-            raise InputError(
-                key, text, f"at most {settings.most_delay_samples} samples", 'position_sample_time = "1 ms"'
-            )
+            raise InputError(key, text, f"at most {MOST_DELAY_SAMPLES} samples", 'position_sample_time = "1 ms"')
         lag = 1 / (2 * np.pi * flat["drive.current_bandwidth"]) if "drive.current_bandwidth" in flat else 0.0
         drive = cls(sample_time, flat.get("drive.delay", 0.0), period, lag)
-        if drive.sample_time and drive.delay > settings.most_delay_samples * drive.sample_time * (1 + 1e-9):
+        if drive.sample_time and drive.delay > MOST_DELAY_SAMPLES * drive.sample_time * (1 + 1e-9):
             text = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
-            raise InputError("drive.delay", text, f"at most {settings.most_delay_samples} samples", 'delay = "100 us"')
+            raise InputError("drive.delay", text, f"at most {MOST_DELAY_SAMPLES} samples", 'delay = "100 us"')
         return drive
 
     @property
@@ -203,9 +204,13 @@ class DriveTiming:
             return (np.log(np.abs(poles)) / time + 1j * (np.angle(poles) / time)).astype(complex)
 
 
+LIGHT_DAMPING = 0.3
+"""Damping ratio below which a pole has a peak that a frequency grid could miss."""
+
+
 def resonances(poles: Complex) -> Complex:
     """Return those of the poles [rad/s] that are lightly damped."""
-    return poles[np.abs(poles.real) < settings.light_damping * np.abs(poles.imag)]
+    return poles[np.abs(poles.real) < LIGHT_DAMPING * np.abs(poles.imag)]
 
 
 def behind_current_loop(machine: System, lag: float) -> System:
@@ -243,6 +248,23 @@ def waited(machine: System, samples: int) -> System:
     )
 
 
+LEAST_DELAY_PHASE = 5.0  # [rad]
+"""Least phase covered by the rational functions. With less, their poles lie too near the loop's poles."""
+
+MOST_DELAY_PHASE = 20.0  # [rad]
+"""Largest phase of a resonance within the delay. A loop with more is unstable in any case."""
+
+PADE_PHASE = 2.5  # [rad]
+"""Phase that one rational function of `PADE_ORDER` covers."""
+
+MOST_DELAY_SECTIONS = 24
+"""Most rational functions of a delay. More make the eigenvalues inaccurate."""
+
+PADE_ORDER = 4
+"""Order of the rational function of a delay. With the phase `PADE_PHASE`, its error stays under 1e-6; a higher
+order is ill-conditioned."""
+
+
 def delayed(machine: System, delay: float, loop: float) -> System:
     """Return a plant with one input behind a delay [s], made of rational functions (Pade).
 
@@ -250,13 +272,9 @@ def delayed(machine: System, delay: float, loop: float) -> System:
     without delay. Raises InputError if the phase of the plant's own resonances turns too far within the delay.
     """
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
-    sections = int(
-        np.ceil(
-            max(settings.least_delay_phase, turn, min(loop * delay, settings.most_delay_phase)) / settings.pade_phase
-        )
-    )
-    if sections > settings.most_delay_sections:
-        most = settings.most_delay_sections * settings.pade_phase / (2 * np.pi)
+    sections = int(np.ceil(max(LEAST_DELAY_PHASE, turn, min(loop * delay, MOST_DELAY_PHASE)) / PADE_PHASE))
+    if sections > MOST_DELAY_SECTIONS:
+        most = MOST_DELAY_SECTIONS * PADE_PHASE / (2 * np.pi)
         expected = f"at most {most:.3g} periods, or a drive.sample_time"
         text = f"{delay:g} s, {turn / (2 * np.pi):.3g} periods of the fastest mode"
         raise InputError("drive.delay", text, expected, 'delay = "100 us"')
@@ -264,7 +282,7 @@ def delayed(machine: System, delay: float, loop: float) -> System:
     from scipy.signal import tf2ss  # 0.8 s to import
 
     for k in range(sections):
-        machine = _behind(machine, tf2ss(*pade(delay / sections, settings.pade_order)), f"delay_{k}")
+        machine = _behind(machine, tf2ss(*pade(delay / sections, PADE_ORDER)), f"delay_{k}")
     return machine
 
 
@@ -443,20 +461,32 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
     return np.broadcast_to(sign * np.asarray(force), speeds.shape)
 
 
+SLOWEST_SPEED_SHARE = 1e-3
+"""Slowest speed over the slowest velocity of the law. A slower cart is as if stuck."""
+
+FASTEST_SPEED_FACTOR = 1e3
+"""Fastest speed over the fastest velocity of the law. Beyond it only viscous friction is left."""
+
+BRISTLE_LENGTH = 1e-6  # [m]
+"""Length scale of a law without bristles, whose force does not depend on speed."""
+
+SLOWEST_BRISTLE_RATE = 0.1  # [1/s]
+"""Slowest rate at which bristles give way. Slower ones are springs to any loop."""
+
+FASTEST_BRISTLE_RATE = 1e5  # [1/s]
+"""Fastest rate at which bristles give way. Faster ones leave only viscous friction."""
+
+
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Return speeds [m/s] from creeping to where friction hardly depends on speed, (count,)."""
     flat = leading_friction(flat)
     units = {key: quantity.unit for key, quantity in declared_keys(flat).items() if key.startswith("friction.")}
     named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]
     if named:
-        return np.geomspace(
-            settings.slowest_speed_share * min(named), settings.fastest_speed_factor * max(named), count
-        )
+        return np.geomspace(SLOWEST_SPEED_SHARE * min(named), FASTEST_SPEED_FACTOR * max(named), count)
     law = law_of(flat)
-    bristles = (law.lengths(flat) if law else []) or [settings.bristle_length]
-    return np.geomspace(
-        settings.slowest_bristle_rate * min(bristles), settings.fastest_bristle_rate * max(bristles), count
-    )
+    bristles = (law.lengths(flat) if law else []) or [BRISTLE_LENGTH]
+    return np.geomspace(SLOWEST_BRISTLE_RATE * min(bristles), FASTEST_BRISTLE_RATE * max(bristles), count)
 
 
 def in_series(first: Any, second: Any) -> Any:
@@ -579,6 +609,10 @@ def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
     }
 
 
+GREATEST_BIAS_SHARE = 0.999
+"""Largest bias force over the break-away force. A stage nearer to break-away has no stiffness."""
+
+
 def family(flat: Mapping[str, Any], biases: int = BIAS_COUNT, speeds_: int = SPEED_COUNT) -> Members:
     """Return states near and between all limit cases of a stage, stuck and sliding.
 
@@ -594,8 +628,8 @@ def family(flat: Mapping[str, Any], biases: int = BIAS_COUNT, speeds_: int = SPE
     for touched in limiter_states(flat):
         for forward in (True, False) if differs else (True,):
             least, most = (
-                -settings.greatest_bias_share * level(flat, not forward),
-                settings.greatest_bias_share * level(flat, forward),
+                -GREATEST_BIAS_SHARE * level(flat, not forward),
+                GREATEST_BIAS_SHARE * level(flat, forward),
             )
             bias = np.unique(np.linspace(least, most, biases))  # a law that creeps instead of sticking bears no bias
             speed = np.concatenate([np.zeros(len(bias)), speeds(flat, speeds_)])

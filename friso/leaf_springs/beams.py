@@ -34,7 +34,6 @@ from friso.leaf_springs import closed_forms
 from friso.leaf_springs import mechanism as plate
 from friso.leaf_springs.closed_forms import SHEAR_COEFFICIENT, axial, body_mass, closed_form_model, edgewise_shear
 from friso.leaf_springs.mechanism import Evaluation, Mechanism, Mode
-from friso.leaf_springs.settings import settings
 from friso.stage import Stage
 
 LEAF_ELEMENTS = 16
@@ -328,6 +327,13 @@ def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     return follow.T @ stiffness @ follow, follow.T @ mass @ follow
 
 
+STAGE_ENERGY_SHARE = 0.1
+"""Fraction of the kinetic energy in the stage below which a mode is one of the leaves."""
+
+REPORTED_MODES = 12
+"""Modes that are reported. Higher ones lie beyond any crossover."""
+
+
 def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     """Return the lowest modes of stage and leaves, and all modes in which the stage moves much.
 
@@ -350,8 +356,8 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     squares, vectors = eigh(stiffness, mass)
     lowest = []
     for square, vector in zip(squares, vectors.T, strict=True):
-        moves = vector[stage] @ body @ vector[stage] > settings.stage_energy_share
-        if len(lowest) >= settings.reported_modes and not moves:
+        moves = vector[stage] @ body @ vector[stage] > STAGE_ENERGY_SHARE
+        if len(lowest) >= REPORTED_MODES and not moves:
             continue
         amplitudes = rows.T @ vector[NODE_COORDINATES:].reshape(len(rows), count)
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
@@ -456,9 +462,13 @@ def _check(mechanism: Mechanism, stroke: float) -> None:
             raise BeamFailure(f"The beams need a positive {name}, not {float(value):.6g}.")
 
 
+BEAM_DEFLECTIONS = 5
+"""Deflections at which beams are evaluated. Fewer miss the curvature of the stiffness over the stroke."""
+
+
 def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluation:
     """Evaluate the mechanism at several deflections up to the stroke [m], and its modes at rest."""
-    deflections = np.linspace(0, stroke, settings.beam_deflections)
+    deflections = np.linspace(0, stroke, BEAM_DEFLECTIONS)
     rest = Configuration.rest(leaves)
     straight = np.repeat(leaves.stiffness(rest.state(mechanism.offsets)[:1]), leaves.count, axis=0)
     unloaded = np.zeros((leaves.count, leaves.nodes, 6))
@@ -484,6 +494,10 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluat
     )
 
 
+MOST_STEP_HALVINGS = 5
+"""Halvings of a step. Leaves that still do not converge are buckled or folded."""
+
+
 def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium], z: float) -> HeldEquilibrium:
     """Return the equilibrium at z [m], reached from the last of `held` in few steps.
 
@@ -491,7 +505,7 @@ def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium]
     """
     nearest = held[-2:]
     start = nearest[-1].place.stage[1]
-    for halving in range(settings.most_step_halvings):
+    for halving in range(MOST_STEP_HALVINGS):
         steps = 2**halving
         try:
             reached = nearest
@@ -524,16 +538,27 @@ def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
     return Configuration(inner, stage)
 
 
+NEWTON_ENERGY_SHARE = 1e-7
+"""Newton's error in energy, relative to the total. It leaves an error of 4e-4 of the buckling load in the axial
+force."""
+
+STEP_NEWTON_ITERATIONS = 8
+"""Newton iterations of a step. A step that needs more converges sooner when halved."""
+
+FOLDING_ANGLE = 1.3  # [rad]
+"""Angle beyond which the mechanism is folded rather than deflected."""
+
+
 def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) -> HeldEquilibrium:
     """Find the equilibrium at the z of a configuration by Newton's method, starting from it.
 
     Raises BeamFailure if the method does not converge.
     """
     z = place.stage[1]
-    relative = settings.newton_energy_share * (float(mechanism.thickness) / z) ** 2
+    relative = NEWTON_ENERGY_SHARE * (float(mechanism.thickness) / z) ** 2
     close = relative * float(closed_forms.drive_stiffness(mechanism)) * z**2
-    for _ in range(settings.step_newton_iterations):
-        if not np.max(np.abs(place.inner[:, :, 2]), initial=abs(place.stage[2])) < settings.folding_angle:
+    for _ in range(STEP_NEWTON_ITERATIONS):
+        if not np.max(np.abs(place.inner[:, :, 2]), initial=abs(place.stage[2])) < FOLDING_ANGLE:
             break
         state = place.state(mechanism.offsets)
         forces, stiffness = leaves.forces(state), leaves.stiffness(state)

@@ -20,8 +20,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.leaf_springs import mechanism as plate
-from friso.leaf_springs.mechanism import Evaluation, Mechanism, Mode, along_motion
-from friso.leaf_springs.settings import settings
+from friso.leaf_springs.mechanism import VISIBLE_PEAK, Evaluation, Mechanism, Mode, along_motion
 from friso.stage.flexure import register_derivation
 
 SHEAR_COEFFICIENT = 5 / 6
@@ -283,13 +282,17 @@ def drive_mode(frequencies: np.ndarray, shapes: np.ndarray) -> np.ndarray:
         return np.argmax(np.nan_to_num((shapes[..., 2, :] / frequencies) ** 2, posinf=np.inf), axis=-1)
 
 
+CLOSED_DEFLECTIONS = 5
+"""Deflections of the closed forms, as many as of beams, for one table."""
+
+
 def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
     """Evaluate the mechanism by closed forms over its stroke [m].
 
     The drive stiffness is equal at all deflections.
     """
-    deflections = np.linspace(0.0, stroke, settings.closed_deflections)
-    drive = drive_stiffness(mechanism) * np.ones(settings.closed_deflections)
+    deflections = np.linspace(0.0, stroke, CLOSED_DEFLECTIONS)
+    drive = drive_stiffness(mechanism) * np.ones(CLOSED_DEFLECTIONS)
     return Evaluation(
         model="closed forms",
         mechanism=mechanism,
@@ -328,12 +331,16 @@ def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
     return Mode.of(mechanism, frequency, stage, leaves)
 
 
+MODE_SHAPE_POINTS = 17
+"""Points of a mode shape, enough to draw the third bending mode smoothly."""
+
+
 def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
     """Return how the leaves' middle lines follow a motion of the stage, (leaves, POINTS, 3).
 
     The motion has shape (6,), and the leaves follow statically.
     """
-    s = np.linspace(0.0, 1.0, settings.mode_shape_points)
+    s = np.linspace(0.0, 1.0, MODE_SHAPE_POINTS)
     by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)
     x, y, z, turn_x, turn_y, turn_z = stage
     return np.array(
@@ -357,7 +364,7 @@ def _unlike(mechanism: Mechanism) -> list[Mode]:
     modes = []
     for k in range(1, count):
         wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # patterns of the leaves, orthogonal to each other
-        leaves = np.zeros((count, settings.mode_shape_points, 3))
+        leaves = np.zeros((count, MODE_SHAPE_POINTS, 3))
         leaves[:, :, 2] = wave[:, None] * _clamped_shape() / np.sqrt(leaf_mass * np.sum(wave**2))
         frequency = float(leaf_bending(mechanism))
         modes.append(Mode("leaf bending, out of phase", frequency, 0.0, 0.0, 0.0, np.zeros(6), leaves))
@@ -366,14 +373,14 @@ def _unlike(mechanism: Mechanism) -> list[Mode]:
 
 def _clamped_shape() -> np.ndarray:
     """Return the first bending mode of a clamped beam at even places, with mean square 1."""
-    x = CLAMPED_ROOT * np.linspace(0.0, 1.0, settings.mode_shape_points)
+    x = CLAMPED_ROOT * np.linspace(0.0, 1.0, MODE_SHAPE_POINTS)
     ratio = (np.cosh(CLAMPED_ROOT) - np.cos(CLAMPED_ROOT)) / (np.sinh(CLAMPED_ROOT) - np.sin(CLAMPED_ROOT))
     return np.cosh(x) - np.cos(x) - ratio * (np.sinh(x) - np.sin(x))
 
 
 def _torsion_mode(mechanism: Mechanism) -> Mode:
     """Return the first torsional mode of the leaves, whose middle lines stay at rest."""
-    leaves = np.zeros((int(mechanism.leaves), settings.mode_shape_points, 3))
+    leaves = np.zeros((int(mechanism.leaves), MODE_SHAPE_POINTS, 3))
     return Mode("leaf torsion", float(leaf_torsion(mechanism)), 0.0, 0.0, 0.0, np.zeros(6), leaves)
 
 
@@ -392,12 +399,16 @@ def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
     return stiffness
 
 
+GAUSS_POINTS = 48
+"""Points of integration along a curved leaf, which are exact to rounding."""
+
+
 def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
     """Return the stiffness matrix (6, 6) at the end of one deflected leaf.
 
     The leaf is bent by `deflection` [m] into the shape 3 s^2 - 2 s^3, s being the fraction of its length.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(settings.gauss_points)
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     x, weight = (nodes + 1) / 2 * mechanism.length, weights / 2 * mechanism.length
     share = x / mechanism.length
     height, slope = deflection * (3 * share**2 - 2 * share**3), 6 * deflection / mechanism.length * (share - share**2)
@@ -493,7 +504,7 @@ class VisibleModes:
         pushed, measured = (along_motion(mechanism, at, shapes) for at in (mechanism.actuation, mechanism.sensor))
         internal = np.arange(7) != drive_mode(frequency, shapes)[..., None]
         residue = np.where(internal, pushed * measured * np.asarray(mechanism.body.mass)[..., None], 0.0)
-        least = settings.visible_peak * 2 * np.asarray(mechanism.damping_ratio)[..., None]
+        least = VISIBLE_PEAK * 2 * np.asarray(mechanism.damping_ratio)[..., None]
         return cls(frequency, residue, np.abs(residue) > least)
 
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
@@ -518,6 +529,10 @@ def first_interfering(mechanism: Mechanism) -> Any:
     return visible.at(np.argmin(np.where(visible.visible, visible.frequency, np.inf), axis=-1))[0]
 
 
+LEAST_RESIDUE = 1e-9
+"""Least residue of a parasitic mode, because the equations need a mass above 0."""
+
+
 def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     """Return frequency [Hz] and residue of the mode whose resonance stands highest in the plant.
 
@@ -531,5 +546,5 @@ def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     height = np.where(visible.visible, np.abs(visible.residue), 0.0) / np.maximum(visible.frequency, 1e-9) ** 2
     frequency, residue = visible.at(np.argmax(height, axis=-1))
     leaves = leaf_bending(mechanism)
-    size = np.maximum(np.abs(residue), settings.least_residue)
+    size = np.maximum(np.abs(residue), LEAST_RESIDUE)
     return np.where(np.isfinite(frequency), frequency, leaves)[()], size[()]

@@ -28,8 +28,6 @@ from typing import Any
 
 import numpy as np
 
-from friso.leaf_springs.settings import settings
-
 CONVERGED_STIFFENING, CONVERGED_PEAK = 0.878, 0.63
 """Fractions that remain with more functions across the width: of the stiffening (0.866 to 0.895 at a Poisson's ratio of
 0.3, 0.854 to 0.909 from 0.05 to 0.45), and of the excess stress (0.60, for square leaves 0.65). They hold for leaves
@@ -175,6 +173,10 @@ def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     return s**3 + 6 * s / rate**2 - (1 + 6 / rate**2) * _decay(rate, s, 2.0, odd=True)
 
 
+TILT_ITERATIONS = 8
+"""Iterations of the tilt. Four reach rounding."""
+
+
 def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted_sum: float) -> np.ndarray:
     """Multiply torsional compliances `shares` (n,) by exp(tilt place^2), for a tilt to be found.
 
@@ -182,7 +184,7 @@ def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted
     (n,), equal to `weighted_sum`. Their plain sum stays, so that an even torque twists the leaf as before.
     """
     tilt, total = 0.0, shares.sum()
-    for _ in range(settings.tilt_iterations):
+    for _ in range(TILT_ITERATIONS):
         now = shares * np.exp(tilt * places**2)
         now *= total / now.sum()
         met = now @ torques**2
@@ -387,6 +389,10 @@ def along_motion(mechanism: Mechanism, point: tuple[Any, Any, Any], shapes: np.n
     return shapes[..., 2, :] + shapes[..., 3, :] * y - shapes[..., 4, :] * x
 
 
+VISIBLE_PEAK = 0.01
+"""Peak over the mass line from which a mode interferes. Lower ones do not reach 0 dB below a margin of 40 dB."""
+
+
 @dataclass(frozen=True)
 class Mode:
     """A mode of the mechanism: its name, its frequency [Hz], and its displacements.
@@ -424,7 +430,7 @@ class Mode:
     @property
     def interferes(self) -> bool:
         """Tell whether actuator and sensor both see the mode well enough to disturb control."""
-        return self.peak > settings.visible_peak
+        return self.peak > VISIBLE_PEAK
 
 
 @dataclass(frozen=True)
@@ -585,12 +591,16 @@ def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
     return shapes - np.outer(shapes[:, -1], x**2 * (3 - 2 * x))
 
 
+SHAPE_RIPPLE = 0.05
+"""Displacement over the largest one below which rounding decides the sign of a shape."""
+
+
 def _number(shapes: np.ndarray) -> str:
     """Return the number of waves of a mode as a suffix of its name; "" for one wave.
 
     `shapes` (leaves, points) are displacements. Waves are counted on the leaf that moves most.
     """
     shape = shapes[np.argmax(np.sum(shapes**2, axis=1))]
-    signs = np.sign(shape[np.abs(shape) > settings.shape_ripple * np.max(np.abs(shape))])
+    signs = np.sign(shape[np.abs(shape) > SHAPE_RIPPLE * np.max(np.abs(shape))])
     waves = 1 + int(np.sum(signs[1:] != signs[:-1]))
     return "" if waves == 1 else f" {waves}"

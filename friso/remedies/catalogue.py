@@ -37,13 +37,17 @@ from friso.frequency.system import limit_cases
 from friso.hunting import find_attractors
 from friso.quantities import exactly
 from friso.remedies.machines import Goal
-from friso.remedies.settings import settings
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import FILTERS_KEY, controller_of, settings_of
 
 CapReason = Literal["stated", "least", "sampling", "mode", "unknown"]
 """What caps the speed: the user's limit of the bandwidth, the least speed that works, the sampling of the drive, the
 lowest mode, or that no mode is known."""
+
+
+FASTER_THAN_LEAST = 1.3
+"""Factor above the least speed that works up to which other remedies are searched, unless a limit of the bandwidth
+is stated. Within it they cost the machine about as much as the least one."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,22 @@ class SpeedCap:
         """Return the cap once a controller that is `least` times as fast works, and nothing faster is needed."""
         if self.reason == "stated":
             return self
-        return SpeedCap(min(self.factor, settings.faster_than_least * max(1.0, least)), "least")
+        return SpeedCap(min(self.factor, FASTER_THAN_LEAST * max(1.0, least)), "least")
+
+
+LARGEST_SPEED_FACTOR = 10.0
+"""Largest factor of the bandwidth. Beyond it the drive limits every machine."""
+
+MODE_SHARE = 0.5
+"""Largest bandwidth advised unasked, over the frequency of the lowest mode. Above it a mode that the file has
+wrong by a little takes the margin, with or without a notch."""
+
+FASTEST_UNASKED = 4.0
+"""Largest factor on the controller's speed that is advised where nobody stated modes or a limit of the machine."""
+
+SAMPLING_SHARE = 0.1
+"""Largest bandwidth advised unasked, over the sampling rate. Above it the phase that sampling costs depends on when
+the drive reads and writes, which files seldom tell."""
 
 
 def speed_cap(stage: Stage, goal: Goal) -> SpeedCap:
@@ -70,17 +89,17 @@ def speed_cap(stage: Stage, goal: Goal) -> SpeedCap:
     no mode is known, a multiple of the present bandwidth. A cap never asks for a slower controller.
     """
     if goal.bandwidth_limit is not None:
-        return SpeedCap(settings.fastest_factor, "stated")
+        return SpeedCap(LARGEST_SPEED_FACTOR, "stated")
     flat, own = stage.flat(), loop_bandwidth(stage)
     caps, mode = [], flat.get("parasitic.frequency")
     if mode is not None and np.isfinite(own):
-        caps.append(SpeedCap(settings.mode_share * mode / own, "mode"))
+        caps.append(SpeedCap(MODE_SHARE * mode / own, "mode"))
     else:
-        caps.append(SpeedCap(settings.fastest_unasked, "unknown"))
+        caps.append(SpeedCap(FASTEST_UNASKED, "unknown"))
     if (sample_time := flat.get("drive.sample_time")) and np.isfinite(own):
-        caps.append(SpeedCap(settings.sampling_share / sample_time / own, "sampling"))
+        caps.append(SpeedCap(SAMPLING_SHARE / sample_time / own, "sampling"))
     least = min(caps, key=lambda cap: cap.factor)
-    return SpeedCap(min(max(1.0, least.factor), settings.fastest_factor), least.reason)
+    return SpeedCap(min(max(1.0, least.factor), LARGEST_SPEED_FACTOR), least.reason)
 
 
 FREQUENCIES_PER_DECADE, SLOWEST_FACTOR, FASTEST_FACTOR = 25, 0.1, 10.0
@@ -156,6 +175,10 @@ DAMPING_RATIOS = (0.01, 0.3)
 """Range of damping ratios of the stage on its joint."""
 
 
+SNAP_SHARE = 0.02
+"""Relative difference from the present number below which the present number is kept."""
+
+
 @dataclass(frozen=True)
 class Variable:
     """A number between `low` and `high` (SI) on a logarithmic scale.
@@ -172,7 +195,7 @@ class Variable:
     def at(self, share: np.ndarray) -> np.ndarray:
         """Return the values at coordinates from 0 to 1 over the range."""
         value = np.asarray(self.low * (self.high / self.low) ** share)
-        return np.where(np.abs(share - self.share(self.present)) < settings.snap_share, self.present, value)
+        return np.where(np.abs(share - self.share(self.present)) < SNAP_SHARE, self.present, value)
 
     def share(self, value: float) -> float:
         """Return the coordinate, from 0 to 1 over the range, of a value."""
@@ -184,9 +207,17 @@ def of_key(key: str, low: float, high: float) -> Variable:
     return Variable(key, low, high, lambda flat, value: {key: value})
 
 
+LEAST_SPEED_FACTOR = 0.3
+"""Smallest factor of the bandwidth. A slower loop does not settle within the move."""
+
+
 def bandwidth_factor(present: float = float("nan")) -> Variable:
     """Return the bandwidth of the whole controller as a variable: a factor on the present one."""
-    return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up, present)
+    return Variable(BANDWIDTH, LEAST_SPEED_FACTOR, LARGEST_SPEED_FACTOR, sped_up, present)
+
+
+GAIN_FACTOR = 4.0
+"""Factor by which relative gains vary either way."""
 
 
 def gains(stage: Stage) -> tuple[Variable, ...]:
@@ -194,8 +225,16 @@ def gains(stage: Stage) -> tuple[Variable, ...]:
     flat, controller = stage.flat(), controller_of(stage.flat())
     shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
     keys = [controller.key(name) for name in controller.speeds_up if flat.get(controller.key(name))]
-    against = [of_key(key, flat[key] / settings.gain_factor, flat[key] * settings.gain_factor) for key in keys[1:]]
+    against = [of_key(key, flat[key] / GAIN_FACTOR, flat[key] * GAIN_FACTOR) for key in keys[1:]]
     return (*shape, *against, bandwidth_factor())
+
+
+JOINT_STROKES = (1e-5, 3e-3)  # [m]
+"""Shortest and longest stroke of a joint. Shorter ones isolate nothing; longer ones are not leaf springs."""
+
+JOINT_FORCE_SHARE = (0.2, 0.8)
+"""Least and largest force of a joint at its stroke, over static friction. With more the cart moves first; with less
+the joint hardly guides."""
 
 
 def joint_variables(friction: float) -> tuple[Variable, ...]:
@@ -211,14 +250,18 @@ def joint_variables(friction: float) -> tuple[Variable, ...]:
         return {"joint.damping": 2 * ratio * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])}
 
     return (
-        of_key("joint.stroke", *settings.joint_strokes),
-        Variable("force of the joint at its stroke", *settings.joint_force_share, stiffness),
+        of_key("joint.stroke", *JOINT_STROKES),
+        Variable("force of the joint at its stroke", *JOINT_FORCE_SHARE, stiffness),
         Variable("damping ratio of the joint", *DAMPING_RATIOS, damping),
     )
 
 
 NOTCH_WIDTHS, NOTCH_DEPTH = (0.1, 1.5), 0.9
 """Range of the width of a notch over its frequency, and the depth of the notch."""
+
+
+TYPED_DIGITS = 4
+"""Significant digits of tuned numbers, in the units of the file. Fewer cost margin by rounding."""
 
 
 @dataclass(frozen=True)
@@ -292,7 +335,7 @@ class Remedy:
         """
         changed = self.changes(shares[None])
         numbers = {key: float(values[0]) for key, values in changed.items()}
-        return self.stage.with_rounded(numbers, settings.typed_digits)
+        return self.stage.with_rounded(numbers, TYPED_DIGITS)
 
 
 def remedies(stage: Stage, goal: Goal, drive: Stage | None = None) -> list[Remedy]:
@@ -312,7 +355,7 @@ def remedies(stage: Stage, goal: Goal, drive: Stage | None = None) -> list[Remed
 
 def with_bandwidth(remedy: Remedy) -> Remedy:
     """Return a remedy that also varies the bandwidth."""
-    faster = replace(bandwidth_factor(), high=min(remedy.fastest, settings.fastest_factor))
+    faster = replace(bandwidth_factor(), high=min(remedy.fastest, LARGEST_SPEED_FACTOR))
     return replace(remedy, name=f"{remedy.name}, and bandwidth", variables=(*remedy.variables, faster))
 
 
@@ -440,6 +483,10 @@ class Suggestion:
     margin: float
 
 
+SUGGESTED_STROKES = (1e-4, 3e-4, 1e-3, 3e-3)  # [m]
+"""Strokes tried for a suggested joint, the shortest first. Longer ones are not leaf springs."""
+
+
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def suggestion(stage: Stage) -> Suggestion | None:
     """Return the isolator with the shortest of a few strokes that settles a stage.
@@ -458,7 +505,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
         return None
     remedy, tried = (
         Remedy("", free, joint_variables(friction), True),
-        [(stroke, d) for stroke in settings.suggested_strokes for d in DAMPING],
+        [(stroke, d) for stroke in SUGGESTED_STROKES for d in DAMPING],
     )
     shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
     numbers = remedy.changes(shares)
@@ -479,12 +526,17 @@ def suggestion(stage: Stage) -> Suggestion | None:
     return Suggestion(remedy.tuned(shares[-1]), False, 0.0)
 
 
+SUGGESTED_FORCE = 0.6
+"""Force of a suggested joint at its stroke, over static friction. With more, the cart of weak machines moves first.
+"""
+
+
 def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
     """Return coordinates, from 0 to 1, of a joint's stroke [m], force and damping ratio.
 
     The scale is logarithmic. The force is `RemedySettings.suggested_force`.
     """
-    wanted = (stroke, settings.suggested_force, damping)
+    wanted = (stroke, SUGGESTED_FORCE, damping)
     return [
         float(np.log(value / variable.low) / np.log(variable.high / variable.low))
         for value, variable in zip(wanted, remedy.variables, strict=True)

@@ -21,7 +21,6 @@ from friso.errors import InputError, StageError
 from friso.frequency.bode import COMFORTABLE_MARGIN
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import exactly
-from friso.remedies.settings import settings
 from friso.stage import Stage, numeric_keys
 from friso.stage.arguments import MOST_SEED
 from friso.stage.controllers import CONTROLLER, as_tuned
@@ -210,6 +209,10 @@ HALF_WIDTHS = 1.959963984540054
 ADDED_KEYS = ("joint.stiffness", "joint.damping")
 
 
+SMALLEST_MOVE = 10.0
+"""Smallest move without [moves], in tolerances. A stage in position hardly leaves its place for shorter ones."""
+
+
 @dataclass(frozen=True)
 class MoveRange:
     """The moves that machines make: sizes from `smallest` to `largest` [m].
@@ -230,7 +233,7 @@ class MoveRange:
         """
         own, stated = float(size(stage.flat())), stage.moves
         if stated is None:
-            return cls(min(own, settings.smallest_move * within), own)
+            return cls(min(own, SMALLEST_MOVE * within), own)
         low, high = stated.lowest_acceleration, stated.highest_acceleration
         accelerations = None if low is None or high is None else (float(low), float(high))
         return cls(float(stated.smallest), float(stated.largest), accelerations)

@@ -25,10 +25,18 @@ from friso.frequency.bode import Limits, limits, loop_bandwidth
 from friso.hunting import Case
 from friso.platform.installed import missing
 from friso.progress import Progress, silent
-from friso.remedies.catalogue import BANDWIDTH, Remedy, SpeedCap, linear_flat, remedies, speed_cap, with_bandwidth
+from friso.remedies.catalogue import (
+    BANDWIDTH,
+    LARGEST_SPEED_FACTOR,
+    Remedy,
+    SpeedCap,
+    linear_flat,
+    remedies,
+    speed_cap,
+    with_bandwidth,
+)
 from friso.remedies.machines import Fleet, Goal, MoveRange, draw_fleet
-from friso.remedies.search import Budget, Search, modulus_margins
-from friso.remedies.settings import settings
+from friso.remedies.search import ALTERNATIVES_SHARE, NEAR_RANGES, SURVEY_BATCH, Budget, Search, modulus_margins
 from friso.remedies.verified import (
     Performance,
     RemedyOutcome,
@@ -88,11 +96,20 @@ def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
     return abs(float(np.log(after / before)))
 
 
+UNCHANGED_SHARE = 1e-6
+"""Largest relative difference between numbers that is rounding, not a change."""
+
+
 def _differ(before: Any, after: Any) -> bool:
     """Tell whether two values of a key differ by more than rounding."""
     if before is None or after is None or isinstance(before, str) or isinstance(after, str):
         return bool(before != after)
-    return abs(after - before) > settings.unchanged_share * max(abs(before), abs(after))
+    return abs(after - before) > UNCHANGED_SHARE * max(abs(before), abs(after))
+
+
+FACTORS_TRIED = 24
+"""Factors on the bandwidth tried either way. Fewer overshoot the smallest change; each costs a move of all
+machines."""
 
 
 def least_factors(search: Search) -> Iterator[np.ndarray]:
@@ -102,19 +119,23 @@ def least_factors(search: Search) -> Iterator[np.ndarray]:
     the goal by moves and margins, and enough surveyed machines do not hunt (`Search.clear`).
     """
     (variable,) = search.remedy.variables
-    home, steps = variable.share(variable.present), np.arange(1, settings.factors_tried + 1)
-    shares = np.concatenate([home + steps * ((end - home) / settings.factors_tried) for end in (1.0, 0.0)])
+    home, steps = variable.share(variable.present), np.arange(1, FACTORS_TRIED + 1)
+    shares = np.concatenate([home + steps * ((end - home) / FACTORS_TRIED) for end in (1.0, 0.0)])
     sizes = np.abs(np.log(variable.at(shares) / variable.present))
     order = np.argsort(sizes, kind="stable")
     for few in search.tries(shares[order[sizes[order] > 0], None]):
         robust = few[search.share(few) == 1] if len(few) else few
-        for some in np.array_split(robust, -(-len(robust) // settings.survey_batch)) if len(robust) else ():
+        for some in np.array_split(robust, -(-len(robust) // SURVEY_BATCH)) if len(robust) else ():
             yield from some[search.clear(some)]
 
 
 Unmade = Literal["rotary", "mode", "extra", "none"]
 """Reason why no leaf springs make a joint: the axis turns; the machine already has a parasitic mode, so there is no
 room for a second one from leaf springs; an extra package is missing; or no usual size bears the stroke."""
+
+
+DESCRIBED_REMEDIES = 2
+"""Remedies that are described in full, the cheapest first. More are a catalogue; the table has all."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +164,7 @@ class Advice:
     correlations: Correlations = field(default_factory=Correlations)
     unmade: Mapping[str, Unmade] = field(default_factory=dict)
     unmet: tuple[str, ...] = ()
-    cap: SpeedCap = field(default_factory=lambda: SpeedCap(settings.fastest_factor, "stated"))
+    cap: SpeedCap = field(default_factory=lambda: SpeedCap(LARGEST_SPEED_FACTOR, "stated"))
 
     @property
     def needed(self) -> bool:
@@ -185,7 +206,7 @@ class Advice:
     @property
     def recommended(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that are described in full: the two that cost the machine least."""
-        return self.working[: settings.described_remedies]
+        return self.working[:DESCRIBED_REMEDIES]
 
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
         """Return the outcome of a remedy's joint when made of leaf springs, or None."""
@@ -222,6 +243,26 @@ def _working(outcomes: Iterable[RemedyOutcome], stage: Stage, goal: Goal) -> tup
     return tuple(sorted(works, key=rank))
 
 
+SETTING_PAIRS = 2
+"""Settings against friction that are combined with the bandwidth. More take minutes."""
+
+PROGRESS_STEPS = 20
+"""Progress steps of a verification, which takes as long as this many generations."""
+
+FRESH_SEED = 1000
+"""Seed of the fresh machines on which the best points are chosen."""
+
+UNSEEN_SEED = 2000
+"""Seed of the unseen machines on which the chosen settings are measured."""
+
+FURTHER_SEED = 4000
+"""Seed of machines that are added if the first are too few to decide."""
+
+TUNING_WORK = 1.5e9
+"""Work for all remedies of the controller but the first, about 18 s on one core, and as much for remedies that buy
+a joint. Remedies left then are not tried, and the answer says so."""
+
+
 def tune(
     stage: Stage,
     goal: Goal | None = None,
@@ -247,21 +288,20 @@ def tune(
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal, stage) if chosen is None or remedy.name in chosen]
-    later = settings.setting_pairs * (_generations(budget) + 4 + settings.progress_steps)
+    later = SETTING_PAIRS * (_generations(budget) + 4 + PROGRESS_STEPS)
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later)
     progress(0, 0, "compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
     of_ideal = correlations.among(ideal.uncertain())
     fresh, unseen = (
-        _not_seen(ideal, of_ideal, budget.fresh, seed + added, moves)
-        for added in (settings.fresh_seed, settings.unseen_seed)
+        _not_seen(ideal, of_ideal, budget.fresh, seed + added, moves) for added in (FRESH_SEED, UNSEEN_SEED)
     )
-    further = _not_seen(ideal, of_ideal, budget.further, seed + settings.further_seed, moves)
+    further = _not_seen(ideal, of_ideal, budget.further, seed + FURTHER_SEED, moves)
     machines = machines_of_search(ideal, of_ideal, budget, seed, goal, stage)
     progress(0, 0, "the stage as it is")
     present, case = moving(ideal, unseen, goal, stage), None
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report, answered)
-    work = settings.tuning_work
+    work = TUNING_WORK
     interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
         if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
@@ -270,7 +310,7 @@ def tune(
             if first.certainty == "works":
                 cap = cap.above(first.factor)
                 if cap.reason != "stated":
-                    session.budget, work = budget.shortened(), settings.alternatives_share * work
+                    session.budget, work = budget.shortened(), ALTERNATIVES_SHARE * work
                 listed = [remedy.up_to(cap) for remedy in listed]
         report("the stage as it is", 0)
         case, present = checked(ideal), present.surveyed(ideal, unseen, goal)
@@ -310,6 +350,22 @@ def _not_seen(stage: Stage, correlations: Correlations, count: int, seed: int, m
     return draw_fleet(stage, correlations, count + 1, seed, moves).take(np.arange(1, count + 1))
 
 
+MACHINE_FACTOR = 2
+"""Factor on the number of machines drawn for searches, so that others stand in for those that are left out."""
+
+USUAL_MACHINES = 200
+"""Machines that show the usual modulus margin. Fewer leave its second digit uncertain."""
+
+USUAL_SEED = 3000
+"""Seed of machines that show the usual robustness."""
+
+FAR_MARGIN_SHARE = 0.5
+"""Fraction of the usual margin below which a machine is left out of the few on which settings are tried."""
+
+FEW_SHARE = 0.2
+"""Fraction, of the machines that may miss the goal, whose margins lie below what is usual."""
+
+
 def machines_of_search(
     stage: Stage, correlations: Correlations, budget: Budget, seed: int, goal: Goal, drive: Stage
 ) -> Fleet:
@@ -318,16 +374,29 @@ def machines_of_search(
     In so small a sample, a machine far less robust than nearly all others would weigh too much. It is left out, and
     another one stands in for it. If too few are left, some count twice. Sampling and delay come from the stage `drive`.
     """
-    machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed, goal.moves)
-    many = draw_fleet(stage, correlations, settings.usual_machines, seed + settings.usual_seed)
+    machines = draw_fleet(stage, correlations, MACHINE_FACTOR * budget.machines, seed, goal.moves)
+    many = draw_fleet(stage, correlations, USUAL_MACHINES, seed + USUAL_SEED)
     own, flat = Remedy.settled_on("", stage), drive.flat()
     robust = limits(linear_flat(drive, flat)).highest_comfortable
     slower = max(1.0, (bandwidth(flat) or 1.0) / robust) if robust else 1.0
     seen, usual = (modulus_margins(own, np.zeros((1, 0)), fleet, drive, slower)[0] for fleet in (machines, many))
-    common = np.flatnonzero(
-        seen >= settings.far_margin_share * np.quantile(usual, settings.few_share * (1 - goal.share))
-    )
+    common = np.flatnonzero(seen >= FAR_MARGIN_SHARE * np.quantile(usual, FEW_SHARE * (1 - goal.share)))
     return machines.take(np.resize(common if common.size else np.arange(machines.count), budget.machines))
+
+
+MOST_LOOKS = 12
+"""Points inspected on fresh machines. More take minutes and have not led to better ones."""
+
+MOST_TRIES = 3
+"""Best points of a remedy that are verified. If all fail on fresh machines, it does not work."""
+
+VERIFYING_WORK = 1.2e9
+"""Work to verify a remedy, about 15 s on one core. Once it is exceeded, no other point is verified."""
+
+FURTHER_PARTS = (1 / 12, 1 / 3)
+"""Fractions of the further machines after which the interval is examined. With more examinations, more settings
+pass by chance: with these two, one in forty of the settings with exactly the required fraction; with two more, one
+in thirty."""
 
 
 @dataclass
@@ -444,7 +513,7 @@ class _Session:
         """
         unsure: RemedyOutcome | None = None
         tries, worked = 0, 0.0
-        looks = settings.most_looks if search.remedy.verifiable else 1
+        looks = MOST_LOOKS if search.remedy.verifiable else 1
         for shares in islice(search.looked_at(points), looks):
             try:
                 with allowance() as spent:
@@ -459,7 +528,7 @@ class _Session:
             unsure = unsure or outcome
             self.outcomes[-1] = unsure
             # after so much computing, other points would take as much
-            if tries == settings.most_tries or worked > settings.verifying_work or "given up" in outcome.doubts:
+            if tries == MOST_TRIES or worked > VERIFYING_WORK or "given up" in outcome.doubts:
                 break
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), tried, search.attracted, cut=search.cut)
@@ -473,7 +542,7 @@ class _Session:
 
         The work allowed for searches does not limit this.
         """
-        for one in _working(self.outcomes, self.stage, self.goal)[: settings.described_remedies]:
+        for one in _working(self.outcomes, self.stage, self.goal)[:DESCRIBED_REMEDIES]:
             if one.remedy.buys_joint:
                 self._made_of_leaves(one)
 
@@ -496,8 +565,8 @@ class _Session:
             measured = measured.surveyed(tuned, self.unseen, goal)
             doubted = missed_parts(measured, goal)
         if not doubted:
-            self.report(f"{remedy.name}: verified on more machines", settings.progress_steps)
-            ends = [round(part * self.further.count) for part in settings.further_parts]
+            self.report(f"{remedy.name}: verified on more machines", PROGRESS_STEPS)
+            ends = [round(part * self.further.count) for part in FURTHER_PARTS]
             for part in np.split(np.arange(self.further.count), ends):
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)
@@ -523,7 +592,7 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
     several = (outcome for outcome in outcomes if outcome.remedy.of_setting and outcome.remedy.verifiable)
     tried = [outcome for outcome in several if outcome.points]
     closest = sorted(tried, key=lambda outcome: outcome.least_cost(goal))
-    return [with_bandwidth(outcome.remedy) for outcome in closest[: settings.setting_pairs]]
+    return [with_bandwidth(outcome.remedy) for outcome in closest[:SETTING_PAIRS]]
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
@@ -547,12 +616,12 @@ def _check_motion(stage: Stage) -> None:
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
     """Estimate the number of progress steps of a remedy."""
-    return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + settings.progress_steps
+    return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + PROGRESS_STEPS
 
 
 def _generations(budget: Budget) -> int:
     """Return the largest number of generations of a search."""
-    return budget.generations + len(settings.near_ranges) * budget.refined
+    return budget.generations + len(NEAR_RANGES) * budget.refined
 
 
 class _Report:

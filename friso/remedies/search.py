@@ -60,6 +60,10 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
     return np.asarray(ordered[..., int(np.ceil(share * values.shape[-1])) - 1])
 
 
+LOOSER_TOLERANCE = 10.0
+"""Factor of a looser tolerance, which shows how near machines are to settling."""
+
+
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def moves_of_points(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING_RTOL
@@ -72,7 +76,7 @@ def moves_of_points(
     count = len(shares) * machines.count
     flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
     settling, looser, force = (np.full(count, np.inf) for _ in range(3))
-    options = RunOptions(rtol=rtol, bands=(goal.within, settings.looser_tolerance * goal.within), record_from=np.inf)
+    options = RunOptions(rtol=rtol, bands=(goal.within, LOOSER_TOLERANCE * goal.within), record_from=np.inf)
     most = np.broadcast_to(flat.get(FORCE_LIMIT, np.inf), (count,))  # any excess is rounding
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, options):
         done = np.equal(runs.results.statuses, Status.DONE)
@@ -176,6 +180,11 @@ def attraction(
     return Attraction(attracts, decided, certain)
 
 
+ALTERNATIVES_SHARE = 0.5
+"""Fraction of generations and work of other searches once the speed of the controller works and no limit of it is
+stated. They find alternatives near that speed, which need not be the very best."""
+
+
 @dataclass(frozen=True)
 class Budget:
     """Sizes of a search: points, generations and machines.
@@ -195,8 +204,12 @@ class Budget:
 
     def shortened(self) -> Budget:
         """Return the budget of searches for alternatives, once a remedy works."""
-        some = settings.alternatives_share
+        some = ALTERNATIVES_SHARE
         return replace(self, generations=round(some * self.generations), refined=round(some * self.refined))
+
+
+WORST_TIME = 1e3  # [s]
+"""Settling time that ranks a point that breaks a constraint behind all others, longer than any move."""
 
 
 @dataclass(frozen=True)
@@ -256,7 +269,7 @@ class TriedPoints(ArrayColumns):
         excess += 4.0 * (1 - self.nearness)
         time = np.where(np.isfinite(self.settling), self.settling, 100.0)
         excess += _excess(time, goal.settle)
-        return np.asarray(np.where(self.meets(goal), time, settings.worst_time * (1 + excess) + time))
+        return np.asarray(np.where(self.meets(goal), time, WORST_TIME * (1 + excess) + time))
 
 
 def _most(limit: float | None) -> float:
@@ -267,6 +280,68 @@ def _most(limit: float | None) -> float:
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
     """Return by which fraction values exceed a limit; 0 if they do not, or if there is none."""
     return np.maximum(0, values / _most(limit) - 1)
+
+
+POINTS_LOOKED_AT = 12
+"""Points tried together on fresh machines, enough to fill the lanes."""
+
+LOOKING_WORK = 4.0
+"""Work to inspect points on fresh machines, in units of the work of a search."""
+
+SETTING_WORK_SHARE = 1 / 3
+"""Fraction of the work of a search for one setting, because runs of a setting that fails go on to the end."""
+
+GENERATION_POINTS = 40
+"""Points of a generation of the optimiser. More cost moves and converge no better."""
+
+OPTIMISER_SEED = 27
+"""Seed of the optimiser. A fixed one gives equal answers for equal input."""
+
+NEAR_RANGES = (0.12, 0.12, 0.03)
+"""Widths of the ranges, relative to the whole range, in which the search continues around its best point, in
+turn."""
+
+HOPEFUL_NEARNESS = 0.9
+"""Fraction of machines that settle with the best point from which the search continues around it."""
+
+HOPELESS_GENERATIONS = 4
+"""Generations after which a search may be abandoned. Fewer would end a search whose first points lie badly."""
+
+HOPELESS_NEARNESS = 0.5
+"""Fraction of machines that settle with the best point below which a search is abandoned."""
+
+BANDWIDTH_RESERVE = 1e-3
+"""Distance of bandwidths from their limit, below it, to allow for rounding."""
+
+FAR_ABOVE_LIMIT = 1.5
+"""Factor above the limit of the bandwidth beyond which a point is penalised as far above."""
+
+FIRST_MACHINES = 3
+"""Machines tried first. Three of them reject most failing points at a tenth of the cost."""
+
+ALIKE_SHARE = 0.01
+"""Distance within which points are the same settings for a drive, over the ranges."""
+
+MOST_BATCHES = 8
+"""Batches of surveyed points after which a remedy whose machines all hunt does not work."""
+
+WIDENED_FACTOR = 1.5
+"""Factor on the distance of the next points after a batch with hunting."""
+
+SURVEY_BATCH = 3
+"""Points whose machines are surveyed at once. Fewer leave cores idle; more are surveyed in vain."""
+
+APART_SHARE = 0.03
+"""Smallest distance between surveyed points, over the ranges. Nearer ones hunt if their neighbour does."""
+
+MOST_CLOSER = 4
+"""Halvings of that range. Nearer points are practically equal settings."""
+
+AROUND_SHARE = 0.02
+"""Half-width of the first range in which points are drawn around another, over the ranges."""
+
+POINTS_AROUND = 64
+"""Points drawn around a point beyond the limit of what works. Fewer miss the way back."""
 
 
 @dataclass
@@ -306,7 +381,7 @@ class Search:
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
         """Try settings, as points (points, variables), in batches; yield those that meet the goal."""
-        for few in np.array_split(points, -(-len(points) // settings.points_looked_at)) if len(points) else ():
+        for few in np.array_split(points, -(-len(points) // POINTS_LOOKED_AT)) if len(points) else ():
             self.report(f"{self.remedy.name}: trying settings")
             with self._allowed(self._work):
                 self.tried.append(self.measured(few))
@@ -319,7 +394,7 @@ class Search:
 
         The search is marked as `cut` in that case.
         """
-        left = settings.looking_work * self._work
+        left = LOOKING_WORK * self._work
         while True:
             point = None
             with self._allowed(left) as spent:
@@ -332,7 +407,7 @@ class Search:
     @property
     def _work(self) -> float:
         """Return the work allowed for this search, in the units of `Allowance`."""
-        return settings.search_work * (settings.setting_work_share if self.remedy.of_setting else 1.0)
+        return settings.search_work * (SETTING_WORK_SHARE if self.remedy.of_setting else 1.0)
 
     @contextmanager
     def _allowed(self, work: float) -> Iterator[Allowance]:
@@ -368,12 +443,12 @@ class Search:
             at = points.shares[points.cost(self.goal).argmin(), 0]
             cost(np.clip(np.linspace(at - 1 / count, at + 1 / count, self.budget.points * 2), 0, 1)[None])
             return
-        size = max(5, min(self.budget.points * variables, settings.generation_points))
-        drawn = np.random.default_rng(settings.optimiser_seed).random((size, variables))
+        size = max(5, min(self.budget.points * variables, GENERATION_POINTS))
+        drawn = np.random.default_rng(OPTIMISER_SEED).random((size, variables))
         _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations, self._is_hopeless)
-        for away in settings.near_ranges:
+        for away in NEAR_RANGES:
             points = self.points
-            if not points.meets(self.goal).any() and points.nearness.max() < settings.hopeful_nearness:
+            if not points.meets(self.goal).any() and points.nearness.max() < HOPEFUL_NEARNESS:
                 return
             best = points.shares[points.cost(self.goal).argmin()]
             ends = [(max(0.0, at - away), min(1.0, at + away)) for at in best]
@@ -385,7 +460,7 @@ class Search:
     def _is_hopeless(self, generation: int) -> bool:
         """Tell whether, after some generations, no settings let the machines nearly settle."""
         points = self.points
-        return generation >= settings.hopeless_generations and points.nearness.max() < settings.hopeless_nearness
+        return generation >= HOPELESS_GENERATIONS and points.nearness.max() < HOPELESS_NEARNESS
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
         """Return coordinates between grid points at which a variable reaches the bandwidth limit.
@@ -397,7 +472,7 @@ class Search:
             return []
 
         def above(shares: np.ndarray) -> np.ndarray:
-            return np.log(self._bandwidth(shares[:, None]) / (limit * (1 - settings.bandwidth_reserve)))
+            return np.log(self._bandwidth(shares[:, None]) / (limit * (1 - BANDWIDTH_RESERVE)))
 
         over = above(grid)
         passed = np.flatnonzero((over[:-1] < 0) & (over[1:] >= 0))
@@ -422,7 +497,7 @@ class Search:
         goal, count, machines = self.goal, len(shares), self.machines.count
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
         bandwidth = self._bandwidth(shares)
-        far = bandwidth > settings.far_above_limit * _most(goal.bandwidth_limit)
+        far = bandwidth > FAR_ABOVE_LIMIT * _most(goal.bandwidth_limit)
         stable = np.flatnonzero((margin > goal.margin / 2) & ~(far & (len(self.remedy.variables) > 1)))
         settling, looser, slower, force = columns = [np.full((count, machines), np.inf) for _ in range(4)]
         for column in columns:
@@ -441,7 +516,7 @@ class Search:
 
         if self.slowest.size != machines:
             self.slowest = np.zeros(machines)
-        parts = np.split(np.argsort(-self.slowest, kind="stable"), [settings.first_machines])
+        parts = np.split(np.argsort(-self.slowest, kind="stable"), [FIRST_MACHINES])
         left = worth_it(stable)
         for part in parts:
             if left.size and part.size:
@@ -514,20 +589,20 @@ class Search:
         """
         points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
-        left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], settings.alike_share
+        left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], ALIKE_SHARE
         away = np.full(len(left), np.inf)  # distance from the inspected points
         enough, any_clear = self.goal.surely(self.fresh.count), False
         best, most = np.zeros((0, points.shares.shape[1])), 0.0
         soonest = left[:1]
-        for _ in range(settings.most_batches):
-            left, away = left[away > settings.alike_share], away[away > settings.alike_share]
+        for _ in range(MOST_BATCHES):
+            left, away = left[away > ALIKE_SHARE], away[away > ALIKE_SHARE]
             if not len(left):
                 break
             while (
-                len(batch := _apart(left[away > apart], settings.points_looked_at, apart)) < settings.points_looked_at
-                and apart > settings.alike_share
+                len(batch := _apart(left[away > apart], POINTS_LOOKED_AT, apart)) < POINTS_LOOKED_AT
+                and apart > ALIKE_SHARE
             ):
-                apart = max(settings.alike_share, apart / settings.widened_factor)
+                apart = max(ALIKE_SHARE, apart / WIDENED_FACTOR)
             looked_at, batch = batch, self._whole(batch)
             away = np.minimum(away, _distance(left, looked_at[~_same(looked_at, batch).any(axis=1)]))
             if not len(batch):
@@ -535,19 +610,17 @@ class Search:
             share = self.share(batch)
             if share.max() > most:
                 best, most = batch[[share.argmax()]], share.max()
-            few = _apart(batch[share >= enough], settings.survey_batch, settings.apart_share)
+            few = _apart(batch[share >= enough], SURVEY_BATCH, APART_SHARE)
             clear = self.clear(few) if len(few) else np.zeros(0, bool)
             any_clear |= bool(clear.any())
             if clear.any() and not _same(few[clear][:1], soonest).any():
                 yield from self._closer(few[clear][0])
             yield from few[clear]
             apart = (
-                settings.alike_share
-                if clear.any()
-                else settings.widened_factor * max(apart, settings.apart_share if len(few) else settings.alike_share)
+                ALIKE_SHARE if clear.any() else WIDENED_FACTOR * max(apart, APART_SHARE if len(few) else ALIKE_SHARE)
             )
             away = np.minimum(away, _distance(left, np.concatenate([batch[share < enough], few])))
-            away[_distance(left, few[~clear]) <= settings.apart_share] = 0.0
+            away[_distance(left, few[~clear]) <= APART_SHARE] = 0.0
         if not any_clear and len(best) and most < enough:
             yield from best[self.clear(best)]
 
@@ -559,17 +632,15 @@ class Search:
         """
         goal, closer = self.goal, list[np.ndarray]()
         cost = self.measured(point[None]).cost(goal)[0]
-        for number in range(settings.most_closer):
-            low, high = np.clip(point - settings.around_share, 0, 1), np.clip(point + settings.around_share, 0, 1)
-            drawn = low + (high - low) * qmc.Sobol(point.size, rng=settings.optimiser_seed + number).random(
-                settings.points_around
-            )
+        for number in range(MOST_CLOSER):
+            low, high = np.clip(point - AROUND_SHARE, 0, 1), np.clip(point + AROUND_SHARE, 0, 1)
+            drawn = low + (high - low) * qmc.Sobol(point.size, rng=OPTIMISER_SEED + number).random(POINTS_AROUND)
             self.tried.append(tried := self.measured(drawn, cost))
             costs = np.where(tried.whole, tried.cost(goal), np.inf)
             better = _apart(
                 drawn[np.argsort(costs, kind="stable")[: np.count_nonzero(costs < cost)]],
-                settings.points_looked_at,
-                settings.alike_share,
+                POINTS_LOOKED_AT,
+                ALIKE_SHARE,
             )
             robust = better[self.share(better) >= goal.surely(self.fresh.count)] if len(better) else better
             taken = next((one for one in robust if self.clear(one[None])[0]), None)
@@ -627,11 +698,15 @@ def _evolve(
         tol=0.0,
         atol=-1,  # never stop by this tolerance, even if all costs are equal
         callback=ended,
-        rng=settings.optimiser_seed,
+        rng=OPTIMISER_SEED,
         polish=False,
         vectorized=True,
         updating="deferred",
     )
+
+
+AGREED_COST = 0.01
+"""Relative difference of costs at which generations have converged."""
 
 
 def _agree(intermediate_result: Any) -> bool:
@@ -640,7 +715,7 @@ def _agree(intermediate_result: Any) -> bool:
     Points that break constraints may all be equally bad; the search must then go on.
     """
     costs = intermediate_result.population_energies
-    return bool(costs.max() < settings.worst_time and costs.std() <= settings.agreed_cost * costs.mean())
+    return bool(costs.max() < WORST_TIME and costs.std() <= AGREED_COST * costs.mean())
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:

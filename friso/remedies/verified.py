@@ -93,6 +93,15 @@ class Confirmation:
         return tuple(name for name, holds in parts.items() if holds)
 
 
+BANDWIDTHS_BESIDE = 2
+"""Bandwidths on either side at which a tuned stage is judged, from the required distance below to as far above.
+With two they are 1.095 apart, closer than the steps of a search for an edge. Fewer may miss a window; each costs as
+much as the stage's own."""
+
+MOVE_RTOL = 1e-6
+"""Tolerance of reported moves. Their settling times are then accurate to three digits."""
+
+
 @np.errstate(all="ignore")
 def confirmed(stage: Stage, goal: Goal) -> Confirmation:
     """Judge a stage at its own bandwidth, and at others within the goal's distance.
@@ -101,7 +110,7 @@ def confirmed(stage: Stage, goal: Goal) -> Confirmation:
     searched from more starts.
     """
     kernels(kernels_to_judge(structure(stage.flat())))
-    steps = settings.bandwidths_beside
+    steps = BANDWIDTHS_BESIDE
     factors = np.delete(goal.distance ** (np.arange(-steps, steps + 1) / steps), steps)
     flat, count = stage.flat(), len(factors)
     word, quiet = None, np.zeros(count, bool)
@@ -110,7 +119,7 @@ def confirmed(stage: Stage, goal: Goal) -> Confirmation:
         try:
             near = find_attractors(faster(flat, factors), count)
             quiet = near.certain & ~near.attracts
-            word = str(judge_many(flat, 1, settings.move_rtol)[0])
+            word = str(judge_many(flat, 1, MOVE_RTOL)[0])
         except Exhausted:
             if allowed.around is not None and allowed.around.left <= 0:
                 raise
@@ -121,6 +130,11 @@ NO_VARIABLES = np.zeros((1, 0))
 """Coordinates of the only point of a remedy without variables."""
 
 Certainty = Literal["works", "unsure", "given up", "does not work"]
+
+
+SURVEY_PARTS = 4
+"""Parts of the fresh machines, of which the first is surveyed before the others. It reveals most failing settings
+at a quarter of the cost."""
 
 
 @dataclass(frozen=True)
@@ -246,7 +260,7 @@ class Performance:
         Only machines that meet all other parts of the goal are surveyed, some of them first. If so many of these hunt
         that too few machines can meet the goal, the survey ends: the result then has the first machines only.
         """
-        first, others = np.split(np.arange(machines.count), [machines.count // settings.survey_parts])
+        first, others = np.split(np.arange(machines.count), [machines.count // SURVEY_PARTS])
         measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
         if np.count_nonzero(self._meets_all(goal) & ~measured._meets_all(goal)) > (1 - goal.share) * machines.count:
             return measured._first(first.size)
@@ -381,7 +395,7 @@ def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[s
     """
     remedy = Remedy.settled_on("", stage)
     return {
-        "moves": moves_of_points(remedy, NO_VARIABLES, machines, goal, rtol=settings.move_rtol),
+        "moves": moves_of_points(remedy, NO_VARIABLES, machines, goal, rtol=MOVE_RTOL),
         "margin": modulus_margins(remedy, NO_VARIABLES, machines, drive),
         "attraction": Attraction.none(machines.count),
     }
@@ -399,16 +413,24 @@ def _stiffness(flat: Mapping[str, Any]) -> float:
     return proportional
 
 
+PRESENT_CHECK_WORK = 3e8
+"""Work to check the present stage, about 4 s on one core. With less, more stages have no edge located."""
+
+
 def checked(stage: Stage) -> Case:
     """Check a stage as `friso check` does, with less work.
 
     The edge of hunting is included if it is located soon.
     """
     try:
-        with allowance(settings.present_check_work):
+        with allowance(PRESENT_CHECK_WORK):
             return check_given(stage)
     except Exhausted:  # raised by a part that must not be left out
         return check_given(stage)
+
+
+ROUNDED_SHARE = 2e-3
+"""Largest relative error of margin and bandwidth by rounding of tuned numbers."""
 
 
 def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
@@ -416,7 +438,7 @@ def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goa
 
     The reasons are names of `friso.questions.tune.present_words.DOUBTS`.
     """
-    rounded = 1 + settings.rounded_share
+    rounded = 1 + ROUNDED_SHARE
     listed = [*confirmation.doubts]
     if goal.bandwidth_limit is not None and not loop_bandwidth(confirmation.stage) <= goal.bandwidth_limit * rounded:
         listed.append("bandwidth")

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, StageError
@@ -16,9 +16,6 @@ from friso.intervals import WIDE_RATIO, Interval, UncertainValue, is_range, unce
 from friso.quantities import Quantity, positive, quoted
 from friso.stage.section import UNKNOWN, nearest_name, numeric_fields
 from friso.stage.tables import FRICTION, MOTOR_FRICTION, USUAL
-
-if TYPE_CHECKING:
-    from friso.stage.stage import Stage
 
 ContactRange = tuple[float, float]
 """Lowest and highest value of a range [SI]."""
@@ -146,7 +143,20 @@ def _guessed(ends: ContactRange, unit: str) -> UncertainValue:
     return UncertainValue(interval.middle, UNKNOWN, interval)
 
 
-def followed(stage: Stage, swept: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
+class GuessedStage(Protocol):
+    """What guesses need of a stage: its axis, its keys, and those that nobody knows."""
+
+    @property
+    def axis_kind(self) -> AxisKind: ...
+    @property
+    def unknown_keys(self) -> tuple[str, ...]: ...
+    @property
+    def guessed_keys(self) -> tuple[str, ...]: ...
+    def flat(self) -> dict[str, Any]: ...
+    def uncertain(self) -> dict[str, Interval]: ...
+
+
+def followed(stage: GuessedStage, swept: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
     """Return the guessed keys of a stage that follow a swept one, each with that key and its values [SI].
 
     `swept` has SI numbers or arrays by key. Values follow from Coulomb friction, or from static friction where that
@@ -168,7 +178,9 @@ def followed(stage: Stage, swept: Mapping[str, Any]) -> dict[str, tuple[str, Any
     return found
 
 
-def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, ContactRange]) -> dict[str, ContactRange]:
+def usual_ranges(
+    stage: GuessedStage, keys: Collection[str], bounds: Mapping[str, ContactRange]
+) -> dict[str, ContactRange]:
     """Return what similar machines have for some keys of [friction] that nobody knows, as ranges [SI] by key.
 
     They follow from Coulomb friction, or else from static friction, and from the contact that the stage's guess names;
@@ -192,7 +204,7 @@ def usual_ranges(stage: Stage, keys: Collection[str], bounds: Mapping[str, Conta
     return {key: cut(ranges[key], bounds.get(key, ranges[key])) for key in keys if key in ranges and key in flat}
 
 
-def guessed_ratios(stage: Stage) -> dict[str, tuple[str, Interval]]:
+def guessed_ratios(stage: GuessedStage) -> dict[str, tuple[str, Interval]]:
     """Return, for keys of [friction] that grow with another one over machines, that key and the range of their ratio.
 
     They are static friction with Coulomb friction, and the damping of bristles with their stiffness. Both keys must be
@@ -212,7 +224,7 @@ def guessed_ratios(stage: Stage) -> dict[str, tuple[str, Interval]]:
     return found
 
 
-def _contact_of(stage: Stage, table: str = "friction") -> ContactKind:
+def _contact_of(stage: GuessedStage, table: str = "friction") -> ContactKind:
     """Return the contact that the guess in a `table` of a stage names, or any contact."""
     guess = getattr(getattr(stage, table), "guess", None)
     return _understood(guess, stage.axis_kind)[0] if guess else any_contact(stage.axis_kind)

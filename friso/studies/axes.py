@@ -24,7 +24,6 @@ from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted, si_value
 from friso.stage import Stage, parse_set
 from friso.stage.controllers import KIND
-from friso.studies.settings import settings
 
 EXAMPLE = 'masses.stage = "0.3 * mass" or friction.static = "max(friction.static, friction.coulomb)"'
 
@@ -349,6 +348,10 @@ def _range(name: str, text: str, reader: _Reader) -> SweptRange:
     return SweptRange(name, first, last, reader.unit, _count(text, match["count"]), scale)
 
 
+MOST_AXIS_POINTS = 1_000_000_000
+"""Most points of an axis. Longer ones take more than 8 GB before a cell is run."""
+
+
 def _count(text: str, digits: str | None) -> int | None:
     """Read the number of points of a range from its `digits`, None if it has none.
 
@@ -357,8 +360,8 @@ def _count(text: str, digits: str | None) -> int | None:
     if digits is None:
         return None
     count = int(digits) if digits.strip().isascii() and digits.strip().isdigit() and len(digits) < 20 else 0
-    if not 2 <= count <= settings.most_axis_points:
-        expected = f"2 points or more, at most {settings.most_axis_points:,}"
+    if not 2 <= count <= MOST_AXIS_POINTS:
+        expected = f"2 points or more, at most {MOST_AXIS_POINTS:,}"
         raise InputError("", quoted(text, f"{digits.strip()} points"), expected, RANGE_EXAMPLE)
     return count
 
@@ -463,12 +466,10 @@ class Samples:
             )
         for name, number, least in (("samples", self.count, 2), ("seed", self.seed, 0)):
             whole = (
-                isinstance(number, Integral)
-                and not isinstance(number, bool)
-                and least <= number <= settings.most_axis_points
+                isinstance(number, Integral) and not isinstance(number, bool) and least <= number <= MOST_AXIS_POINTS
             )
             if not (whole or (number is None and name == "samples")):
-                expected = f"a whole number from {least} to {settings.most_axis_points:,}"
+                expected = f"a whole number from {least} to {MOST_AXIS_POINTS:,}"
                 raise InputError(name, quoted(number), expected, f"{name}=1024")
         if self.method not in METHODS:
             raise InputError("method", quoted(self.method), f"one of {', '.join(METHODS)}", 'method="sobol"')

@@ -39,7 +39,9 @@ from friso.progress import Progress, silent
 from friso.stage import Stage, violations
 from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
-from friso.studies.settings import settings
+
+LOOSEST_RTOL = 1e-6
+"""Loosest tolerance of orbits. Looser ones lose the branch at a fold."""
 
 
 def boundary(
@@ -77,10 +79,8 @@ def boundary(
         if key.startswith("motion."):
             problem = "a key of the motion, which plays no part"
             raise InputError(key, problem, "a key of the stage or its controller", example)
-    if rtol > settings.loosest_rtol:
-        raise InputError(
-            "rtol", f"{rtol:g}", f"at most {settings.loosest_rtol:g}, since multipliers are derivatives", "1e-9"
-        )
+    if rtol > LOOSEST_RTOL:
+        raise InputError("rtol", f"{rtol:g}", f"at most {LOOSEST_RTOL:g}, since multipliers are derivatives", "1e-9")
     space = Space(ranges, lambda values: flat_cells(stage, {}, values))
     _refuse_impossible(space, example)
     kernels([KernelRequest(space.form, variational) for variational in (False, True)])
@@ -88,9 +88,13 @@ def boundary(
     return (diagram if len(ranges) == 1 else plane)(space, rtol, progress=progress)
 
 
+TRIED_VALUES = 9
+"""Values tried over a range. Fewer miss a range with cycles in its middle only."""
+
+
 def _refuse_impossible(space: Space, example: str) -> None:
     """Raise InputError if no stage in the ranges is valid, from a coarse grid of stages."""
-    points = space.grid(settings.tried_values)
+    points = space.grid(TRIED_VALUES)
     if not space.allowed(points).any():
         key, why = space.ranges[0].key, violations(space.flat(space.values(points)))[0][1]
         raise InputError(key, "ranges that no stage may have", why, example)

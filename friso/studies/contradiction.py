@@ -15,7 +15,6 @@ from friso.identification.experiments.hunting import swings_of
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import digit_of, noise_of
 from friso.stage import Stage
-from friso.studies.settings import settings
 
 CHANGES: Mapping[str, tuple[str, ...]] = {
     "friction.static": ("friction.static",),
@@ -63,6 +62,13 @@ class ExplainingChange:
     period: float | None
 
 
+PERIODS_OF_A_STANDING_LOG = 2.0
+"""Periods of the predicted cycle for which a reference must stand before rest in a log contradicts it."""
+
+SHORTEST_STANDING = 0.3  # [s]
+"""Shortest time for which a reference stands that shows whether a machine rests: half of the quickest cycles."""
+
+
 @dataclass(frozen=True)
 class Contradiction:
     """What a log shows, what the stage does, and what would explain a difference.
@@ -93,9 +99,13 @@ class Contradiction:
         """Tell whether the log decides nothing: it neither swings nor rests, is too short, or the stage does both."""
         if self.standing.hunts:
             return False
-        least = settings.periods_of_a_standing_log * (self.period or 0.0)
-        brief = self.standing.time < max(least, settings.shortest_standing)
+        least = PERIODS_OF_A_STANDING_LOG * (self.period or 0.0)
+        brief = self.standing.time < max(least, SHORTEST_STANDING)
         return not self.standing.rests or brief or (self.attracts and self.may_rest)
+
+
+RATIO_OF_ALIKE_SWINGS = 1.25
+"""Largest ratio of swings, and of periods, that count as alike: friction of one machine differs by as much."""
 
 
 def alike(standing: Standing, swing: float | None, period: float | None) -> bool:
@@ -103,7 +113,26 @@ def alike(standing: Standing, swing: float | None, period: float | None) -> bool
     if standing.swing is None or standing.period is None or swing is None or period is None:
         return False
     off = max(abs(np.log(swing / standing.swing)), abs(np.log(period / standing.period)))
-    return bool(off < np.log(settings.ratio_of_alike_swings))
+    return bool(off < np.log(RATIO_OF_ALIKE_SWINGS))
+
+
+NOISES_AT_REST = 10.0
+"""Largest motion of a machine at rest, peak to peak, in standard deviations of the position's noise."""
+
+COUNTS_OF_A_DITHER = 3
+"""Most levels of a position that jumps between counts of its encoder instead of swinging."""
+
+NOISES_OF_A_SWING = 4.0
+"""Smallest amplitude of a swing, in standard deviations of the position's noise."""
+
+UNEVENNESS_OF_A_SWING = 0.4
+"""Largest standard deviation of the amplitude of a swing, relative to its mean. Noise is less even."""
+
+SAMPLES_OF_A_SWING = 10.0
+"""Shortest period of a swing in samples."""
+
+SHARE_OF_A_LASTING_SWING = 0.5
+"""Smallest share of the time at which a reference stands that a lasting swing takes."""
 
 
 def standing_of(log: Log) -> Standing:
@@ -123,16 +152,16 @@ def standing_of(log: Log) -> Standing:
     position = signals["position"]
     noise, digit = noise_of(position), digit_of(position)
     late = position[len(position) // 2 :]
-    rests = bool(np.ptp(late) <= max(settings.noises_at_rest * noise, 3 * digit))
+    rests = bool(np.ptp(late) <= max(NOISES_AT_REST * noise, 3 * digit))
     try:
         swings = swings_of(part)
     except InputError:
         return Standing(whole, None, None, rests)
-    dithers = len(np.unique(position)) <= settings.counts_of_a_dither
-    seen = swings.amplitude > max(settings.noises_of_a_swing * noise, 2 * digit) and not dithers
-    even = swings.amplitude_deviation < settings.unevenness_of_a_swing * swings.amplitude
-    slow = swings.period > settings.samples_of_a_swing * log.sample_time
-    lasts = swings.count * swings.period > settings.share_of_a_lasting_swing * whole
+    dithers = len(np.unique(position)) <= COUNTS_OF_A_DITHER
+    seen = swings.amplitude > max(NOISES_OF_A_SWING * noise, 2 * digit) and not dithers
+    even = swings.amplitude_deviation < UNEVENNESS_OF_A_SWING * swings.amplitude
+    slow = swings.period > SAMPLES_OF_A_SWING * log.sample_time
+    lasts = swings.count * swings.period > SHARE_OF_A_LASTING_SWING * whole
     if seen and even and slow and lasts:
         return Standing(whole, swings.amplitude, swings.period, False, swings.middle)
     return Standing(whole, None, None, rests)
@@ -140,22 +169,32 @@ def standing_of(log: Log) -> Standing:
 
 def _longest_stand(reference: np.ndarray) -> tuple[int, int]:
     """Return the first sample and the end of the longest stretch at which a reference does not change."""
-    still = max(np.finfo(np.float32).eps * float(np.ptp(reference)), settings.noises_at_rest * noise_of(reference))
+    still = max(np.finfo(np.float32).eps * float(np.ptp(reference)), NOISES_AT_REST * noise_of(reference))
     moves = np.abs(np.diff(reference)) > still
     ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
     longest = int(np.argmax(np.diff(ends)))
     return int(ends[longest]), int(ends[longest + 1])
 
 
+REACH_OF_A_CHANGE = 8.0
+"""Largest factor tried on keys of a stage to explain a log."""
+
+CHANGES_TRIED = 37
+"""Factors tried on a key, 12 % apart, less than the difference that swings may have to be alike."""
+
+RTOL_OF_OWN_MOVES = 1e-6
+"""Relative tolerance of the run of a stage's own move that is compared with a log."""
+
+
 def contradiction(stage: Stage, standing: Standing) -> Contradiction:
     """Compare what a log shows with what attracts the stage, and look for single changes that explain a difference."""
     flat = stage.flat()
-    factors = np.geomspace(1 / settings.reach_of_a_change, settings.reach_of_a_change, settings.changes_tried)
+    factors = np.geomspace(1 / REACH_OF_A_CHANGE, REACH_OF_A_CHANGE, CHANGES_TRIED)
     own = _attracted(flat, np.ones(1))
     swing, period, middle = (values[0] if own[0][0] else None for values in own[2:])
     sure = bool(own[1][0]) and not stage.uncertain() and not stage.doubt
     attracts = bool(own[0][0])
-    may_rest = attracts and not standing.hunts and judge_many(flat, 1, settings.rtol_of_own_moves)[0] != "hunts"
+    may_rest = attracts and not standing.hunts and judge_many(flat, 1, RTOL_OF_OWN_MOVES)[0] != "hunts"
     plain = Contradiction(standing, attracts, sure, swing, period, (), may_rest, middle or 0.0)
     if plain.agrees:
         return plain

@@ -103,6 +103,13 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     return {name: by_variant[same] for name, same in _same(stage).items()}
 
 
+FINEST_STEP = 1e-6
+"""Relative difference below which two bandwidths are one."""
+
+STEP_OF_BANDWIDTHS = 1.26
+"""Ratio of bandwidths that are tried, about three an octave. Windows of hunting narrower than a step are missed."""
+
+
 @dataclass(frozen=True)
 class DrawnBandwidths:
     """At which bandwidths drawn stages hunt.
@@ -132,13 +139,13 @@ class DrawnBandwidths:
 
         It reaches over a coarse step at least, so that the cure does not stand on an edge.
         """
-        at = np.flatnonzero(self.factors > 1 + settings.finest_step)
+        at = np.flatnonzero(self.factors > 1 + FINEST_STEP)
         for first in at:
             run = 0
             while first + run < len(self.factors) and self.quiet[first + run]:
                 run += 1
             low, high = self.factors[first], self.factors[first + run - 1]
-            if run and high >= low * settings.step_of_bandwidths * (1 - settings.finest_step):
+            if run and high >= low * STEP_OF_BANDWIDTHS * (1 - FINEST_STEP):
                 return float(low), float(high)
         return None
 
@@ -167,9 +174,26 @@ class DrawnBandwidths:
         return low, high
 
 
+MOST_OPEN_DRAWS = 0.05
+"""Largest share of draws that hunt or have no certain verdict where the others decide: advice holds for 95 %."""
+
+
 def _quiet(hunts: np.ndarray) -> np.ndarray:
     """Tell whether nearly all stages surely do not hunt; `hunts` has a row for each, as in `DrawnBandwidths`."""
-    return (hunts != 0).mean(axis=0) <= settings.most_open_draws
+    return (hunts != 0).mean(axis=0) <= MOST_OPEN_DRAWS
+
+
+TRIAL_DRAWS = 16
+"""Draws that are timed first. Fewer are misled by a single slow one."""
+
+WORK_OF_BANDWIDTHS = 3e8
+"""Work of trying draws at other bandwidths, about as much as the verdicts on them."""
+
+USUAL_BANDWIDTHS = 10
+"""Bandwidths that are usually tried, among which the work is divided."""
+
+DRAWS_OF_BANDWIDTHS = 64
+"""Most draws tried at other bandwidths. If none of 59 hunts, 95 % of all do not, with 95 % confidence."""
 
 
 def by_bandwidth(stage: Stage, sample: Sample) -> DrawnBandwidths | None:
@@ -181,12 +205,12 @@ def by_bandwidth(stage: Stage, sample: Sample) -> DrawnBandwidths | None:
     own = bandwidth(stage.flat())
     if (own is None and not (stage.controller and stage.controller.speeds_up)) or not can_hunt(stage.flat()):
         return None
-    trial = min(sample.count, settings.trial_draws)
+    trial = min(sample.count, TRIAL_DRAWS)
     with allowance() as spent:
         ladder = _Ladder(stage, sample, trial, own)
         ladder.hunts(0)
-    count = int(settings.work_of_bandwidths / settings.usual_bandwidths * trial / max(spent.used, 1.0))
-    if (count := min(sample.count, count, settings.draws_of_bandwidths)) > trial:
+    count = int(WORK_OF_BANDWIDTHS / USUAL_BANDWIDTHS * trial / max(spent.used, 1.0))
+    if (count := min(sample.count, count, DRAWS_OF_BANDWIDTHS)) > trial:
         ladder = _Ladder(stage, sample, count, own)
     if ladder.hunts(0).any():
         ladder.climb()
@@ -195,6 +219,16 @@ def by_bandwidth(stage: Stage, sample: Sample) -> DrawnBandwidths | None:
     places = sorted(ladder.columns)
     columns = np.stack([ladder.columns[one] for one in places], axis=1)
     return DrawnBandwidths(np.array([*map(ladder.factor, places)]), columns, own)
+
+
+HALVINGS_OF_BANDWIDTHS = 2
+"""Halvings of the step in which hunting ends. Fewer advise more bandwidth than is needed."""
+
+REACH_OF_BANDWIDTHS = 8.0
+"""Largest factor up and down to which bandwidths are tried. Few machines can be made faster by more."""
+
+MOST_UNSTABLE_DRAWS = 0.5
+"""Largest share of draws whose loop may be unstable at a bandwidth before no faster ones are tried."""
 
 
 @dataclass(frozen=True)
@@ -210,16 +244,16 @@ class _Ladder:
     own: float | None
     columns: dict[int, np.ndarray] = field(default_factory=dict)
 
-    coarse: ClassVar[int] = 1 << settings.halvings_of_bandwidths
+    coarse: ClassVar[int] = 1 << HALVINGS_OF_BANDWIDTHS
     """Places in a coarse step."""
 
     def factor(self, place: int) -> float:
         """Return the bandwidth at a place, as a factor on that of the stage."""
-        return float(settings.step_of_bandwidths ** (place / self.coarse))
+        return float(STEP_OF_BANDWIDTHS ** (place / self.coarse))
 
     def within(self, place: int) -> bool:
         """Tell whether a place is within reach."""
-        return 1 / settings.reach_of_bandwidths <= self.factor(place) <= settings.reach_of_bandwidths
+        return 1 / REACH_OF_BANDWIDTHS <= self.factor(place) <= REACH_OF_BANDWIDTHS
 
     def hunts(self, place: int, thoroughly: bool = False) -> np.ndarray:
         """Return which stages hunt at a place: 1, 0, or NaN where that is not certain or a loop unstable, (count,).
@@ -247,7 +281,7 @@ class _Ladder:
             place += self.coarse
             column = self.hunts(place)
             quiet = quiet + 1 if _quiet(column) else 0
-            if np.isnan(column).mean() > settings.most_unstable_draws:
+            if np.isnan(column).mean() > MOST_UNSTABLE_DRAWS:
                 return
         if quiet < 2:
             return
@@ -266,15 +300,23 @@ class _Ladder:
             self.hunts(place)
 
 
+USUAL_WORK = 3e8
+"""Work of a check without a requested number of draws (see `friso.engine.allowance`). It takes about 4 s on one
+core."""
+
+USUAL_DRAWS = 256
+"""Default draws. They give a fraction to five percent; more make a check wait."""
+
+
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
     """Return how many stages to draw for a fixed amount of work, measured on a few draws.
 
     The number is a power of two, for which Sobol's points are spread evenly.
     """
     with allowance() as spent:
-        fates(stage, draw(stage, correlations, settings.trial_draws, seed), rtol)
-    most = min(settings.trial_draws * settings.usual_work / max(spent.used, 1.0), settings.usual_draws)
-    return 1 << max(settings.trial_draws.bit_length() - 1, int(np.log2(most)))
+        fates(stage, draw(stage, correlations, TRIAL_DRAWS, seed), rtol)
+    most = min(TRIAL_DRAWS * USUAL_WORK / max(spent.used, 1.0), USUAL_DRAWS)
+    return 1 << max(TRIAL_DRAWS.bit_length() - 1, int(np.log2(most)))
 
 
 @dataclass(frozen=True)
@@ -323,7 +365,7 @@ class Draws:
         tried = self.bandwidths.get(name)
         next_to = tried is not None and not attracted.any() and tried.hunting_reaches is not None
         differ = next_to or len({*attracted[~open_ones].tolist()}) > 1
-        return bool(open_ones.mean() > settings.most_open_draws or differ)
+        return bool(open_ones.mean() > MOST_OPEN_DRAWS or differ)
 
     def unit(self, key: str) -> str:
         """Return the SI unit of a key."""
@@ -382,6 +424,13 @@ class FrictionLevels:
         return (float(self.coulomb[at[0]]), float(self.coulomb[at[-1]])) if at.size else None
 
 
+ACCELERATIONS_OF_FRICTION = (0.01, 10.0)  # [m/s^2]
+"""Range of Coulomb friction over mass that bearings have, from air-like to a preloaded screw on a light stage."""
+
+LEVELS_OF_FRICTION = 10
+"""Levels of Coulomb friction tried over that range, a factor of two apart."""
+
+
 def friction_levels(stage: Stage) -> FrictionLevels | None:
     """Draw machines like a stage without friction at levels of Coulomb friction, and see which of them hunt.
 
@@ -391,7 +440,7 @@ def friction_levels(stage: Stage) -> FrictionLevels | None:
     if stage.states_friction:
         return None
     mass = float(moving_mass(stage.flat()))
-    levels = mass * np.geomspace(*settings.accelerations_of_friction, settings.levels_of_friction)
+    levels = mass * np.geomspace(*ACCELERATIONS_OF_FRICTION, LEVELS_OF_FRICTION)
     columns = []
     for level in levels:
         column = _hunting(stage, float(level))
@@ -399,6 +448,10 @@ def friction_levels(stage: Stage) -> FrictionLevels | None:
             return None
         columns.append(column)
     return FrictionLevels(levels, np.stack(columns, axis=1))
+
+
+MACHINES_OF_A_LEVEL = 32
+"""Machines drawn at each level of Coulomb friction."""
 
 
 def _hunting(stage: Stage, coulomb: float) -> np.ndarray | None:
@@ -417,7 +470,7 @@ def _hunting(stage: Stage, coulomb: float) -> np.ndarray | None:
     unknown = ", ".join(f"friction.{key}" for key in ranges if key != "coulomb")
     try:
         tried = Stage(**{**stage.as_written(), "friction": table, "unknown": unknown})
-        sample = draw(tried, Correlations(), settings.machines_of_a_level, 0)
+        sample = draw(tried, Correlations(), MACHINES_OF_A_LEVEL, 0)
     except StageError:  # uncertain keys of the stage itself may hardly ever fit together
         return None
     flat = laid_over(tried, sample.keys)

@@ -18,7 +18,6 @@ from friso.progress import Progress, silent
 from friso.studies.axes import SAMPLE, SweptAxis
 from friso.studies.cells import flat_cells
 from friso.studies.metric import in_order, metrics
-from friso.studies.settings import settings
 from friso.studies.study import Dimension, Study
 from friso.studies.sweep import Crew, run_in_memory
 
@@ -127,6 +126,13 @@ def fine_edges(
     return MapEdges(*placed) if here is None else MapEdges(*placed, *search.around(here, sides))
 
 
+SEEN_EDGE_PRECISION = 5e-3  # [ranges]
+"""Precision of edges of a map by verdicts alone, which take longer. It is a fifth of a cell of a usual map."""
+
+EDGE_PRECISION = 5e-4  # [ranges]
+"""Precision of edges of a map at which a closed orbit ceases to attract. Three digits of them are sure."""
+
+
 @dataclass(frozen=True)
 class _Search:
     """Verdicts and cycles at further places of a map, whose axes are the ranges of a `space`."""
@@ -195,7 +201,7 @@ class _Search:
         A place is inside where that is at least the limit. An uncertain one counts as inside or outside, as said.
         """
         start, end, unsure = start.copy(), end.copy(), np.zeros(len(limits), bool)
-        precision = settings.seen_edge_precision if tell == self.levels else settings.edge_precision
+        precision = SEEN_EDGE_PRECISION if tell == self.levels else EDGE_PRECISION
         while (going := np.flatnonzero(np.abs(end - start).max(axis=1, initial=0.0) > precision)).size:
             middle = (start[going] + end[going]) / 2
             values = tell(middle)

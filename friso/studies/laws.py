@@ -27,7 +27,6 @@ from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.section import list_fields, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
-from friso.studies.settings import settings
 
 
 @dataclass(frozen=True)
@@ -42,21 +41,31 @@ class HysteresisLoop:
     stiffness: float
 
 
+POINTS_OF_A_LOOP = 1000
+"""Samples of a period of a hysteresis loop. Fewer cut its corners."""
+
+LOOP_PERIODS = 3
+"""Periods of a hysteresis loop, of which the last counts. Fewer still drift."""
+
+LOOP_TOLERANCE = 1e-6
+"""Relative tolerance of the solver along a loop, below the last digit of the table."""
+
+
 def hysteresis_loop(flat: Mapping[str, Any], amplitude: float, speed: float) -> HysteresisLoop:
     """Compute the last of several hysteresis loops of a stage's friction law.
 
     `flat` has the stage's keys. A body is moved back and forth by the `amplitude` [m] at a steady `speed` [m/s], from
     rest with unbent bristles.
     """
-    law, points = flat["friction.model"], settings.points_of_a_loop
+    law, points = flat["friction.model"], POINTS_OF_A_LOOP
     shape = kernel(Dragged(law, friction_law(law).variant(flat)))
     # first a quarter, then whole loops from one end, as triangles with the same speed throughout
-    phase = np.arange(points // 4 + settings.loop_periods * points + 1) / points
+    phase = np.arange(points // 4 + LOOP_PERIODS * points + 1) / points
     place = amplitude * (2 / np.pi) * np.arcsin(np.sin(2 * np.pi * phase))
     inputs = Inputs(place, np.zeros(len(place)), 4 * amplitude / speed / points)
     starts = np.zeros((1, shape.initial_size))
     starts[:, shape.velocity] = inputs.velocity[0]
-    (run,) = run_driven(shape, {**flat, "motion.duration": 1.0}, 1, inputs, starts, settings.loop_tolerance)
+    (run,) = run_driven(shape, {**flat, "motion.duration": 1.0}, 1, inputs, starts, LOOP_TOLERANCE)
     force = np.diff(run.states[0, :, -1]) / inputs.sample_time
     last, moved = force[-points:], np.diff(place)[-points:]
     middles = (place[1:] + place[:-1])[-points:] / 2
@@ -194,16 +203,28 @@ def compared(
     return LawConversion(made, items, left_open, passive_where(flat))
 
 
+LOOP_SPEED = 1e-3
+"""Speed of a loop in Stribeck velocities. Faster loops lose energy in the damping of bristles, which is reported
+separately."""
+
+LOOP_AMPLITUDES = (0.1, 0.5)
+"""Amplitudes of loops, in units of static friction over initial stiffness: one with hardly any slip, one with
+slip."""
+
+LOOP_ERROR = 0.05
+"""Relative difference of loop areas or stiffnesses that a log hardly shows."""
+
+
 def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
     """Yield the changes of slow hysteresis loops between both laws: of their area and stiffness.
 
     The loops have fractions of the deflection at break-away as amplitudes.
     """
-    deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
-    for share in settings.loop_amplitudes:
+    deflection, speed = before.levels.static / before.stiffness, LOOP_SPEED * before.levels.stribeck_velocity
+    for share in LOOP_AMPLITUDES:
         old, new = (hysteresis_loop(stage.flat(), share * deflection, speed) for stage in (source, made))
-        yield _number("loop area", old.area, new.area, settings.loop_error)
-        yield _number("loop stiffness", old.stiffness, new.stiffness, settings.loop_error)
+        yield _number("loop area", old.area, new.area, LOOP_ERROR)
+        yield _number("loop stiffness", old.stiffness, new.stiffness, LOOP_ERROR)
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -245,12 +266,16 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
     return MeasuredChange("curve", float(np.abs(new - old).max() / before.levels.static))
 
 
+CURVE_ERROR = 0.02
+"""Largest difference of virgin curves that a measurement cannot resolve."""
+
+
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
     """Return the change of the virgin curve, at the displacement where it differs most."""
     if not after.stiffness:
-        return MeasuredChange("virgin", float(before.stiffness > 0), settings.curve_error)
+        return MeasuredChange("virgin", float(before.stiffness > 0), CURVE_ERROR)
     new = np.interp(before.displacement, after.displacement, after.force)
-    return MeasuredChange("virgin", before.misfit(new), settings.curve_error)
+    return MeasuredChange("virgin", before.misfit(new), CURVE_ERROR)
 
 
 NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "viscous"))

@@ -28,7 +28,6 @@ from friso.errors import StoreError, one_line
 from friso.platform.system import cause_of, delete_file, once_free
 from friso.stage.arguments import check_arguments
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
-from friso.studies.settings import settings
 from friso.studies.store_files import (
     CHUNK,
     DESCRIPTION,
@@ -149,17 +148,29 @@ def own_at(path: Path) -> Own:
     raise StoreError("", actual, f"a copy of it, or {_ANEW}", _EXAMPLE, str(path))
 
 
+SURVEYED_BLOCK = 32
+"""Cells of a block with surveys of a hundred runs each, so that an interruption costs seconds."""
+
+STORED_BLOCK = 1024
+"""Cells of a block in a study with at most the usual number of blocks."""
+
+LEAST_BLOCKS = 8
+"""Fewest blocks of a store, so that an interruption loses an eighth of a study at most."""
+
+LARGEST_STORED_BLOCK = 16384
+"""Largest block of a store [cells]. A larger one is read whole for a single cell."""
+
+USUAL_BLOCKS = 250
+"""Usual most blocks of a store. With more, writing delays the workers."""
+
+
 class Store:
     """The store of a study in a folder at `path`, locked by this process while open."""
 
     def __init__(self, path: Path, study: Study) -> None:
         self.path, self.study = path, study
-        usual = min(
-            settings.surveyed_block if study.cycles else settings.stored_block, study.cells // settings.least_blocks
-        )
-        self.blocks = study.block_shape(
-            max(16, usual, min(settings.largest_stored_block, study.cells // settings.usual_blocks))
-        )
+        usual = min(SURVEYED_BLOCK if study.cycles else STORED_BLOCK, study.cells // LEAST_BLOCKS)
+        self.blocks = study.block_shape(max(16, usual, min(LARGEST_STORED_BLOCK, study.cells // USUAL_BLOCKS)))
 
     @classmethod
     @contextmanager
@@ -358,7 +369,7 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
 
     words_once: dict[str, str] = {}
     decoded = np.empty(texts.shape, dtype=object)
-    rows = max(1, settings.largest_stored_block // max(1, int(np.prod(texts.shape[1:]))))
+    rows = max(1, LARGEST_STORED_BLOCK // max(1, int(np.prod(texts.shape[1:]))))
     for first in range(0, texts.shape[0], rows):
         codes, words = pd.factorize(texts[first : first + rows].values.ravel())
         once = np.array([words_once.setdefault(str(word), str(word)) for word in words], dtype=object)

@@ -35,7 +35,6 @@ from friso.studies.axes import (
 )
 from friso.studies.cells import flat_cells
 from friso.studies.metric import every_variable, in_order, metrics, usual_metrics
-from friso.studies.settings import settings
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -352,6 +351,11 @@ def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
     return axis.axis()
 
 
+MOST_MOTIONS = 100_000
+"""Most cells whose motions are looked at before a study begins. More take seconds; larger maps over a motion have
+their extremes among fewer."""
+
+
 def _check_verdicts(study: Study) -> None:
     """Refuse verdicts on stages whose reference keeps moving, since there are none.
 
@@ -366,7 +370,7 @@ def _check_verdicts(study: Study) -> None:
         return
     if any(name.startswith("motion.") for name in varied):
         numeric = {axis.name for axis in study.axes if axis.numeric}
-        columns = study.columns(np.arange(min(study.cells, settings.most_motions)))
+        columns = study.columns(np.arange(min(study.cells, MOST_MOTIONS)))
         cells.append(flat_cells(study.stage, study.links, {name: columns[name] for name in numeric}))
     if not all(map(rests, cells)):
         actual = f'verdicts, with motion.kind = "{flat["motion.kind"]}", whose reference keeps moving'

@@ -54,6 +54,20 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 
+LOOK_INTERVAL = 0.05  # [s]
+"""Interval between checks for cancellation. Longer ones are felt after Ctrl-C."""
+
+BLOCK_TIMEOUT = 10.0  # [s]
+"""Time within which cancelled blocks end."""
+
+LARGEST_SURVEY_BLOCK = 256
+"""Largest block of a survey [cells], which needs a hundred runs for each cell. Larger ones report progress too
+rarely."""
+
+LARGEST_MEMORY_BLOCK = 2048
+"""Largest block in memory [cells]. It fills the processor's registers nearly to its end."""
+
+
 @dataclass
 class Crew:
     """The workers of a study: an executor, with its size and a function that computes a block.
@@ -95,19 +109,19 @@ class Crew:
                     flying[self._submit(*job)] = job
                 if not flying:
                     return
-                for future in wait(flying, settings.look_interval, FIRST_COMPLETED).done:
+                for future in wait(flying, LOOK_INTERVAL, FIRST_COMPLETED).done:
                     yield *flying.pop(future), self._result(future)
         finally:
             self.cancel[0] = 1
             if not self.broken:  # a failed executor would stumble over cancelled futures and leave processes behind
                 for future in flying:
                     future.cancel()
-                wait(flying, timeout=settings.block_timeout)
+                wait(flying, timeout=BLOCK_TIMEOUT)
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, CellBlock]]:
         """Yield the blocks of studies: as large as memory allows, but enough for all workers."""
         for study in studies:
-            largest = settings.largest_survey_block if study.cycles else settings.largest_memory_block
+            largest = LARGEST_SURVEY_BLOCK if study.cycles else LARGEST_MEMORY_BLOCK
             shape = study.block_shape(max(1, min(largest, study.cells // self.shares)))
             yield from ((study, block) for block in study.blocks(shape))
 

@@ -27,7 +27,7 @@ from friso.stage import Stage
 from friso.stage.rig import Floor
 from friso.version import VERSION
 from friso.virtual_rig.settings import RigSettings, settings
-from friso.virtual_rig.task import SAMPLE_TIME, MoveTask, own_motion, tables
+from friso.virtual_rig.task import SAMPLE_TIME, TABLE_MARGIN, MoveTask, own_motion, tables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,6 +106,10 @@ def run(
     yield from run_flat(as_built_keys(stage, changes), stage.floor, task, seeds, interval, threads)
 
 
+SAMPLE_MEMORY = 2.5e8  # [B]
+"""Memory for the samples of the runs in progress. Larger machines gain nothing from more."""
+
+
 def run_flat(
     flat: Mapping[str, Any],
     floor: Floor | None,
@@ -126,12 +130,16 @@ def run_flat(
     form = AsBuilt.of(first_run)
     shape = kernel(replace(form, structure=replace(form.structure, reference=task.form)), method=METHOD)
     count = int(np.ceil(task.duration / interval * (1 - 1e-12)))
-    chunk = max(8, int(settings.sample_memory / (8 * count * len(shape.full_state))))
+    chunk = max(8, int(SAMPLE_MEMORY / (8 * count * len(shape.full_state))))
     for first in range(0, len(seeds), chunk):
         numbers = np.arange(first, min(first + chunk, len(seeds)))
         part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
         part["drive.seed"] = np.asarray(seeds)[numbers].astype(float)
         yield _recorded(shape, part, floor, task.of_runs(numbers), numbers, (interval, count, threads), outputs)
+
+
+MOST_DELAY_SAMPLES = 64
+"""Largest delay in samples. Longer delays take memory for every sample of every run."""
 
 
 def _check(flat: Mapping[str, Any], interval: float) -> None:
@@ -144,14 +152,18 @@ def _check(flat: Mapping[str, Any], interval: float) -> None:
     if "rail.seed" in flat and not varied:
         actual = f'a [rail], but friction "{flat["friction.model"]}" without a static or Coulomb level to vary along it'
         raise InputError("rail", actual, "no [rail], or a law with such a level", 'model = "lugre"')
-    if whole_samples(flat) > settings.most_delay_samples:
+    if whole_samples(flat) > MOST_DELAY_SAMPLES:
         actual = f"{flat['drive.delay']:g} s, {whole_samples(flat)} samples of {flat['drive.sample_time']:g} s"
-        raise InputError("drive.delay", actual, f"at most {settings.most_delay_samples} samples", 'delay = "100 us"')
+        raise InputError("drive.delay", actual, f"at most {MOST_DELAY_SAMPLES} samples", 'delay = "100 us"')
     samples = interval / flat["drive.sample_time"]
     if samples < 1 - 1e-9 or abs(samples - round(samples)) > 1e-6:
         step = flat["drive.sample_time"]
         expected = f"a whole number of samples of the drive, {step:g} s each"
         raise InputError("interval", f"{interval:g} s", expected, f"{max(1, round(samples)) * step:g} s")
+
+
+STEPS_PER_SAMPLE = 200
+"""Largest mean number of steps per sample. Runs that need more chatter, and would never end."""
 
 
 def _recorded(
@@ -173,12 +185,12 @@ def _recorded(
     low, high = task.span
     motion = {
         "motion.kind": "step",
-        "motion.size": (high - low) or settings.table_margin,
+        "motion.size": (high - low) or TABLE_MARGIN,
         "motion.duration": task.duration,
     }
     options = RunOptions(
         rtol=settings.rig_rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, interval=interval,
-        budget=int(settings.steps_per_sample * task.duration / np.min(flat["drive.sample_time"])),
+        budget=int(STEPS_PER_SAMPLE * task.duration / np.min(flat["drive.sample_time"])),
     )  # fmt: skip
     pieces = task.pieces.reshape(-1, *task.pieces.shape[-2:])
     values = shape.values(flat | motion, len(seeds))

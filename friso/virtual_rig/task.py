@@ -21,7 +21,6 @@ from friso.equations.rail import friction_factors
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.rig import QUADRATIC, Floor, ReferenceForm
-from friso.virtual_rig.settings import settings
 
 SAMPLE_TIME = 50e-6
 """Sample time [s] of a drive that states none, as in the thesis (Sec. 3.5.2)."""
@@ -157,21 +156,35 @@ def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
     return {key: value[run] if np.ndim(value) else value for key, value in flat.items()}
 
 
+TABLE_MARGIN = 0.01  # [m]
+"""Margin of tables beyond the motion. Stages that overshoot further leave the rail."""
+
+TABLE_SHARE = 0.5
+"""Margin of tables in long moves, as a fraction of the travel. Stages that overshoot further leave the rail."""
+
+POINTS_PER_LENGTH = 12
+"""Table points per correlation length of the rail. Fewer show corners in the rail's friction; tables grow in
+proportion."""
+
+POINTS_PER_WAVE = 40
+"""Table points per wave. Fewer flatten the ripple by a percent; tables grow in proportion."""
+
+
 def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
     """Return the places [m] at which tables have points, and the grid that they form, (1, 2).
 
     The places reach beyond the reference on both sides. The grid holds the first place [m] and the points per metre.
     """
     low, high = task.span
-    margin = max(settings.table_margin, settings.table_share * (high - low))
+    margin = max(TABLE_MARGIN, TABLE_SHARE * (high - low))
     lengths = [np.inf]
     for key, points in (
-        ("rail.correlation_length", settings.points_per_length),
-        ("drive.ripple_pitch", settings.points_per_wave),
+        ("rail.correlation_length", POINTS_PER_LENGTH),
+        ("drive.ripple_pitch", POINTS_PER_WAVE),
     ):
         lengths += [float(np.min(flat[key])) / points] if key in flat else []
     if "rail.rolling_pitch" in flat:
-        lengths.append(float(np.min(flat["rail.rolling_pitch"])) / (3 * settings.points_per_wave))
+        lengths.append(float(np.min(flat["rail.rolling_pitch"])) / (3 * POINTS_PER_WAVE))
     step = min(lengths)
     count = 2 if step == np.inf else int(np.ceil((high - low + 2 * margin) / step)) + 2
     step = (high - low + 2 * margin) / (count - 1)
@@ -184,6 +197,10 @@ def _over_places(flat: Mapping[str, Any], places: np.ndarray) -> np.ndarray:
     return np.array([*friction_factors(flat, places), ripple])
 
 
+POINTS_PER_PERIOD = 10
+"""Points per period of the highest frequency of the floor. Fewer flatten it by some percent."""
+
+
 def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tuple[np.ndarray, float]:
     """Return injected force and floor acceleration over time, shape (runs or 1, 2, points).
 
@@ -193,7 +210,7 @@ def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tup
     if floor is None and not injected:
         return np.zeros((1, 2, 2)), 0.0
     fine = [task.injected_each] if injected else []
-    fine += [1 / (settings.points_per_period * floor.frequency[-1])] if floor else []
+    fine += [1 / (POINTS_PER_PERIOD * floor.frequency[-1])] if floor else []
     interval = min(fine)
     count = int(np.ceil(task.duration / interval)) + 2
     inputs = np.zeros((len(seeds) if floor or task.injected.ndim > 1 else 1, 2, count))

@@ -103,7 +103,7 @@ class KeptWork:
         """Return the number of pieces kept."""
         if self.folder is None or not self.folder.exists():
             return 0
-        return sum(1 for file in self.folder.iterdir() if file.suffix in (".npz", ".json"))
+        return sum(1 for file in self.folder.iterdir() if file.suffix == ".npz")
 
     def clear(self) -> None:
         """Delete all saved pieces."""

@@ -9,8 +9,16 @@ from patched import patched
 
 from friso.progress import Tally
 from friso_thesis.studies.thesis.claims import Finding, Part, registered
-from friso_thesis.studies.thesis.plausible import ClaimInSpace, _in_space, looks, plausible, work_of
-from friso_thesis.studies.thesis.settings import settings
+from friso_thesis.studies.thesis.plausible import (
+    DRAW_LOOKS,
+    HALF_SHARE,
+    RARE_SHARE,
+    ClaimInSpace,
+    _in_space,
+    looks,
+    plausible,
+    work_of,
+)
 from friso_thesis.studies.thesis.space import Draw, draw
 
 PLAUSIBLE: Any = import_module("friso_thesis.studies.thesis.plausible")
@@ -39,8 +47,8 @@ def test_stopping_early_keeps_the_level_of_the_interval(own: Finding, share: flo
             missed[those], word[those] = not space.holds.low <= share <= space.holds.high, space.judged(own)
             running[those] = not space.settled(own)
     assert missed.mean() <= 0.05
-    wrong = "holds" if own is YES and share < settings.half_share else "differs" if own is NO else "nothing"
-    assert (word == wrong).mean() <= 0.05 or share < settings.rare_share
+    wrong = "holds" if own is YES and share < HALF_SHARE else "differs" if own is NO else "nothing"
+    assert (word == wrong).mean() <= 0.05 or share < RARE_SHARE
 
 
 def test_a_claim_that_has_decided_is_drawn_no_further() -> None:
@@ -69,7 +77,7 @@ def test_a_claim_that_has_decided_is_drawn_no_further() -> None:
 
 
 def test_the_looks() -> None:
-    assert settings.draw_looks == looks(51) == (7, 17, 51)
+    assert DRAW_LOOKS == looks(51) == (7, 17, 51)
     assert (looks(0), looks(2), looks(17), looks(20)) == ((), (2,), (7, 17), (7, 17, 20))
     assert space_of(7, 7).settled(YES)
     assert not space_of(6, 7).settled(YES)

@@ -30,7 +30,6 @@ from friso.drives.drive import (
     there_and_back,
     torque,
 )
-from friso.drives.settings import drive_settings
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage.controllers import FEEDBACK, FILTERS_KEY
@@ -224,6 +223,10 @@ def _torque_limit(axis: AxisParameters) -> float:
     return min(axis.number(f"{MOTOR}.current_lim") * axis.number(IN_TURNS), largest)
 
 
+LEAST_GAIN_RATIO = 0.01
+"""Least ratio of scheduled gains in a stage whose drive lets them fall to 0: a loop needs some gain."""
+
+
 def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:
     """List in sentences the settings of the axis that a stage cannot describe.
 
@@ -234,7 +237,7 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
         unknown = f"the firmware, which no {IN_TURNS} tells"
         left.append(f"{unknown}: gains in turns and N m are assumed, as 0.5.1 and later have")
     if axis.flag(SCHEDULED) and axis.is_set(SCHEDULE_WIDTH) and not axis.is_set(LEAST_RATIO):
-        least = f"{drive_settings.least_gain_ratio:g}"
+        least = f"{LEAST_GAIN_RATIO:g}"
         left.append(f"gains that fall to 0 with the error: here they stay at {least} of theirs, or more")
     if axis.flag(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
@@ -379,7 +382,7 @@ class Odrive(CascadeDrive):
         if turns <= 0 or not 0 <= least < 1:
             actual = f"{turns:g} turns and a least ratio of {least:g}"
             raise InputError(SCHEDULE_WIDTH, actual, "a width above 0, and a ratio from 0 to below 1", "0.01")
-        least = least or drive_settings.least_gain_ratio
+        least = least or LEAST_GAIN_RATIO
         width, unit = turns * units.length, units.kind.unit("m")
         places = [si(0.0 if line else least * width, unit), si(width, unit)]
         return {"schedule_error": places, "schedule_factor": [least, 1.0]}

@@ -11,7 +11,6 @@ import sympy as sp
 
 from friso.drives.languages import PYTHON
 from friso.drives.program import OUTPUT, LinearController, identifier
-from friso.drives.settings import settings
 from friso.drives.target import CodeTarget, Parcel
 
 _WORDS = """False None True and as assert async await break class continue def del elif else except finally for from
@@ -85,6 +84,14 @@ def _document(parcel: Parcel, rows: Mapping[str, Any], sections: Mapping[str, np
     }
 
 
+SECTION_POINTS = 200
+"""Frequencies at which biquads are compared with the state space; a notch is a tenth of a decade wide."""
+
+SECTION_ROUNDING = 1e-6
+"""Largest relative difference between biquads and state space at which the biquads are told. Poles that nearly
+coincide lose digits."""
+
+
 def biquads(linear: LinearController) -> dict[str, np.ndarray]:
     """Return the transfer function from each input to the output as sections of second order, by input.
 
@@ -96,7 +103,7 @@ def biquads(linear: LinearController) -> dict[str, np.ndarray]:
     if len(linear.samples) > 1:
         return {}
     found_sections: dict[str, np.ndarray] = {}
-    turns = np.geomspace(1e-3, np.pi, settings.section_points)[:-1]  # where the last one is, a zero may lie
+    turns = np.geomspace(1e-3, np.pi, SECTION_POINTS)[:-1]  # where the last one is, a zero may lie
     for name in linear.inputs:
         zeros, poles = _roots(linear, name)
         wanted = linear.response(name, turns)
@@ -108,9 +115,14 @@ def biquads(linear: LinearController) -> dict[str, np.ndarray]:
         gain = float(np.real(wanted[largest] / shape[largest]))
         sections = zpk2sos(zeros, poles, gain)
         error = np.abs(_of_sections(sections, z) - wanted) / np.abs(wanted)
-        if error.max() <= settings.section_rounding:
+        if error.max() <= SECTION_ROUNDING:
             found_sections[name] = sections
     return found_sections
+
+
+CANCELLING_DISTANCE = 1e-9
+"""Distance of a zero and a pole in z that cancel, and size of what is infinite. Rounding of a pole is 1e-15, of a
+double one 1e-8."""
 
 
 def _roots(linear: LinearController, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -123,11 +135,11 @@ def _roots(linear: LinearController, name: str) -> tuple[np.ndarray, np.ndarray]
     whole = np.block([[a, b[:, column]], [c, d[:, column]]])
     pairs: Any = eig(whole, np.diag([1.0] * n + [0.0]), right=False, homogeneous_eigvals=True)
     finite, infinite = pairs
-    ends = np.abs(infinite) > settings.cancelling_distance * np.abs(finite)
+    ends = np.abs(infinite) > CANCELLING_DISTANCE * np.abs(finite)
     zeros = [*(finite[ends] / infinite[ends])]
     poles = []
     for pole in np.linalg.eigvals(a):
-        near = [k for k, zero in enumerate(zeros) if abs(zero - pole) <= settings.cancelling_distance]
+        near = [k for k, zero in enumerate(zeros) if abs(zero - pole) <= CANCELLING_DISTANCE]
         if near:
             zeros.pop(min(near, key=lambda k: abs(zeros[k] - pole)))
         else:

@@ -9,7 +9,6 @@ from typing import Any
 
 from friso.drives.languages import Language, functions
 from friso.drives.program import OUTPUT, identifier
-from friso.drives.settings import settings
 from friso.drives.target import CodeTarget, Parcel
 
 _WORDS = """abs acos action and any array asin at atan bool by byte case concat configuration constant continue cos
@@ -50,9 +49,13 @@ def _tcpou(parcel: Parcel, unit: str, declaration: str, body: str) -> str:
     return parcel.rendered("block.TcPOU", unit_name=unit, identity=f"{{{own}}}", declaration=parts[0], body=parts[1])
 
 
+TEXT_SAMPLES = 400
+"""Samples of the test in structured text, which stand in its source. Editors of PLCs slow down beyond thousands."""
+
+
 def _files(parcel: Parcel) -> Mapping[str, str]:
     """Return function block, vector, and a program that runs its first samples, one a cycle, by name."""
-    rows = parcel.vector.table[: settings.text_samples + 1]
+    rows = parcel.vector.table[: TEXT_SAMPLES + 1]
     columns = dict(zip([*parcel.inputs, "expected"], zip(*rows, strict=True), strict=True))
     values: dict[str, Any] = {"samples": len(rows) - 1, "columns": columns, "text": TEXT, "lreal": _number}
     values["named"] = lambda symbol: "Manual" if symbol == str(OUTPUT) else identifier(symbol)

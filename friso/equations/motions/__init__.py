@@ -25,7 +25,6 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from friso.equations.motions.settings import MotionSettings
 from friso.quantities import Bound, Number, Quantity, Value, any_sign, non_negative, positive
 from friso.stage.rig import DURATION, Lowered, Motion, Piece, ReferenceForm, Stand, Tone, register_motion
 from friso.stage.section import Rule, Several, Values, element_keys
@@ -75,7 +74,8 @@ def _numbers(flat: Mapping[str, Any], key: str) -> list[Any]:
     return [flat[name] for name in element_keys(flat, key)]
 
 
-_MOST_TONES = MotionSettings().most_tones
+_MOST_TONES = 24
+"""Most sinusoids of a reference. Each adds to the code of every step, which takes longer to compile."""
 
 
 @register_motion
@@ -262,7 +262,8 @@ def _end(flat: Mapping[str, Any]) -> Any:
     return start + move.time
 
 
-_MOST_MOVES = MotionSettings().most_moves
+_MOST_MOVES = 100
+"""Most moves of a profile. Each has eight pieces or more, and its own settling time."""
 
 
 @register_motion

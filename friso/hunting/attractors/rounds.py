@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Status
-from friso.engine.settings import room_settings
+from friso.engine.batch import FIRST_TURNING_POINTS
 from friso.hunting.attractors.settings import settings
 from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, done, wait
@@ -171,7 +171,7 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 
     Returns the runs at their new states and how they ended.
     """
-    room = room_settings.first_turning_points
+    room = FIRST_TURNING_POINTS
     stages, count = runs.stages, runs.stages.count
     least = survey_settings.least_swing * stages.length
     results = stages.run(

@@ -10,7 +10,6 @@ import numpy as np
 from friso.hunting import Diagram, KeyRange, Plane
 from friso.questions.boundary.words import MEANINGS, ShownKey, answer, end_sentence
 from friso.questions.map.words import QUIET, quantity
-from friso.questions.settings import boundary_figure_settings
 from friso.shown.drawing.figure import (
     BLUE,
     GREY,
@@ -88,6 +87,10 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
     return Figure("boundary", "Hunting cycles", "", panels, note=note)
 
 
+AXIS_BEYOND = 0.15
+"""How far an axis goes on beyond the last cycle, as a share of what has cycles. It shows that none is there."""
+
+
 def _told(branches: tuple[Line, ...], axis: Axis) -> Axis:
     """Return an axis that ends a little beyond the last change of a branch, if none is left there."""
     at = np.concatenate([np.empty(0), *(line.at[:, 0] for line in branches)])
@@ -96,9 +99,9 @@ def _told(branches: tuple[Line, ...], axis: Axis) -> Axis:
     low, high = axis.limits
     ends = (float(at.min()), float(at.max()))
     if axis.log:
-        gap = (ends[1] / ends[0]) ** boundary_figure_settings.axis_beyond
+        gap = (ends[1] / ends[0]) ** AXIS_BEYOND
         return replace(axis, limits=(max(low, ends[0] / gap), min(high, ends[1] * gap)))
-    gap = boundary_figure_settings.axis_beyond * (ends[1] - ends[0])
+    gap = AXIS_BEYOND * (ends[1] - ends[0])
     return replace(axis, limits=(max(low, ends[0] - gap), min(high, ends[1] + gap)))
 
 

@@ -16,8 +16,7 @@ from friso.questions.check.words import speed_text
 from friso.shown.drawing.figure import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
 from friso.shown.motion_words import case_labels
 from friso.shown.text import NOTHING, if_so, length_at_rest, percentage, range_with_unit, share_with_interval, with_unit
-from friso.studies.draws import DrawnBandwidths, Draws, Fates
-from friso.studies.settings import settings
+from friso.studies.draws import TRIAL_DRAWS, DrawnBandwidths, Draws, Fates
 
 COLOURS = {
     "hunts": VERMILLION,
@@ -229,7 +228,7 @@ def _narrowed(draws: Draws) -> str:
     """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))
-    if len(shown) < settings.trial_draws or not np.ptp(fates.amplitudes[shown]) > 0:
+    if len(shown) < TRIAL_DRAWS or not np.ptp(fates.amplitudes[shown]) > 0:
         return ""
     ranks = fates.amplitudes[shown].argsort().argsort()
     follows = {

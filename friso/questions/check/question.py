@@ -42,8 +42,7 @@ from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
 from friso.stage.rig import left_out
 from friso.stage.tables import passive_where
-from friso.studies.draws import Draws, FrictionLevels
-from friso.studies.settings import settings
+from friso.studies.draws import TRIAL_DRAWS, Draws, FrictionLevels
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,9 +52,13 @@ if TYPE_CHECKING:
     from friso.studies.laws import VerdictsByLaw
 
 
+SHARES_OF_LEVELS = (0.05, 0.5)
+"""Shares of machines that hunt from the levels of friction on that an answer states: some, and half."""
+
+
 def levels_sentence(levels: FrictionLevels) -> str:
     """Say from which Coulomb friction on machines with similar contacts hunt, and what shows one's own."""
-    some, half = map(levels.ends, settings.shares_of_levels)
+    some, half = map(levels.ends, SHARES_OF_LEVELS)
     if some is None:
         tried = range_with_unit(float(levels.coulomb[0]), float(levels.coulomb[-1]), "N")
         return f"The stage file has no [friction]: with usual bearings, {tried} of Coulomb friction, it would not hunt."
@@ -220,6 +223,10 @@ def check(
     return checked_stage(chosen, correlations, tolerance, draws, seed, laws, progress, file)
 
 
+MOST_DRAWS = 100_000
+"""Most draws. At the edge of hunting a draw takes 50 ms, so more take hours."""
+
+
 def checked_stage(
     chosen: Stage,
     correlations: Correlations,
@@ -239,7 +246,7 @@ def checked_stage(
     loose = max(tolerance, LONG_RUN_RTOL)
     sample = uncertain = None
     if draws is not None:
-        inputs.whole_number(draws, "draws", 1, settings.most_draws, "1000")
+        inputs.whole_number(draws, "draws", 1, MOST_DRAWS, "1000")
         try:
             sample = draw(chosen, correlations, draws, seed)
         except InputError as error:
@@ -320,7 +327,7 @@ def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlatio
     """
 
     try:
-        draw(stage, correlations, settings.trial_draws, seed)
+        draw(stage, correlations, TRIAL_DRAWS, seed)
     except InputError as error:
         inputs.note(f"no machines were drawn from the uncertain keys ({error.actual}); their centres are used")
         return None

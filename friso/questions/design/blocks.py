@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.method import Design, NoDesign, UnfinishedDesign
+from friso.design_method.method import SLOW_SHARE, Design, NoDesign, UnfinishedDesign
 from friso.design_method.requirements import Candidate, Confirmed, RelaxableKey, Relaxation, Requirement
-from friso.design_method.settings import settings
 from friso.design_method.spec import Geometry
 from friso.design_method.verification import Corners, MachineOutcomes
 from friso.equations.controllers.pid import ALPHA, BETA, CROSSOVER, TUNED_MASS
@@ -560,7 +559,7 @@ def _controller(design: Design) -> dict[str, Any]:
 def _verification(design: Design) -> dict[str, Any]:
     """Return the outcome of the simulated moves with the joint free and locked."""
     verification, limit = design.verification, design.spec.position.settling_time
-    met = None if limit is None else verification.free.slower_than(settings.slow_share) <= limit
+    met = None if limit is None else verification.free.slower_than(SLOW_SHARE) <= limit
     return {
         **_outcome_document(verification.free),
         "settling_time_met": met,

@@ -32,7 +32,6 @@ from friso.drives.program import (
     linear_controller,
     program_of,
 )
-from friso.drives.settings import settings
 from friso.drives.target import TARGETS, CodeTarget, Parcel, Vector
 from friso.engine.simd_math import gaussian, quantised, sine
 from friso.equations.as_built import VELOCITY_SEED_OFFSET
@@ -228,6 +227,11 @@ def _reference(task: MoveTask, rows: np.ndarray, time: np.ndarray) -> dict[sp.Sy
     return {one: np.broadcast_to(value, time.shape) for one, value in zip(wanted, values, strict=True)}
 
 
+MACHINE_SAMPLES = 200
+"""Samples over which a machine as a plant is compared with friso. Behind the first impacts of a limiter runs that
+begin a rounding apart differ by the stroke."""
+
+
 def packed(
     stage: Stage, target: CodeTarget, name: str, user_values: Mapping[str, Any], samples: int, plant: bool = False
 ) -> Parcel:
@@ -262,9 +266,13 @@ def packed(
         )
     if machine is None:
         return parcel
-    few, held = settings.machine_samples, vector.start[str(OUTPUT)]
+    few, held = MACHINE_SAMPLES, vector.start[str(OUTPUT)]
     run = machine_run(machine, flat, vector.output[:few], vector.true_position[:few], held)
     return replace(parcel, machine=run)
+
+
+VECTOR_SAMPLES = 4000
+"""Samples of a test vector. Of most drives they last through a move; ten times as many make files of megabytes."""
 
 
 def parcel_of(
@@ -280,6 +288,6 @@ def parcel_of(
 
     Raises InputError for what `packed` refuses.
     """
-    parcel = packed(stage, target, name, user_values, settings.vector_samples, plant)
+    parcel = packed(stage, target, name, user_values, VECTOR_SAMPLES, plant)
     check = checked_stage(stage, correlations, progress=progress)
     return replace(parcel, header=header(parcel, check)), check

@@ -43,7 +43,6 @@ from friso.shown.text import listed, swing_with_unit, with_unit
 from friso.stage import Stage
 from friso.stage.correlations import correlations_file, correlations_text
 from friso.studies.contradiction import CHANGES, Contradiction, ExplainingChange, Standing
-from friso.studies.settings import settings
 
 if TYPE_CHECKING:
     from friso.questions.identify.question import IdentifyAnswer
@@ -276,6 +275,10 @@ def details(identification: Identification, files: Sequence[LogFile]) -> list[st
     return lines
 
 
+MOST_EXPLANATIONS = 3
+"""Most changes that an answer names as explanations of a log."""
+
+
 def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[str]:
     """Say what the log called `name` shows, whether the stage does so, and which change would explain a difference."""
     standing = result.standing
@@ -295,7 +298,7 @@ def against_sentences(name: str, stage: Stage, result: Contradiction) -> list[st
     if result.agrees:
         return [f"{name} agrees with the stage: the machine {machine}; the stage {does}{doubt}."]
     says = f"{name} contradicts the stage: the machine {machine}; the stage {does}{doubt}."
-    nearest = result.explanations[: settings.most_explanations]
+    nearest = result.explanations[:MOST_EXPLANATIONS]
     if not nearest:
         return [says, "No single change of friction, masses or the controller's speed explains that."]
     changes = listed([_change(stage, one) for one in nearest], "or")

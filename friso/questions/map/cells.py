@@ -18,7 +18,6 @@ from friso.errors import InputError
 from friso.hunting.criteria import ATTRACTED
 from friso.questions.map import words as map_words
 from friso.questions.map.words import quantity, variable
-from friso.questions.settings import map_settings
 from friso.shown.drawing.figure import (
     BLACK,
     GREY,
@@ -509,6 +508,16 @@ def _room(cells: np.ndarray, steps: list[float]) -> Array:
     return distances
 
 
+LETTER_WIDTH = 0.012
+"""Width of a letter as a share of the panel. Bold capitals of a page's panel take as much."""
+
+LINE_HEIGHT = 0.05
+"""Height of a line of words as a share of the panel. Lines of a page's panel take as much."""
+
+ROOM_OF_WORDS = 0.55
+"""Distance of words from the edge of their region, by their own size. With 0.5, their middles touch it."""
+
+
 def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list[MapPoint]) -> Lettering | None:
     """Return the word of a region where it has most room in it; None where it has too little.
 
@@ -521,18 +530,18 @@ def _written(word: str, words: np.ndarray, x: CellAxis, y: CellAxis, taken: list
         return None
     text, colour = WRITTEN[word]
     lines = text.splitlines()
-    shares = map_settings.letter_width * max(map(len, lines)), map_settings.line_height * len(lines)
+    shares = LETTER_WIDTH * max(map(len, lines)), LINE_HEIGHT * len(lines)
     steps = [1 / share / count for share, count in zip(shares, cells.shape, strict=True)]  # [sizes of the words]
     if word == HUNTS:
         labelled: Any = ndimage.label(words == KICKED)
         parts = [labelled[0] == number + 1 for number in range(labelled[1])]
         for part in parts:
-            cells &= ~part if _room(part, steps).max() > map_settings.room_of_words else True
+            cells &= ~part if _room(part, steps).max() > ROOM_OF_WORDS else True
     free = cells.copy()
     for place in taken:
         free[_nearest_cell(x, place[0]), _nearest_cell(y, place[1])] = False
     room = _room(free, steps)
-    if room.max() < map_settings.room_of_words:
+    if room.max() < ROOM_OF_WORDS:
         return None
     at = np.unravel_index(room.argmax(), room.shape)
     place = float(x.positions[at[0]]), float(y.positions[at[1]])

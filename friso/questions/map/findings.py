@@ -22,16 +22,15 @@ from friso.shown.text import listed, range_with_unit, unstable_loop
 from friso.stage import Stage
 from friso.stage.contacts import followed
 from friso.studies.axes import SCALINGS
-from friso.studies.edges import HUNTS_LEVEL, MapEdges, OwnLine, verdict_levels
+from friso.studies.edges import EDGE_PRECISION, HUNTS_LEVEL, MapEdges, OwnLine, verdict_levels
 from friso.studies.metric import MapFinding, metrics, worded
-from friso.studies.settings import settings
 from friso.studies.study import Study
 
 _NO_RESULT = {"failed": "the run was not completed", "invalid": "these values are not a valid stage"}
 
 _QUIET = ("transient", "settles")
 
-_SHARP = 2 * settings.edge_precision
+_SHARP = 2 * EDGE_PRECISION
 """Width of a change, as a share of its value, that three digits do not show."""
 
 MOST_SENTENCES = 3

@@ -147,10 +147,13 @@ def tune(
     return TuneAnswer(advice)
 
 
+OTHERS_TIME = 36.0  # [s]
+"""Time for which other remedies are tried once one works, as is said then: twice `TUNING_WORK`, on one core."""
+
+
 def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
     """Log the first remedy that works, and how long others are still tried."""
     from friso.questions.tune.words import changes, slowest_time
-    from friso.remedies.settings import settings
     from friso.shown.text import listed, unknown_condition, with_unit
 
     if outcome.stage is None or outcome.measured is None:
@@ -159,7 +162,7 @@ def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
     when, condition = slowest_time(outcome.measured, goal), unknown_condition(stage, [*stage.uncertain()])
     LOGGER.info(
         f"{condition}this works: {changed}, in position after {when}; others are tried for up to "
-        f"{with_unit(settings.others_time, 's', 2)} of computing (Ctrl-C ends with this)",
+        f"{with_unit(OTHERS_TIME, 's', 2)} of computing (Ctrl-C ends with this)",
         extra={"meanwhile": True},
     )
 

@@ -20,11 +20,17 @@ from friso.platform.installed import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
 from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
-from friso.remedies.catalogue import BANDWIDTH
+from friso.remedies.catalogue import (
+    BANDWIDTH,
+    FASTER_THAN_LEAST,
+    FASTEST_UNASKED,
+    MODE_SHARE,
+    SAMPLING_SHARE,
+    TYPED_DIGITS,
+)
 from friso.remedies.machines import Goal
 from friso.remedies.method import Advice
 from friso.remedies.search import TriedPoints
-from friso.remedies.settings import settings
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.shown.text import (
     NOTHING,
@@ -109,10 +115,10 @@ def number(key: str, value: float, before: Stage, unit: str) -> str:
     The value has as many digits as tuned numbers have.
     """
     if not unit:
-        return f"{value:.{settings.typed_digits}g}"
+        return f"{value:.{TYPED_DIGITS}g}"
     if not before.unit_in_file(key):
-        return with_unit(value, unit, settings.typed_digits)
-    text, _, written = str(before.in_file_unit(key, value, settings.typed_digits)).partition(" ")
+        return with_unit(value, unit, TYPED_DIGITS)
+    text, _, written = str(before.in_file_unit(key, value, TYPED_DIGITS)).partition(" ")
     return f"{float(text):.10g} {pretty(written)}"
 
 
@@ -188,10 +194,10 @@ _CAPPED = {
 def cap_words(tuning: Advice) -> str:
     """Say which controllers are too fast to be advised unasked; empty if the user stated a limit."""
     return _CAPPED[tuning.cap.reason].format(
-        least=factor_text(settings.faster_than_least),
-        factor=factor_text(settings.fastest_unasked),
-        mode=percent(settings.mode_share),
-        sampling=percent(settings.sampling_share),
+        least=factor_text(FASTER_THAN_LEAST),
+        factor=factor_text(FASTEST_UNASKED),
+        mode=percent(MODE_SHARE),
+        sampling=percent(SAMPLING_SHARE),
     )
 
 
@@ -560,11 +566,15 @@ def _row(measured: Performance, tuning: Advice, set_to: str, works: str) -> list
     ]
 
 
+LISTED_CHANGES = 6
+"""Largest number of changed keys that a row of the table lists; the stage file of the remedy has the others."""
+
+
 def _set_to(before: Stage, after: Stage) -> str:
     """List the first changed keys with their new values, and how many more the stage file of the remedy has."""
     keys = [one.partition(" (was ")[0] for one in changes(before, after)]
-    more = len(keys) - settings.listed_changes
-    return ", ".join([*keys[: settings.listed_changes], *([f"and {more} more"] if more > 0 else [])])
+    more = len(keys) - LISTED_CHANGES
+    return ", ".join([*keys[:LISTED_CHANGES], *([f"and {more} more"] if more > 0 else [])])
 
 
 def assumptions(tuning: Advice) -> list[str]:

@@ -28,7 +28,6 @@ from friso.equations.structure import Structure, shared_structure
 from friso.frequency.system import Declared
 from friso.stage import Stage
 from friso_thesis.studies.describing.function import IMPOSED_RTOL, checked_positive, dynamic_stiffness
-from friso_thesis.studies.describing.settings import settings
 
 FORCE, CART, STAGE = "force on cart", "cart", "stage"
 
@@ -99,6 +98,10 @@ class Balance:
     unsolved: int
 
 
+BALANCE_RESIDUAL = 1e-6
+"""Relative residual of a solution, the accuracy of the describing functions."""
+
+
 def single_harmonic(
     stage: Stage,
     amplitudes: Sequence[float] | np.ndarray = DEFAULT_AMPLITUDES,
@@ -122,7 +125,7 @@ def single_harmonic(
     middles = np.stack([(axis[cell] + axis[cell + 1]) / 2 for axis, cell in zip(axes, cells.T, strict=True)])
     solutions = loop.polished(middles)
     error = loop.left(solutions)[1]
-    good = (error < settings.balance_residual) & _near(axes, cells, solutions)
+    good = (error < BALANCE_RESIDUAL) & _near(axes, cells, solutions)
     i, j = np.unravel_index(np.argmin(np.where(np.isnan(residual), np.inf, residual)), shape)
     least = (float(residual[i, j]), float(sizes[i]), float(rates[j]))
     solutions, error = solutions[:, good], error[good]
@@ -155,6 +158,20 @@ def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.
     return near
 
 
+GRID_HALVINGS = 12
+"""Halvings of the grid. A resonance that needs more has no damping."""
+
+BALANCE_NEWTON_STEPS = 20
+"""Newton steps after which a balance does not converge."""
+
+LOGARITHM_NUDGE = 1e-5
+"""Step in the logarithms of amplitude and frequency for numerical derivatives. Smaller steps drown in the error of
+the describing function."""
+
+LONGEST_LOG_STEP = 1.0
+"""Longest Newton step in the logarithms. A longer one jumps to another solution."""
+
+
 @dataclass(frozen=True)
 class _Loop:
     """Both sides of the balance, 1/R and N, as functions of log amplitude and log frequency.
@@ -175,7 +192,7 @@ class _Loop:
 
     def refined(self, frequencies: np.ndarray) -> np.ndarray:
         """Return ascending frequencies [Hz], (n,), with more inserted where the loop turns by TURN."""
-        for _ in range(settings.grid_halvings):
+        for _ in range(GRID_HALVINGS):
             logs, share = np.log(frequencies), np.linspace(0, 1, PARTS_BETWEEN + 1)
             dense = np.exp(logs[:-1, None] + np.diff(logs)[:, None] * share)
             answer = receptance(self.stage.flat(), dense.ravel())[0].reshape(dense.shape)
@@ -191,12 +208,11 @@ class _Loop:
 
         A start stays where no step can be computed.
         """
-        for _ in range(settings.balance_newton_steps if logs.size else 0):
+        for _ in range(BALANCE_NEWTON_STEPS if logs.size else 0):
             sides = [
-                self.left(logs + settings.logarithm_nudge * step[:, None])[0]
-                for step in np.vstack([np.eye(2), -np.eye(2)])
+                self.left(logs + LOGARITHM_NUDGE * step[:, None])[0] for step in np.vstack([np.eye(2), -np.eye(2)])
             ]
-            slopes = np.array([(sides[k] - sides[k + 2]) / (2 * settings.logarithm_nudge) for k in range(2)])
+            slopes = np.array([(sides[k] - sides[k + 2]) / (2 * LOGARITHM_NUDGE) for k in range(2)])
             matrix = np.moveaxis(np.array([np.real(slopes), np.imag(slopes)]), 2, 0)
             left = self.left(logs)[0]
             usable = np.isfinite(left) & np.all(np.isfinite(slopes), axis=0)
@@ -204,5 +220,5 @@ class _Loop:
             usable &= np.linalg.det(matrix) != 0
             matrix[~usable] = np.eye(2)
             step = np.linalg.solve(matrix, np.stack([np.real(left), np.imag(left)], axis=1)[:, :, None])[:, :, 0].T
-            logs = logs - np.where(usable, np.clip(step, -settings.longest_log_step, settings.longest_log_step), 0.0)
+            logs = logs - np.where(usable, np.clip(step, -LONGEST_LOG_STEP, LONGEST_LOG_STEP), 0.0)
         return logs

@@ -41,6 +41,10 @@ IMPOSED_RTOL = 1e-9
 """Default relative tolerance of the runs."""
 
 
+MOST_SAMPLES = 1 << 20
+"""Most samples in memory, tens of megabytes."""
+
+
 @dataclass(frozen=True)
 class Imposition:
     """Friction laws with equal equations, each under a sinusoidal motion of its own.
@@ -122,10 +126,18 @@ class Imposition:
         starts[:, self.kernel.position] = self.flat["motion.displacement"]
         starts[:, self.inner] = inner
         interval = 1 / samples if samples else None
-        chunk = max(8, min(2048, settings.most_samples // max(samples, 1)))
+        chunk = max(8, min(2048, MOST_SAMPLES // max(samples, 1)))
         options = RunOptions(rtol=self.rtol, interval=interval, chunk=chunk)
         for part in run_chunks(self.kernel, {**self.flat, "motion.duration": share}, self.count, options, starts):
             yield part.numbers, part.results
+
+
+GAP_TOLERANCES = 1e3
+"""Largest gap of a periodic state, in relative tolerances of the run."""
+
+WIDEST_GAP = 1e-4
+"""Largest relative mismatch of a state after one period, at any tolerance. It changes the third digit of
+stiffness."""
 
 
 def periodic_gap(rtol: float) -> float:
@@ -133,7 +145,7 @@ def periodic_gap(rtol: float) -> float:
 
     It is relative to the state's scale, and depends on the tolerance of the runs.
     """
-    return min(settings.gap_tolerances * rtol, settings.widest_gap)
+    return min(GAP_TOLERANCES * rtol, WIDEST_GAP)
 
 
 @dataclass(frozen=True)
@@ -147,6 +159,10 @@ class PeriodicStates:
     inner: np.ndarray
     gap: np.ndarray
     done: np.ndarray
+
+
+LEAST_SECANT = 1e-4
+"""Least distance of the points of a secant. Closer ones differ by errors of the runs."""
 
 
 def steady(friction: Imposition) -> PeriodicStates:
@@ -166,7 +182,7 @@ def steady(friction: Imposition) -> PeriodicStates:
         gap[open_], done[open_] = np.max(np.abs(missed) / scales, axis=1), fine
         far = fine & (gap[open_] > periodic_gap(friction.rtol))
         inner[open_[far]] += step[far]
-        width[open_[far]] = np.clip(np.abs(step[far]), settings.least_secant * scales[far], scales[far])
+        width[open_[far]] = np.clip(np.abs(step[far]), LEAST_SECANT * scales[far], scales[far])
         open_ = open_[far]
     return PeriodicStates(inner, gap, done)
 

@@ -29,7 +29,6 @@ from friso.equations.friction.common import DIRECTION, direction, friction_alone
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
 from friso_thesis.studies.describing.balance import TOUCHES, beyond_stroke, receptance
-from friso_thesis.studies.describing.settings import settings
 
 
 @dataclass(frozen=True)
@@ -133,6 +132,13 @@ def _middles(z: np.ndarray) -> np.ndarray:
     return (z[:-1] + z[1:]) / 2
 
 
+STATE_NEWTON_STEPS = 30
+"""Newton steps for laws with one state, which converge in a handful."""
+
+STATE_ERROR = 1e-12
+"""Largest Newton step of the friction state, relative to the state, at which the state has converged."""
+
+
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
     """Compute the friction force on a periodic motion from velocities [m/s], shape (M,).
 
@@ -141,19 +147,26 @@ def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sig
     """
     z = np.zeros(len(velocity) + 1)
     chain, pushed = None, np.zeros(0)
-    for _ in range(settings.state_newton_steps if law.remembers else 0):
+    for _ in range(STATE_NEWTON_STEPS if law.remembers else 0):
         rate, by_z, by_velocity, *_ = law.at(velocity, _middles(z))
         chain = Chain(1 - interval * by_z / 2, 1 + interval * by_z / 2, sign)
         missed = interval * rate - np.diff(z)
         step = chain.solve(missed[:, None])[:, 0]
         z, pushed = z + step, interval * by_velocity
-        if np.max(np.abs(step)) <= settings.state_error * np.max(np.abs(z)):
+        if np.max(np.abs(step)) <= STATE_ERROR * np.max(np.abs(z)):
             break
     _, _, _, force, by_state, by_velocity = law.at(velocity, _middles(z))
     return FrictionAnswer(force, by_velocity, by_state, chain, pushed)
 
 
 DONE, REST, OPEN = "done", "only the rest at the reference was found", "no series was found near the known motion"
+
+
+LEAST_INTERVALS = 4096
+"""Least number of intervals. Fewer miss the instant at which friction reverses."""
+
+SAMPLES_PER_HARMONIC = 32
+"""Intervals per harmonic. Fewer alias the corners of friction into the harmonics."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +200,7 @@ class HarmonicSeries:
         angles = np.linspace(
             0,
             2 * np.pi,
-            max(settings.least_intervals, settings.samples_per_harmonic * int(self.orders[-1])),
+            max(LEAST_INTERVALS, SAMPLES_PER_HARMONIC * int(self.orders[-1])),
             endpoint=False,
         )
         return np.real(np.exp(1j * np.outer(angles, self.orders)) @ harmonics)
@@ -246,7 +259,7 @@ def balanced(
     """
     law, size = (
         OneStateLaw.of(flat),
-        intervals or max(settings.least_intervals, settings.samples_per_harmonic * harmonics),
+        intervals or max(LEAST_INTERVALS, SAMPLES_PER_HARMONIC * harmonics),
     )
     basis = Basis.of(harmonics, mirrored, 2 * (size // 2))
     spectrum = np.fft.rfft(position)[basis.orders] / len(position) * np.where(basis.orders == 0, 1, 2)
@@ -262,18 +275,35 @@ def balanced(
     return replace(series, status=_status(flat, series, length))
 
 
+RESTING_SHARE = 1e-3
+"""Amplitude relative to the previous one below which a series is the rest at the reference."""
+
+SERIES_STEP = 1e-9
+"""Step, relative to the amplitude, below which a change is only rounding."""
+
+
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
     """Return "done" if a series is a motion of the stage, and otherwise why it is none.
 
     It is none in three cases: Newton's method did not converge; the limiter would be touched; or the amplitude is tiny
     against `length` [m], that of the known motion, so that the stage rests.
     """
-    if series.amplitude < settings.resting_share * length:
+    if series.amplitude < RESTING_SHARE * length:
         return REST
-    if series.step > settings.series_step:
+    if series.step > SERIES_STEP:
         return OPEN
     deflection = np.max(np.abs(series.over_period(series.stage - series.cart)))
     return TOUCHES if beyond_stroke(flat, deflection) else DONE
+
+
+SERIES_NEWTON_STEPS = 40
+"""Newton steps after which a series does not converge."""
+
+LONGEST_STEP_SHARE = 0.5
+"""Longest step relative to the amplitude. A longer one jumps to another solution, or to rest."""
+
+SERIES_HALVINGS = 6
+"""Halvings of a step after which its direction is useless."""
 
 
 @dataclass(frozen=True)
@@ -339,13 +369,13 @@ class _Problem:
     def solve(self) -> tuple[np.ndarray, float]:
         """Solve the equations by Newton's method; return the unknowns and the size of the last step."""
         state, size = np.append(self.start, 0.0), np.inf
-        for _ in range(settings.series_newton_steps):
+        for _ in range(SERIES_NEWTON_STEPS):
             left = self.residual(state)
             step = np.linalg.lstsq(self.jacobian(state), -left, rcond=None)[0]
-            step /= max(1.0, float(np.max(np.abs(step))) / settings.longest_step_share)
+            step /= max(1.0, float(np.max(np.abs(step))) / LONGEST_STEP_SHARE)
             state = state + step * self._share(state, step, float(np.linalg.norm(left)))
             size = float(np.max(np.abs(step)))
-            if size <= settings.series_step:
+            if size <= SERIES_STEP:
                 break
         return state, size
 
@@ -354,7 +384,7 @@ class _Problem:
 
         `state` are the unknowns, and `left` is the size of the residuals there.
         """
-        shares = [0.5**halving for halving in range(settings.series_halvings)]
+        shares = [0.5**halving for halving in range(SERIES_HALVINGS)]
         return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])
 
 

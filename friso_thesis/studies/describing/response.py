@@ -27,13 +27,31 @@ from friso.stage import Stage
 from friso.stage.arguments import check_arguments
 from friso_thesis.studies.describing.balance import TOUCHES, beyond_stroke
 from friso_thesis.studies.describing.function import IMPOSED_RTOL, Imposition, checked_positive, dynamic_stiffness
-from friso_thesis.studies.describing.settings import settings
 
 if TYPE_CHECKING:
     import xarray as xr
 
 AMPLITUDE_LIMITS = (1e-18, 1e18)
 """Smallest and largest amplitude [m] of the search."""
+
+
+STUCK_AMPLITUDE = 1e-3
+"""Amplitude below which bristles are springs, in units of the scale of the law's state."""
+
+STATELESS_AMPLITUDE = 1e-12  # [m]
+"""Amplitude scale of a law without a state of its own, far below any motion that matters."""
+
+FREE_AMPLITUDE = 10.0
+"""Amplitude, relative to that of a cart without friction, beyond which friction does not matter."""
+
+AMPLITUDES_BEYOND = 30.0
+"""Factor beyond the amplitudes of a stuck and a free cart within which roots are searched."""
+
+MOST_DECADES = 8
+"""Most decades searched. A law that needs more is unbounded."""
+
+AMPLITUDES_PER_DECADE = 32  # [1/decade]
+"""Amplitudes per decade. Fewer step over two roots that lie close together."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +93,8 @@ class DrivenPlant:
         friction = Imposition.of(self.flat, np.ones(1), np.ones(1), self.rtol)
         return float(
             np.min(
-                settings.stuck_amplitude * friction.scales[0, friction.inner],
-                initial=settings.stateless_amplitude if not friction.inner else 1,
+                STUCK_AMPLITUDE * friction.scales[0, friction.inner],
+                initial=STATELESS_AMPLITUDE if not friction.inner else 1,
             )
         )
 
@@ -90,14 +108,12 @@ class DrivenPlant:
         with np.errstate(over="ignore"):
             bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *AMPLITUDE_LIMITS)
         stuck = np.abs(self.answer(np.full(shape[1], self.stuck), rows)[1][:, 1])
-        slid = np.abs(self.answer((settings.free_amplitude * bare).ravel(), np.tile(rows, shape[0]))[1][:, 1]).reshape(
-            shape
-        )
+        slid = np.abs(self.answer((FREE_AMPLITUDE * bare).ravel(), np.tile(rows, shape[0]))[1][:, 1]).reshape(shape)
         with np.errstate(over="ignore"):
             states = np.stack([bare, stuck * forces[:, None], slid * forces[:, None]])
         low, high = (
-            np.fmin.reduce(states) / settings.amplitudes_beyond,
-            np.fmax.reduce(states) * settings.amplitudes_beyond,
+            np.fmin.reduce(states) / AMPLITUDES_BEYOND,
+            np.fmax.reduce(states) * AMPLITUDES_BEYOND,
         )
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
@@ -105,7 +121,7 @@ class DrivenPlant:
         """Return amplitudes moved until they need less force (`side` -1) or more (1) than `forces`."""
         amplitudes = np.clip(amplitudes, *AMPLITUDE_LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
-        for _ in range(settings.most_decades):
+        for _ in range(MOST_DECADES):
             reached = self.answer(amplitudes[force, frequency], frequency)[0]
             missed = ~(side * (reached - forces[force]) > 0)
             force, frequency = force[missed], frequency[missed]
@@ -121,11 +137,11 @@ class DrivenPlant:
         a force is searched.
         """
         low, high = self.ends(forces)
-        first = np.floor(settings.amplitudes_per_decade * np.log10(low)).astype(int)
-        last = np.ceil(settings.amplitudes_per_decade * np.log10(high)).astype(int)
+        first = np.floor(AMPLITUDES_PER_DECADE * np.log10(low)).astype(int)
+        last = np.ceil(AMPLITUDES_PER_DECADE * np.log10(high)).astype(int)
         points = int(np.max(last.max(axis=0) - first.min(axis=0))) + 1
         numbers = first.min(axis=0)[:, None] + np.arange(points)
-        amplitudes = 10.0 ** (numbers / settings.amplitudes_per_decade)
+        amplitudes = 10.0 ** (numbers / AMPLITUDES_PER_DECADE)
         pending = numbers <= last.max(axis=0)[:, None]
         reached = np.full(amplitudes.shape, np.nan)
         reached[pending], _, _ = self.answer(amplitudes[pending], np.nonzero(pending)[0])
@@ -150,6 +166,13 @@ class Roots:
     unknown: np.ndarray
 
 
+FORCE_ERROR = 1e-10
+"""Relative error of the force at a root. Larger ones show in curves."""
+
+MOST_ROOT_STEPS = 60
+"""Most steps to a root; halving alone needs fewer."""
+
+
 def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
     """Find all amplitudes at which forces [N] move the cart, as far as the grid resolves."""
     amplitudes, reached, inside = driven.grid(forces)
@@ -160,8 +183,8 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
         lambda x, at, size: np.log(driven.answer(np.exp(x), at)[0] / size),
         tuple(np.log(amplitudes[frequency, cell + side]) for side in (0, 1)),
         args=(frequency, forces[force]),
-        tolerances={"fatol": settings.force_error},
-        maxiter=settings.most_root_steps,
+        tolerances={"fatol": FORCE_ERROR},
+        maxiter=MOST_ROOT_STEPS,
     )
     rising = reached[frequency, cell + 1] > reached[frequency, cell]
     return Roots(force, frequency, np.exp(root.x), rising, np.abs(root.f_x), np.any(inside & ~computed, axis=2))
@@ -311,7 +334,7 @@ def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, u
     count = np.sum(present, axis=2)
     last = np.take_along_axis(lasting, np.maximum(count - 1, 0)[:, :, None], axis=2)[:, :, 0]
     missing = unknown | (lasting[:, :, 0] != 1) | (last != 1)
-    unfound = (count == 0) | np.any(present & ~(branches["error"] <= 100 * settings.force_error), axis=2)
+    unfound = (count == 0) | np.any(present & ~(branches["error"] <= 100 * FORCE_ERROR), axis=2)
     deflection = np.abs(branches["response"] - branches["cart_response"]) * forces[:, None, None]
     status = np.where(missing, MISSING, "done").astype(object)
     status[np.any(beyond_stroke(stage.flat(), deflection), axis=2)] = TOUCHES

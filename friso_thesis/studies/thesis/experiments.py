@@ -29,6 +29,7 @@ from friso_thesis.studies.rig.in_position import InPosition
 from friso_thesis.studies.rig.outcome import freed, locked_stage, pace
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import (
+    RAIL_COUNT,
     RAIL_SEED,
     CyclesOnRails,
     MovesOnRails,
@@ -44,7 +45,6 @@ from friso_thesis.studies.thesis.as_built import (
 )
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import PartNeeded
-from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import LOCKED
 
 FORCE_AMPLITUDE = 5.0
@@ -191,7 +191,7 @@ class Experiments:
         """Run an experiment that is not among the attributes yet."""
         if name not in _RUNS:
             raise AttributeError(name)
-        about, kind = ("experiment", name, self._stage_file, settings.rail_count), get_type_hints(Experiments)[name]
+        about, kind = ("experiment", name, self._stage_file, RAIL_COUNT), get_type_hints(Experiments)[name]
         setattr(self, name, self._kept.result(about, kind, partial(_experiment, name, *about[2:])))
         return vars(self)[name]
 
@@ -288,6 +288,6 @@ _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
         GRID: grid,
         ON_RAILS: cycles,
         STANDSTILL: standstill,
-        TRACES: lambda stage: traces(stage, _lively_rail(_experiment(MOVES, stage.to_toml(), settings.rail_count))),
+        TRACES: lambda stage: traces(stage, _lively_rail(_experiment(MOVES, stage.to_toml(), RAIL_COUNT))),
     }
 )

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
@@ -16,11 +16,9 @@ from typing import TYPE_CHECKING, Any, TypeVar, Union, cast, get_args, get_origi
 import numpy as np
 
 from friso.studies.metric import form_of
-from friso.studies.store_files import stored
 from friso.studies.study import Study
 from friso.studies.sweep import dataset
-from friso_thesis.studies.kept_work import KeptWork, digest, keep_arrays, kept_arrays, put
-from friso_thesis.studies.thesis.claims import Finding, Part
+from friso_thesis.studies.kept_work import KeptWork, keep_arrays, kept_arrays
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
@@ -104,9 +102,6 @@ SOURCES = (
 """Folders and files, besides the equations, whose contents decide on saved results. Paths start from the package
 friso."""
 
-Findings = dict[str, Finding]
-"""Findings by name, such as that of a claim."""
-
 
 class Kept(KeptWork):
     """Folders in which maps, experiments and findings of the thesis are saved."""
@@ -144,33 +139,9 @@ class Kept(KeptWork):
             keep_arrays(file, taken_apart(made))
         return made
 
-    def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
-        """Return the findings saved under `about`; otherwise `make` and save them."""
-        file = self._file("json", "findings", *about)
-        if file is not None and (kept := kept_findings(file)) is not None:
-            return kept
-        findings = make()
-        if file is not None:
-            document = {name: [asdict(part) for part in item.parts] for name, item in findings.items()}
-            file.parent.mkdir(parents=True, exist_ok=True)
-            put(file, json.dumps({"findings": document, "sha256": digest([file.name, document])}).encode("utf-8"))
-        return findings
-
     def _file(self, suffix: str, *about: Any) -> Path | None:
         return super()._file(suffix, thesis_rig().to_toml(), *about)
 
 
 NOT_KEPT = Kept()
 """A store that saves nothing."""
-
-
-def kept_findings(file: Path) -> Findings | None:
-    """Return the findings in a file; None if it is missing, damaged, or of another kind."""
-    try:
-        kept = json.loads(stored(file))
-        document = kept["findings"]
-        if kept["sha256"] != digest([file.name, document]):
-            return None
-        return {name: Finding(tuple(Part(**part) for part in parts)) for name, parts in document.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None

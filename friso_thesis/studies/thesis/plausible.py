@@ -28,13 +28,17 @@ from friso_thesis.studies.thesis.claims import (
 )
 from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS
-from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
+from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
-from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.space import DRAW_SEED, FORCE_NOISE, OPEN, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
 
-DRAW_COUNT, ANALYSED_PART = settings.draw_looks[-1], 3
+DRAW_LOOKS = (7, 17, 51)  # [draws]
+"""Numbers of draws after which a claim is looked at; a claim whose interval has decided is drawn no further. Seven
+draws that all hold lie above `HALF_SHARE`, seventeen of which none does below `RARE_SHARE`, and with fifty-one an
+interval is at most a third wide. Looking three times, each interval may miss by a third of 5 %."""
+
+DRAW_COUNT, ANALYSED_PART = DRAW_LOOKS[-1], 3
 """Default number of joint draws, and that number over the number of draws with linear analysis and experiments, which
 take longer than all maps."""
 
@@ -46,6 +50,9 @@ DRAW_RTOL = 1e-5
 
 CHANCE_PROBABILITY = 0.05
 """Probability of a chance separation above which it is not reported, for all values of a claim together."""
+
+Findings = dict[str, Finding]
+"""Findings by name, such as that of a claim."""
 
 PARTS = {**NEEDS, **EXPERIMENTS}
 """Parts of the evidence besides maps and responses."""
@@ -70,6 +77,22 @@ class MetPart:
 
     met: int
     share: Share
+
+
+STRAY_SHARE = 0.05
+"""Share that the lower end of an interval must exceed to say that a claim holds in more than stray draws. It is
+that of “few” cells of a map. Twice as much would need ten of 51 draws."""
+
+LEAST_DECIDED = 7  # [draws]
+"""Least number of decided draws. With fewer, even if all agree, the interval of the share reaches below a half."""
+
+HALF_SHARE = 0.5
+"""Share of the draws in which a claim must hold to agree; the whole interval must lie above it. With less, a claim
+could fail in most of what the thesis leaves open."""
+
+RARE_SHARE = 0.25
+"""Largest share of the draws in which a claim that fails at friso's choice may hold, and still fail. The upper end
+of the interval counts: seventeen draws without one that holds show it, and one of 51 does not turn it."""
 
 
 @dataclass(frozen=True)
@@ -122,18 +145,18 @@ class ClaimInSpace:
         """
         if not turns(own):
             return own.judgement
-        holds, low, high, stray = own.judgement == "holds", self.holds.low, self.holds.high, settings.stray_share
-        if self.decided < settings.least_decided:
+        holds, low, high, stray = own.judgement == "holds", self.holds.low, self.holds.high, STRAY_SHARE
+        if self.decided < LEAST_DECIDED:
             return "not decided enough"
-        if (low > settings.half_share) if holds else (high <= settings.rare_share):
+        if (low > HALF_SHARE) if holds else (high <= RARE_SHARE):
             return own.judgement
         return "depends" if (holds or low > stray) and (not holds or high < 1 - stray) else "not decided enough"
 
     def settled(self, own: Finding) -> bool:
         """Tell whether the draws have decided: no more of them turn the judgement if the interval holds the share."""
-        border = settings.half_share if own.judgement == "holds" else settings.rare_share
+        border = HALF_SHARE if own.judgement == "holds" else RARE_SHARE
         decides = self.holds.low > border or self.holds.high <= border
-        return not turns(own) or (self.decided >= settings.least_decided and decides)
+        return not turns(own) or (self.decided >= LEAST_DECIDED and decides)
 
 
 def turns(own: Finding) -> bool:
@@ -200,8 +223,8 @@ def plausible(
     by_claim: dict[str, ClaimInSpace] = {}
 
     def judged(one: Draw, group: Mapping[str, Registered]) -> Findings:
-        about = ("draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
-        by_name = kept.findings(about, partial(_judged, group, one))
+        about = ("findings", "draw", sorted(group), MAP_POINTS, DRAW_RTOL, DRAW_SEED, one.number)
+        by_name = kept.result(about, Findings, partial(_judged, group, one))
         tally.add(_work(group), f"{one.name} of {draws}" if one in drawn else "friso's own choice")
         return by_name
 
@@ -231,7 +254,7 @@ def _settled(space: ClaimInSpace | None, own: Finding) -> bool:
 
 def looks(draws: int) -> tuple[int, ...]:
     """Return after how many of at most `draws` draws the claims are looked at."""
-    return (*(count for count in settings.draw_looks if count < draws), draws) if draws else ()
+    return (*(count for count in DRAW_LOOKS if count < draws), draws) if draws else ()
 
 
 def _judged_in(entries: Mapping[str, Registered], number: int, draws: int) -> dict[str, Registered]:
@@ -247,13 +270,35 @@ def work_of(entries: Mapping[str, Registered], draws: int, first: int = 0) -> in
     return sum(_work(_judged_in(entries, number, draws)) for number in range(first, draws))
 
 
+EXPERIMENT_WORK = (
+    ("locked_line", 700),
+    ("joint_steps", 140),
+    ("slow_motion", 90),
+    ("constant_speed", 4100),
+    ("rig_loops", 1000),
+    ("moves", 4600),
+    ("grid", 9500),
+    ("cycles", 3700),
+    ("standstill", 3000),
+    ("traces", 1000),
+)  # [runs]
+"""Work of each experiment on a drawn rig, in runs of a map: as measured on three drawn rigs, in milliseconds of
+processor time. Equal work for all told half an hour for claims of half a minute."""
+
+LINEAR_WORK = 2500  # [runs]
+"""Work of the linear analysis of a rig, in runs of a map: 2.5 s of processor time."""
+
+RESPONSE_WORK = 40  # [runs]
+"""Work of a run in time, in runs of a map, for the progress: 40 ms of processor time against 1 ms."""
+
+
 def _work(entries: Mapping[str, Registered]) -> int:
     """Return the work of judging these claims in one draw, in units of the progress tally."""
     needs = {need for entry in entries.values() for need in entry.needs}
     maps = len(needs & STUDIES.keys()) * MAP_POINTS**2
-    experiments = sum(work for name, work in settings.experiment_work if name in needs)
-    linear = settings.linear_work * bool(needs & NEEDS.keys())
-    return maps + experiments + linear + settings.response_work * len(needs & RESPONSES.keys())
+    experiments = sum(work for name, work in EXPERIMENT_WORK if name in needs)
+    linear = LINEAR_WORK * bool(needs & NEEDS.keys())
+    return maps + experiments + linear + RESPONSE_WORK * len(needs & RESPONSES.keys())
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:
@@ -327,7 +372,7 @@ def _share(flags: np.ndarray, count: int) -> Share:
     """
     missing = count - len(flags)
     decided = np.append(np.ones(len(flags), bool), np.zeros(missing, bool))
-    return share(np.append(flags, np.zeros(missing, bool)), decided, DOUBT_PROBABILITY / len(settings.draw_looks))
+    return share(np.append(flags, np.zeros(missing, bool)), decided, DOUBT_PROBABILITY / len(DRAW_LOOKS))
 
 
 def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) -> Iterator[Separation]:

@@ -30,9 +30,17 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence, map_of
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS, Experiments
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS, Linear
-from friso_thesis.studies.thesis.plausible import DRAW_COUNT, PARTS, Plausible, counted, plausible, work_of
+from friso_thesis.studies.thesis.plausible import (
+    DRAW_COUNT,
+    EXPERIMENT_WORK,
+    LINEAR_WORK,
+    PARTS,
+    Plausible,
+    counted,
+    plausible,
+    work_of,
+)
 from friso_thesis.studies.thesis.reading import others_of, read_as, words_read
-from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
 
@@ -196,7 +204,7 @@ def reproduce(
 
 def _part_work(part: str) -> int:
     """Return the progress steps that a part of the linear analysis, or an experiment, takes."""
-    return dict(settings.experiment_work).get(part, settings.linear_work)
+    return dict(EXPERIMENT_WORK).get(part, LINEAR_WORK)
 
 
 def _surveyed_studies(

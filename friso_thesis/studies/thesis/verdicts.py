@@ -8,8 +8,7 @@ from types import MappingProxyType
 
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Claim, ClaimJudgement, Finding
-from friso_thesis.studies.thesis.plausible import ClaimInSpace
-from friso_thesis.studies.thesis.settings import settings
+from friso_thesis.studies.thesis.plausible import LEAST_DECIDED, ClaimInSpace
 from friso_thesis.studies.thesis.space import OPEN
 
 NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
@@ -92,8 +91,8 @@ class ClaimVerdict:
         """Say that too few draws decide, or that they leave the share too uncertain; "" if they do not."""
         if self.space is None or self.judgement != "not decided enough":
             return ""
-        if self.space.decided < settings.least_decided:
-            return f" That is not enough: at least {settings.least_decided} are needed."
+        if self.space.decided < LEAST_DECIDED:
+            return f" That is not enough: at least {LEAST_DECIDED} are needed."
         return " The interval is too wide to judge by: more draws are needed."
 
     @property

@@ -25,7 +25,6 @@ from friso_thesis.studies.thesis.linear import PLANT
 from friso_thesis.studies.thesis.linear.plants import Springs
 from friso_thesis.studies.thesis.maps import trend, trend_text, verdict_table
 from friso_thesis.studies.thesis.reading import about, words
-from friso_thesis.studies.thesis.settings import settings
 
 K_F, K_J = sp.symbols("k_f k_j", positive=True)
 
@@ -81,6 +80,10 @@ def _text(expression: sp.Basic) -> str:
     return str(expression).replace("**", "^").replace("*", " ")
 
 
+EXACT_SHARE = 1e-9
+"""Largest relative difference between numbers that follow from one equation. Rounding is far smaller."""
+
+
 def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
     """Judge a stiffness formula in K_F and K_J against the plant of the declared equations."""
     eta = springs.joint / springs.bristles
@@ -88,7 +91,7 @@ def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
     return Part(
         "Eq. 1 with k_f = sigma_0 is the force over displacement at rest of the plant linearised with a stuck cart, "
         "its limiter free",
-        abs(springs.both / expected - 1) <= settings.exact_share,
+        abs(springs.both / expected - 1) <= EXACT_SHARE,
         f"plant {springs.both:.6g} N/m, Eq. 1 {expected:.6g} N/m; eta {eta:.3g}: an error of 1 % in k_f changes k_e by "
         f"{eta / (1 + eta):.2g} %",
     )
@@ -167,6 +170,18 @@ class TunedLoop:
     margin: float
 
 
+FAR_CROSSOVER_FACTOR = 3.0
+"""Factor of “significantly larger” or “smaller” for a tuned crossover: half a decade, as “far” in all claims. It is
+the other reading of Sec. 3.4.2, whose own 8 Hz then lie too near, though their loop crosses 0 dB at 24 Hz."""
+
+LOWEST_CROSSOVER_RATIO = 0.03
+"""Lowest crossover tried over the first eigenfrequency: 0.3 Hz, low enough that the resonance stays below 0 dB
+while the cart slides. From 0.8 Hz on it reaches 0 dB, and the loop crosses there."""
+
+CROSSOVERS_TRIED = 21
+"""Number of crossovers tried beside the first eigenfrequency, 30 % apart, finer than “about”."""
+
+
 @lru_cache(maxsize=256)
 def loops_over_crossover(stage_file: str, first: float) -> tuple[TunedLoop, ...]:
     """Return the loops with the joint free, tuned to crossovers on both sides of the `first` eigenfrequency [Hz].
@@ -174,9 +189,9 @@ def loops_over_crossover(stage_file: str, first: float) -> tuple[TunedLoop, ...]
     A loop crosses 0 dB, the cart sliding, at the last crossing below the parasitic mode.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
-    highest = 2 * settings.far_crossover_factor
+    highest = 2 * FAR_CROSSOVER_FACTOR
     tried = []
-    for ratio in np.geomspace(settings.lowest_crossover_ratio, highest, settings.crossovers_tried):
+    for ratio in np.geomspace(LOWEST_CROSSOVER_RATIO, highest, CROSSOVERS_TRIED):
         tuned = {**flat, CROSSOVER: float(ratio) * first}
         crossings = margins(tuned, limit_cases(tuned)["sliding"]).crossovers
         last = max((f for f in crossings if f < (1 - words.close) * flat["parasitic.frequency"]), default=np.nan)
@@ -208,7 +223,7 @@ def judged_crossovers(tried: tuple[TunedLoop, ...], first: float, force: float, 
     `tried` are loops tuned to several crossovers. `force` and `settling` are the rank correlations of force and
     settling time with the crossover.
     """
-    far = settings.far_crossover_factor
+    far = FAR_CROSSOVER_FACTOR
     near = [loop for loop in tried if about(loop.crossing, 1.0)]
     apart = [loop.margin for loop in tried if loop not in near]
     tuned_near = [loop.margin for loop in tried if 1 / far < loop.tuned < far]
@@ -260,7 +275,7 @@ def motor_constant_cancels(evidence: Evidence) -> Finding:
         Part(
             "the open loop is the one of the true mass, if the controller is tuned for the mass that a wrong motor "
             "constant shows, with that motor",
-            max(changes) <= settings.exact_share,
+            max(changes) <= EXACT_SHARE,
             f"it differs by at most {percent(max(changes), 2)} with motors of "
             f"{' and '.join(f'{1 / factor:.2g}' for factor in CONSTANTS)} of the force assumed, as Fig. 17 and 18 "
             "ask for",

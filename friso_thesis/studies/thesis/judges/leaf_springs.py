@@ -18,7 +18,6 @@ from friso.materials import materials
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.reading import words
-from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 JOINT_STROKE, JOINT_STIFFNESS, FIRST_FREQUENCY, PARASITIC_FREQUENCY, LARGEST_STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
@@ -164,9 +163,13 @@ def shortening_is_negligible(evidence: Evidence) -> Finding:
     return judged_shortening(evaluated())
 
 
+NEGLIGIBLE_SHARE = 0.01
+"""Largest share that is negligible, for a nonlinearity or a motion. Smaller ones cannot be read off a figure."""
+
+
 def judged_shortening(leaves: Evaluation) -> Finding:
     """Judge how nonlinear leaf springs are, and how much they shorten, at full stroke."""
-    share, least = leaves.shortening / leaves.stroke, settings.negligible_share
+    share, least = leaves.shortening / leaves.stroke, NEGLIGIBLE_SHARE
     return Finding.of(
         Part(
             f"at full stroke the force is linear in the deflection (within {percent(least)})",
@@ -189,12 +192,16 @@ def width_against_length(evidence: Evidence) -> Finding:
     return judged_dimensions(*(_ratios(name) for name in ("width", "length")))
 
 
+LEAF_CHANGE_FACTOR = 1.1
+"""Factor by which a dimension of the leaves grows, small enough for stiffnesses to change in proportion."""
+
+
 def _ratios(dimension: str) -> tuple[float, float, float]:
     """Return by which factors a larger `dimension` of the leaves changes three stiffnesses.
 
     The stiffnesses are those of the drive, along the leaves, and along their width.
     """
-    own, other = evaluated(), evaluated(dimension, settings.leaf_change_factor)
+    own, other = evaluated(), evaluated(dimension, LEAF_CHANGE_FACTOR)
     drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)
     return drive, along, across
 
@@ -204,7 +211,7 @@ def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, fl
 
     The stiffnesses are that of the drive, along the leaves, and along their width.
     """
-    alike, larger = settings.negligible_share, settings.leaf_change_factor
+    alike, larger = NEGLIGIBLE_SHARE, LEAF_CHANGE_FACTOR
     drive, along, across = wider
     return Finding.of(
         Part(

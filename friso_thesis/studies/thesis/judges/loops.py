@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from friso.frequency.bode import COMFORTABLE_MARGIN, Range
+from friso.frequency.bode import COMFORTABLE_MARGIN, HIGHEST_CROSSOVER, Range
 from friso.frequency.margins import Margins
-from friso.frequency.settings import settings as frequency_settings
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import BUILT
@@ -228,7 +227,7 @@ def _stable_at_speeds(speeds: Speeds) -> Part:
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
     steady = f"unstable with {', '.join(where)}" if where else "stable at every speed too"
     if speeds.incurable:
-        highest = f"{frequency_settings.highest_crossover / 1e3:g} kHz"
+        highest = f"{HIGHEST_CROSSOVER / 1e3:g} kHz"
         steady += f", and in the middle of that range no faster controller up to {highest} is stable"
     return Part(
         "linearised about an initial speed of the cart, the bristles not yet deflected (z = 0), the loop is stable at "
@@ -355,11 +354,7 @@ def _frequencies(frequencies: tuple[float, ...]) -> str:
 
 
 def _hertz(crossover: float | None) -> str:
-    return (
-        f"{frequency_settings.highest_crossover / 1e3:g} kHz, the end of the search"
-        if crossover is None
-        else f"{crossover:.4g} Hz"
-    )
+    return f"{HIGHEST_CROSSOVER / 1e3:g} kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
 
 
 def _sampled(analysis: Linear) -> FindingTable:

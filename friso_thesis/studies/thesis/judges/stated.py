@@ -20,7 +20,6 @@ from friso_thesis.studies.thesis.experiments import LINE, RESPONSE_FREQUENCIES, 
 from friso_thesis.studies.thesis.judges.arguments import HEAVIEST, LIGHT
 from friso_thesis.studies.thesis.judges.identified_in_time import NOISY_RANGE
 from friso_thesis.studies.thesis.reading import words
-from friso_thesis.studies.thesis.settings import settings
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 
 V, Z = sp.symbols("v z", real=True)
@@ -190,9 +189,14 @@ def _of(trace: object) -> tuple[np.ndarray, np.ndarray]:
     return time, position - reference
 
 
+FIRST_RESPONSE = 0.3  # [s]
+"""Time for which the initial response lasts, five times that of the move: its overshoot of 28 mm has turned and
+come back by then, and the stage has not stuck yet."""
+
+
 def _first_deviation(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     """Return the deviation while the first move and its overshoot last."""
-    return deviation[time <= settings.first_response]
+    return deviation[time <= FIRST_RESPONSE]
 
 
 def judged_initial(light: np.ndarray, heavy: np.ndarray) -> Finding:
@@ -200,7 +204,7 @@ def judged_initial(light: np.ndarray, heavy: np.ndarray) -> Finding:
     off = float(np.abs(heavy - light).max() / np.abs(light).max())
     return Finding.of(
         Part(
-            f"until {settings.first_response:g} s, in the first move and its overshoot, the deviation from the "
+            f"until {FIRST_RESPONSE:g} s, in the first move and its overshoot, the deviation from the "
             f"reference is the same with {LIGHT} and {HEAVIEST} (within {percent(words.same)} of its largest)",
             off <= words.same,
             f"it differs by at most {percent(off)} of {1e3 * np.abs(light).max():.3g} mm",

@@ -14,8 +14,9 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.pid import CROSSOVER, TUNED_MASS
-from friso.frequency.bode import range_end, ranges_below, searched_crossovers, stable_crossovers
+from friso.frequency.bode import HIGHEST_CROSSOVER, range_end, ranges_below, searched_crossovers, stable_crossovers
 from friso.frequency.margins import (
+    MARGIN_DENSITY,
     Margins,
     controller_response,
     frequencies,
@@ -25,7 +26,6 @@ from friso.frequency.margins import (
     plants,
     with_resonances,
 )
-from friso.frequency.settings import settings as frequency_settings
 from friso.frequency.system import DriveTiming, Members, in_series, limit_cases
 from friso.stage import Stage
 from friso_thesis.studies.rig.experiments.frf import CROSSOVER_SETTINGS as MEASURED_SETTINGS
@@ -160,16 +160,14 @@ def _single(flat: Mapping[str, Any]) -> float | None:
     """
     cases = limit_cases(flat)
     member = cases.get("sliding-touched", cases["sliding"])
-    omega = frequencies(
-        flat, member, DriveTiming.of(flat), frequency_settings.margin_density, [plant_poles(flat, member)]
-    )
+    omega = frequencies(flat, member, DriveTiming.of(flat), MARGIN_DENSITY, [plant_poles(flat, member)])
     bare = plants(flat, member, omega)[0]
 
     def more(crossover: np.ndarray) -> np.ndarray:
         above = np.array([np.abs(bare * controller_response(_tuned(flat, f), omega)) > 1 for f in crossover])
         return (above[:, 1:] != above[:, :-1]).sum(axis=1) - 1.5
 
-    at = np.geomspace(LOWEST_CROSSOVER, 0.999 * frequency_settings.highest_crossover, CROSSOVER_STEPS)
+    at = np.geomspace(LOWEST_CROSSOVER, 0.999 * HIGHEST_CROSSOVER, CROSSOVER_STEPS)
     end = next((high for _, high in ranges_below(at, more)), 0.0)
     return None if end >= at[-1] else end
 

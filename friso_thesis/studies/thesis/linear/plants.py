@@ -14,10 +14,9 @@ from scipy.signal import find_peaks
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.pid import CROSSOVER
-from friso.frequency.bode import PRESCRIBED_SPEEDS, Range, ranges_below
+from friso.frequency.bode import HIGHEST_CROSSOVER, PRESCRIBED_SPEEDS, Range, ranges_below
 from friso.frequency.loops import DISTURBANCE, FORCE, STAGE, cart_states, closed_loop, operating_point, plant
-from friso.frequency.margins import frequencies, loops, plant_poles, plants, spectral_abscissa
-from friso.frequency.settings import settings
+from friso.frequency.margins import MARGIN_DENSITY, frequencies, loops, plant_poles, plants, spectral_abscissa
 from friso.frequency.system import DriveTiming, Members, law_of, limit_cases, limiter_in_series, member, speeds
 from friso.stage.tables import friction_law
 
@@ -77,7 +76,7 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
     """Tell whether no faster controller is stable in the middle of at least one unstable range."""
-    crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVER_COUNT)
+    crossover = np.geomspace(flat[CROSSOVER], HIGHEST_CROSSOVER, CROSSOVER_COUNT)
     many = faster(flat, crossover / flat[CROSSOVER])
     middles = [np.full(CROSSOVER_COUNT, np.sqrt(low * high)) for low, high in unstable]
     return any(bool((spectral_abscissa(many, _sliding(speed)) > 0).all()) for speed in middles)
@@ -191,7 +190,7 @@ def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
 
 
 def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
-    omega = frequencies(flat, member, DriveTiming.of(flat), settings.margin_density, [plant_poles(flat, member)])
+    omega = frequencies(flat, member, DriveTiming.of(flat), MARGIN_DENSITY, [plant_poles(flat, member)])
     resonances, antiresonances = (_peaks(flat, member, omega, sign) for sign in (1, -1))
     low = _low_lines(flat, member, omega[0])
     at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan, low))
