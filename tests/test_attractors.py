@@ -40,8 +40,7 @@ from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.ensemble import bent
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import run_motions
-from friso.hunting.settings import CheckSettings
-from friso.hunting.verdict import own_motion
+from friso.hunting.verdict import CHECK_WORK, own_motion
 from friso.stage import Stage
 from friso.studies.boundary import REPELS, UNKNOWN, place_verdicts
 from friso.studies.sweep import sweep
@@ -502,7 +501,7 @@ def ten_times_larger(flat: dict[str, Any]) -> StageAttractors:
 @pytest.mark.thorough
 def test_a_stage_that_begins_to_hunt_after_hundreds_of_seconds() -> None:
     """A bias on one side, and bristles that hardly yield."""
-    with allowance(CheckSettings().check_work / 2) as work:
+    with allowance(CHECK_WORK / 2) as work:
         (motion,) = find_swings(draw(302, 12).flat())
     assert not work.exhausted
     assert motion.amplitude == pytest.approx(2.90279e-3, rel=1e-4)  # SciPy's as well

@@ -30,8 +30,7 @@ from friso.hunting import (
     moves_that_hunt,
     pushes_that_hunt,
 )
-from friso.hunting.basin import ends_in, evenly
-from friso.hunting.settings import BasinSettings
+from friso.hunting.basin import DRAWN_MOVES, ends_in, evenly
 from friso.hunting.verdict import own_motion
 from friso.stage import Stage
 
@@ -40,8 +39,6 @@ GAINS = pytest.mark.xdist_group("gains")
 
 LONG = 60
 """Periods after which a single run has settled, or swings like the cycle."""
-
-MOVES = BasinSettings().drawn_moves
 
 
 def rigid(crossover: float) -> Stage:
@@ -152,7 +149,7 @@ def test_share_of_moves_is_reproducible() -> None:
     first, second = moves_that_hunt(MOVING, target()), moves_that_hunt(MOVING, target())
     assert first is not None
     assert first == second
-    assert first.count == MOVES
+    assert first.count == DRAWN_MOVES
     assert first.ranges["motion.acceleration"] == pytest.approx([10, 200])
     assert first.ranges["motion.acceleration_time"] == pytest.approx([0.003, 0.06])
     low, high = first.interval
@@ -183,12 +180,12 @@ def test_moves_by_single_runs() -> None:
     """The count equals that of single runs of the draws; eight of them, hunting and resting, are simulated."""
     result = moves_that_hunt(MOVING, target())
     assert result is not None
-    drawn = qmc.scale(evenly(MOVES).T, *zip(*result.ranges.values(), strict=True))
+    drawn = qmc.scale(evenly(DRAWN_MOVES).T, *zip(*result.ranges.values(), strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    item, completed, _ = ends_in(own, MOVES, target())
+    item, completed, _ = ends_in(own, DRAWN_MOVES, target())
     assert completed.all()
     assert item.sum() == result.hunting
-    assert 0 < result.hunting < MOVES
+    assert 0 < result.hunting < DRAWN_MOVES
     for k in (*np.flatnonzero(item)[:4], *np.flatnonzero(~item)[:4]):
         acceleration, time = map(float, drawn[k])
         move = there_and_back(f"{5.2 + LONG * cycle().period!r} s").replace("30 ms", f"{time!r} s")

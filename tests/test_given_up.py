@@ -30,10 +30,11 @@ from friso.hunting import (
     verdict,
 )
 from friso.hunting.attractors import Attractors
+from friso.hunting.basin import KICK_COUNT
 from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
-from friso.hunting.settings import BasinSettings, CheckSettings
 from friso.hunting.verdict import (
+    MASS_CHANGES,
     judge,
 )
 from friso.stage import Stage
@@ -73,7 +74,7 @@ def test_kicks_whose_runs_were_given_up_make_no_window() -> None:
     assert large.unknown > 0
     assert large.searched[1] == large.windows[-1][1] < 8e-3
     nothing = displaced(beyond(2e-3), beyond(1))
-    assert (nothing.windows, nothing.unknown) == ((), BasinSettings().kick_count)
+    assert (nothing.windows, nothing.unknown) == ((), KICK_COUNT)
     assert nothing.searched == pytest.approx((1e-3 / 30, 0.3))
 
 
@@ -108,7 +109,7 @@ def judged(
     """The verdict on a stage that something attracts, where its own motion ends so, and is completed or not; and with
     the last of the other masses."""
     attraction = replace(fake_hunting(fake_cycle(), certain=certain), surveyed=surveyed(complete))
-    runs = np.array([(ends, completed)] * (len(CheckSettings().mass_changes) - 1) + [other or (ends, completed)])
+    runs = np.array([(ends, completed)] * (len(MASS_CHANGES) - 1) + [other or (ends, completed)])
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "ends_in": lambda *_: (*runs.T, np.full(len(runs), swing)),

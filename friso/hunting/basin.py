@@ -22,7 +22,6 @@ from friso.hunting.motions import run_motions, some_of
 from friso.hunting.path import SEARCH_LIMITS
 from friso.hunting.return_map.attracting import motions_go_on
 from friso.hunting.return_map.landing_map import LandingMap
-from friso.hunting.settings import basin_settings
 from friso.intervals import share_interval
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
@@ -103,6 +102,13 @@ def ends_in(
     return ends, completed, swing
 
 
+JUDGED_PERIODS = 1.5  # [periods]
+"""Length of the end of a run that is judged. Shorter ones miss a whole swing; longer ones include the transient."""
+
+CAUGHT_SWING_SHARE = 0.003
+"""Largest difference in swing between a run and the attractor at which the run need not be continued."""
+
+
 def _ends_closed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -114,7 +120,7 @@ def _ends_closed(
     """
     size, lasting, early, last = (
         np.broadcast_to(part, (count,))
-        for part in (2 * target.amplitude, target.lasting, target.early, basin_settings.judged_periods * target.period)
+        for part in (2 * target.amplitude, target.lasting, target.early, JUDGED_PERIODS * target.period)
     )
     ends, completed, swing, since = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count), np.zeros(count)
     left, until, leg = np.arange(count), np.minimum(early, lasting), np.max(last_corner(flat)) + early
@@ -122,13 +128,17 @@ def _ends_closed(
         part = some_of(flat, left), leg[left], last[left], starts
         swing[left], completed[left], starts = _last_swing(*part, SURVEY_RTOL, **options)
         final = until[left] >= lasting[left]
-        close = np.abs(swing[left] / size[left] - 1) <= basin_settings.caught_swing_share
+        close = np.abs(swing[left] / size[left] - 1) <= CAUGHT_SWING_SHARE
         ends[left] = completed[left] & np.where(final, lasts(swing[left], 0.0, size[left] / 4), close)
         on = completed[left] & ~ends[left] & ~final
         left, starts, flat = left[on], starts[on], standing(flat)
         since, until = until, np.minimum(2 * until, lasting)
         leg = np.maximum(until - since, last)
     return ends, completed, swing
+
+
+RESTING_END_SHARE = 0.5  # [of the run]
+"""Shortest standstill at the end of a run at rest. A shorter one may only be the wait for the next break-away."""
 
 
 def _ends_observed(
@@ -141,13 +151,11 @@ def _ends_observed(
     peak-to-peak swing [m], all of shape (count,).
     """
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
-    swing, completed, _ = _last_swing(
-        flat, after, basin_settings.judged_periods * target.period, starts, TIGHT_SURVEY_RTOL, **options
-    )
+    swing, completed, _ = _last_swing(flat, after, JUDGED_PERIODS * target.period, starts, TIGHT_SURVEY_RTOL, **options)
     ends = completed & lasts(swing, 0.0, np.broadcast_to(target.amplitude, (count,)) / 2)
     if (others := np.flatnonzero(completed & ~ends)).size:
         begin = None if starts is None else starts[others]
-        part = some_of(flat, others), after[others], basin_settings.resting_end_share * after[others]
+        part = some_of(flat, others), after[others], RESTING_END_SHARE * after[others]
         swing[others], completed[others], _ = _last_swing(*part, begin, TIGHT_SURVEY_RTOL, **options)
     return ends, completed, swing
 
@@ -226,10 +234,14 @@ def displacements_that_hunt(
     return kick_windows(hunts, target.amplitude, _symmetric(stage))
 
 
+RUNAWAY_PERIODS = 200.0  # [typical periods]
+"""Time after which a motion that has not diverged does not diverge."""
+
+
 def displacements_that_run_away(stage: Stage) -> Kick:
     """Find the displacements after which a stage with a force limit and no anti-windup diverges."""
     flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
-    end = basin_settings.runaway_periods * float(typical_period(stages)[0])
+    end = RUNAWAY_PERIODS * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Run the stage from displacements [m]; return which diverge, and which are certain, (n,)."""
@@ -282,28 +294,43 @@ def kick_windows(
     return Kick(tuple(windows), (max(low), min(high)), sum(side.unknown for side in sides), symmetric)
 
 
+KICK_RANGE = (1 / 30, 300.0)  # [least attracting motions]
+"""Smallest and largest kick. Smaller ones do not break away; larger ones meet the force limit."""
+
+KICK_COUNT = 128
+"""Kicks tried. Windows narrower than a step are missed; more kicks take longer."""
+
+KICK_EDGE_SHARE = 0.01
+"""Precision of the edges of windows, which are shown with three digits."""
+
+KICKS_BETWEEN = 7
+"""Kicks tried at once between the edges of a window, which take hardly longer than one."""
+
+
 def _windows_of_sizes(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
     """Find the windows of positive kicks that hunt (see `kick_windows`)."""
-    tried = np.geomspace(
-        basin_settings.kick_range[0] * unit, basin_settings.kick_range[1] * unit, basin_settings.kick_count
-    )
+    tried = np.geomspace(KICK_RANGE[0] * unit, KICK_RANGE[1] * unit, KICK_COUNT)
     hunting, completed = hunts(tried)
     kicks, hunting, unknown = tried[completed], hunting[completed], int(np.count_nonzero(~completed))
     if not kicks.size:
         return Kick((), (float(tried[0]), float(tried[-1])), unknown)
     edges = np.flatnonzero(hunting[1:] != hunting[:-1])
     low, high = kicks[edges], kicks[edges + 1]
-    while edges.size and np.any(high > (1 + basin_settings.kick_edge_share) * low):
-        between = np.geomspace(low, high, basin_settings.kicks_between + 2, axis=1)
-        ends, completed = (part.reshape(-1, basin_settings.kicks_between) for part in hunts(between[:, 1:-1].ravel()))
+    while edges.size and np.any(high > (1 + KICK_EDGE_SHARE) * low):
+        between = np.geomspace(low, high, KICKS_BETWEEN + 2, axis=1)
+        ends, completed = (part.reshape(-1, KICKS_BETWEEN) for part in hunts(between[:, 1:-1].ravel()))
         unknown += int(np.count_nonzero(~completed))
         unlike = completed & (ends != hunting[edges, None])
-        last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), basin_settings.kicks_between)
+        last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), KICKS_BETWEEN)
         low, high = (between[np.arange(len(edges)), last + step] for step in (0, 1))
     places = np.where(hunting[edges], low, high)  # the side that hunts
     turns = [*([kicks[0]] if hunting[0] else []), *places, *([kicks[-1]] if hunting[-1] else [])]
     windows = tuple((float(a), float(b)) for a, b in zip(turns[::2], turns[1::2], strict=True))
     return Kick(windows, (float(kicks[0]), float(kicks[-1])), unknown)
+
+
+DRAWN_MOVES = 128
+"""Moves drawn. The interval of the fraction narrows with the root of this number."""
 
 
 def moves_that_hunt(
@@ -318,9 +345,9 @@ def moves_that_hunt(
     flat = stage.flat()
     if not (ranges := motion_of(flat).varied(flat, SEARCH_LIMITS.move_shares)):
         return None
-    drawn = zip(ranges.items(), evenly(basin_settings.drawn_moves), strict=True)
+    drawn = zip(ranges.items(), evenly(DRAWN_MOVES), strict=True)
     moved = {**flat, **{key: low + places * (high - low) for (key, (low, high)), places in drawn}}
-    ends, decided = _caught(moved, basin_settings.drawn_moves, target, widest, landing_map)
+    ends, decided = _caught(moved, DRAWN_MOVES, target, widest, landing_map)
     return MoveShare(int(decided.sum()), int(ends[decided].sum()), ranges) if decided.any() else None
 
 

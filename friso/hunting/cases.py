@@ -16,7 +16,7 @@ from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.engine.side_by_side import side_by_side
 from friso.equations.motion import size, stands
 from friso.equations.structure import structure
-from friso.hunting.attractors.settings import settings
+from friso.hunting.attractors.rounds import RUN_TURNING_POINTS
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.feeding import Feeding, feeding
@@ -26,10 +26,9 @@ from friso.hunting.margin import unstable_bandwidths
 from friso.hunting.measures import bands_of, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
 from friso.hunting.path import BandwidthWindow
-from friso.hunting.settings import ToleranceSettings, check_settings
 from friso.hunting.stage_margins import BandwidthAdvice, ParameterMargin, advised, friction_margin
 from friso.hunting.tracking import Dwell, StickSlipSpeeds, Tracking, dwells, is_moved_evenly, stick_slip, tracking
-from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
+from friso.hunting.verdict import CHECK_WORK, PARTS, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
@@ -134,8 +133,8 @@ PART_COUNT = len(PARTS) + 1
 """Number of parts of a check: the parts of its verdict, and its margin in static friction."""
 
 
-LONG_RUN_RTOL = ToleranceSettings().long_run_rtol
-"""Relative tolerance of runs that only show how a motion ends. Runs from which times are taken are finer."""
+LONG_RUN_RTOL = 1e-6
+"""Tolerance of runs that only show how a motion ends. Times and widths come from finer runs."""
 
 
 def check(
@@ -173,7 +172,7 @@ def check(
             rtol,
             traces,
             done,
-            share * check_settings.check_work,
+            share * CHECK_WORK,
             lambda verdict: tell(names[-1], verdict),
             margins,
         )
@@ -187,13 +186,17 @@ def needed_kernels(stage: Stage) -> set[KernelRequest]:
     return set[KernelRequest]().union(*map(_needed, stage.variants().values()))
 
 
+FREE_WORK_SHARE = 0.58
+"""Fraction of the work for the case with a free joint, whose limiter chatters."""
+
+
 def _share(stage: Stage) -> float:
     """Return the fraction of a check's work that a variant of the stage may take.
 
     It depends on whether the variant has a free joint.
     """
     free = stage.joint is not None and not stage.joint.locked
-    return check_settings.free_work_share if free else 1 - check_settings.free_work_share
+    return FREE_WORK_SHARE if free else 1 - FREE_WORK_SHARE
 
 
 def check_given(stage: Stage, rtol: float = SIMULATION_RTOL, progress: Progress = silent) -> Case:
@@ -203,12 +206,19 @@ def check_given(stage: Stage, rtol: float = SIMULATION_RTOL, progress: Progress 
     """
     checked_rtol(rtol)
     kernels(_needed(stage))
-    return _case(stage, rtol, False, Tally(progress, PART_COUNT), check_settings.check_work)
+    return _case(stage, rtol, False, Tally(progress, PART_COUNT), CHECK_WORK)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
     """Return the kernels for a check of the stage as it is, without variants of its joint."""
     return kernels_to_judge(structure(stage.flat()))
+
+
+FEEDING_WORK_SHARE = 0.3
+"""Least fraction of a case's work for the search of the cause that feeds a cycle."""
+
+FRICTION_MARGIN_WORK_SHARE = 0.4
+"""Work for the margin in static friction, as a fraction of that of a case."""
 
 
 def _case(
@@ -237,19 +247,19 @@ def _case(
 
     options = measuring_options(rtol, bands=bands_of(flat))
     with allowance() as spent:
-        (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(options, room=settings.run_turning_points))
+        (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(options, room=RUN_TURNING_POINTS))
         measures = measure_runs(flat, runs, bands_of(flat))
         judgement = judge(stage, measures, max(rtol, LONG_RUN_RTOL), begin, work - spent.used, tell)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
     fed = None
     if judgement.swing and structure(flat).plays:
-        fed = _fed(stage, max(work - spent.used, check_settings.feeding_work_share * work))
+        fed = _fed(stage, max(work - spent.used, FEEDING_WORK_SHARE * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
     static_friction, lost = None, unstable_bandwidths(stage) if judgement.hunting.possible else ()
     if margins:
         begin(CheckPart.FRICTION)
-        with allowance(check_settings.friction_margin_work_share * work):
+        with allowance(FRICTION_MARGIN_WORK_SHARE * work):
             static_friction = friction_margin(stage, judgement)
         if static_friction and static_friction.open_sides:
             judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
@@ -301,6 +311,10 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
         return None
 
 
+LIMIT_FORCE_SHARE = 1e-9  # [of the limit]
+"""Largest difference between a force and its limit that is only rounding."""
+
+
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
     """Return the controller's force limit [N] if it holds the stage off its reference, or None.
 
@@ -315,11 +329,7 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
     shape = kernel(structure(flat))
     forces = sampled_outputs(shape, flat, runs.results.ends.T, runs.statistic("ended"))
     force = float(forces[list(shape.outputs).index("force")][0])
-    return (
-        limit
-        if abs(force) > limit * (1 - check_settings.limit_force_share) or (possible and limit < breakaway)
-        else None
-    )
+    return limit if abs(force) > limit * (1 - LIMIT_FORCE_SHARE) or (possible and limit < breakaway) else None
 
 
 def _breakaway(flat: Mapping[str, Any]) -> float:

@@ -12,7 +12,6 @@ import numpy as np
 
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.settings import check_settings
 from friso.stage import Stage
 from friso.stage.controllers import NO_SETTINGS, controller_of
 from friso.stage.tables import BACKLASH, MOTOR_MASS, MOTOR_STATES
@@ -53,6 +52,10 @@ def surely_run_away(stages: Ensemble) -> np.ndarray:
     return np.zeros(stages.count, bool) if far is None else far == "unstable"
 
 
+LOOPS_AT_ONCE = 256
+"""Loops of a map that are analysed together, at 0.1 MB each."""
+
+
 @np.errstate(all="ignore")
 def at_lower_gains(stages: Ensemble) -> np.ndarray:
     """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
@@ -66,7 +69,7 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     the viscous friction matter for the largest motions: with a mass m and viscous friction b, they shrink if b k_p > m
     k_i and grow if less. This is Hurwitz's criterion for the loop at any gain.
     """
-    at_once = check_settings.loops_at_once
+    at_once = LOOPS_AT_ONCE
     controller, form = controller_of(stages.flat), stages.structure.controller
     settings = form.settings if form else NO_SETTINGS
     if not controller.loop_gain or settings.bends:
@@ -75,19 +78,24 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     return np.concatenate([_at_lower_gains(stages.take(part)) for part in parts])
 
 
+LOWER_GAIN_SHARES = (1e-06, 1.0, 37)
+"""First and last gain, and number of gains, at which stability is computed: twelve per decade."""
+
+LEAST_GROWTH_RATE = 1e-5  # [natural frequencies]
+"""Slowest growth rate that is not rounding. A stage that sticks has poles at 0."""
+
+
 def _at_lower_gains(stages: Ensemble) -> np.ndarray:
     """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
 
     The stages are few enough for the memory, and their controller names the keys of its gain.
     """
-    shares = np.geomspace(*check_settings.lower_gain_shares)
+    shares = np.geomspace(*LOWER_GAIN_SHARES)
     controller, form = controller_of(stages.flat), stages.structure
     flat = stages.take(np.repeat(np.arange(stages.count), len(shares))).flat
     gains = {key: flat[key] * np.tile(shares, stages.count) for key in map(controller.key, controller.loop_gain)}
     slower = Ensemble.held({**flat, **gains}, stages.count * len(shares), form=form)
-    growths = _growth(_sliding(slower, _rates(slower), np.min)) / (
-        check_settings.least_growth_rate * slower.number("rate")
-    )
+    growths = _growth(_sliding(slower, _rates(slower), np.min)) / (LEAST_GROWTH_RATE * slower.number("rate"))
     growing, shrinking = (
         (growths > 1).reshape(-1, len(shares)),
         (growths <= 1).reshape(-1, len(shares)),
@@ -122,7 +130,7 @@ def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
 
     A sliding stage is damped by the mean viscous friction of both directions.
     """
-    limit = check_settings.least_growth_rate * stages.number("rate")
+    limit = LEAST_GROWTH_RATE * stages.number("rate")
     return {state: growth > limit for state, growth in _growths(stages).items()}
 
 
@@ -135,7 +143,7 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     switches the force. Without friction, the
     controller must also act alike near the reference and far from it.
     """
-    least_rate = check_settings.least_growth_rate
+    least_rate = LEAST_GROWTH_RATE
     form = stages.structure
     drive, controller = form.transmission, form.controller
     settings = controller.settings if controller else NO_SETTINGS
@@ -157,13 +165,25 @@ def lags(stages: Ensemble) -> np.ndarray:
     force comes behind the error, which feeds a swing. A controller whose force never lags below the crossover only
     takes energy out.
     """
-    at_once, controller = check_settings.loops_at_once, stages.structure.controller
+    at_once, controller = LOOPS_AT_ONCE, stages.structure.controller
     lagging = np.zeros(stages.count, bool)
     if controller is not None and not controller.integral:
         pulled_back = np.flatnonzero(stages.number("stiffness") > 0)
         for part in np.split(pulled_back, range(at_once, pulled_back.size, at_once)) if pulled_back.size else ():
             lagging[part] = _lags(stages.take(part))
     return lagging
+
+
+LAG_RATES = (1e-6, 30.0)  # [natural frequencies]
+"""Lowest and highest rate at which lags are looked for. A slower lag rises too slowly to break a stage away."""
+
+LAG_POINTS = 200
+"""Rates at which the phase is computed: 27 per decade, finer than any lag."""
+
+LAG_ANGLE = 1e-3  # [rad]
+"""Phase lag of the force behind the error from which a controller counts as a lag. With a smaller one, the force at
+standstill exceeds that of a slip by only a few thousandths. So the slip stops even if Coulomb friction is a
+hundredth of static friction."""
 
 
 @np.errstate(all="ignore")
@@ -176,12 +196,12 @@ def _lags(stages: Ensemble) -> np.ndarray:
 
     rate = stages.number("rate")
     mass = stages.number("stiffness") / rate**2
-    lowest, highest = check_settings.lag_rates
-    omega = rate[:, None] * np.geomspace(lowest, highest, check_settings.lag_points)
+    lowest, highest = LAG_RATES
+    omega = rate[:, None] * np.geomspace(lowest, highest, LAG_POINTS)
     control = compensator(stages.flat, stages.count).take((STAGE, VELOCITY), (FORCE,)).at(1j * omega)[:, :, 0]
     stiffness = -(control[..., 0] + 1j * omega * control[..., 1])
     acts = np.abs(stiffness) > mass[:, None] * omega**2
-    return np.any(acts & (np.angle(stiffness) < -check_settings.lag_angle), axis=1)
+    return np.any(acts & (np.angle(stiffness) < -LAG_ANGLE), axis=1)
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
@@ -213,11 +233,15 @@ def _motor_state(stages: Ensemble, which: int) -> int:
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
 
+DERIVATIVE_STEP_SHARE = 1e-6  # [of the states]
+"""Step of numerical derivatives. A smaller one is rounding; a larger one includes the curvature of friction."""
+
+
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
     """Yield states (count, states) at zero but for one state moved slightly, each state in turn."""
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
-        moved[:, k] = check_settings.derivative_step_share * scale
+        moved[:, k] = DERIVATIVE_STEP_SHARE * scale
         yield moved
 
 
@@ -233,11 +257,12 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
     if stages.structure.plays:  # the loop is open within a backlash
         flank[:, _motor_state(stages, 0)] = stages.flat[BACKLASH]
     moved = ((flank + step, flank - step) for step in _displaced_states(stages))
-    columns = [
-        (stages.rates(ahead) - stages.rates(behind)) / (2 * check_settings.derivative_step_share)
-        for ahead, behind in moved
-    ]
+    columns = [(stages.rates(ahead) - stages.rates(behind)) / (2 * DERIVATIVE_STEP_SHARE) for ahead, behind in moved]
     return np.stack(columns, axis=2) / stages.scales[:, :, None]
+
+
+VISCOUS_SPEED = 1e3  # [loop speeds]
+"""Speed, in units of the loop's, at which friction that falls with speed has become viscous."""
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
@@ -259,8 +284,8 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
         unit = stages.scales[:, body]
         for k, step in enumerate(_displaced_states(stages)):
             change = _force(stages, step, output) - _force(stages, -step, output)
-            matrix[:, body, k] += change / (2 * check_settings.derivative_step_share * own * unit)
-        both = [_viscous(stages, way * check_settings.viscous_speed * unit, output) for way in (1.0, -1.0)]
+            matrix[:, body, k] += change / (2 * DERIVATIVE_STEP_SHARE * own * unit)
+        both = [_viscous(stages, way * VISCOUS_SPEED * unit, output) for way in (1.0, -1.0)]
         matrix[:, body, body] -= of_directions(both, axis=0) / own
     bristles = kernel.having(Role.BRISTLE)
     return np.delete(np.delete(matrix, bristles, 1), bristles, 2)

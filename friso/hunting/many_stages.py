@@ -33,7 +33,7 @@ from friso.hunting.motions import (
     run_motions,
     some_of,
 )
-from friso.hunting.settings import check_settings
+from friso.hunting.verdict import RUNAWAY_SWING_FACTOR
 from friso.hunting.what_attracts import surveyed_roughly
 
 
@@ -190,7 +190,7 @@ def judge_runs(
         ends, completed, swing = ends_in(some_of(flat, chosen), chosen.size, targets, threads=threads, cancel=cancel)
         completed &= ~swings_seldom(targets, ends, swing)
         if winds_up_at_a_limit(stages):
-            completed &= ~(ends & (swing > check_settings.runaway_swing_factor * 2 * targets.amplitude))
+            completed &= ~(ends & (swing > RUNAWAY_SWING_FACTOR * 2 * targets.amplitude))
         in_cycle[chosen], decided[chosen] = ends, completed
         settled = np.isfinite(motions.settling[chosen]) & (swing <= resting(flat, count)[chosen])
         restless = chosen[completed & ~ends & ~settled]

@@ -13,7 +13,6 @@ from friso.hunting.cycle.ensemble import Ensemble, spans
 from friso.hunting.loop import unstable_among
 from friso.hunting.path import SEARCH_LIMITS, AttractionEnd, BandwidthWindow, LossKind, ParameterPath, bandwidth_path
 from friso.hunting.path_search import PathSearch
-from friso.hunting.settings import check_settings
 from friso.stage import Stage
 
 LOWEST, HIGHEST = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
@@ -114,12 +113,16 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     return SearchedBandwidths(outermost, windows, lower, contradicts)
 
 
+LOOP_BANDWIDTHS = 200
+"""Bandwidths at which the loop's stability is computed, 2 % apart, and again between two of these, 0.01 % apart."""
+
+
 def unstable_bandwidths(stage: Stage) -> tuple[BandwidthWindow, ...]:
     """Find the bandwidths of `SEARCH_LIMITS` at which the loop of a stage is unstable, whatever the friction.
 
     The loop is unstable while the stage sticks, or while it slides. Windows narrower than a step may be missed.
     """
-    count, path = check_settings.loop_bandwidths, bandwidth_path(stage.flat(), attracting=True)
+    count, path = LOOP_BANDWIDTHS, bandwidth_path(stage.flat(), attracting=True)
 
     def end(inside: float, outside: float) -> AttractionEnd:
         """Return where the loop becomes stable between a factor at which it is not, and one at which it is."""

@@ -14,12 +14,10 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner, rests
 from friso.equations.structure import shared_structure
-from friso.hunting.attractors.rounds import loose_from
-from friso.hunting.attractors.settings import settings
+from friso.hunting.attractors.rounds import LEAST_SWING, loose_from
 from friso.hunting.criteria import COUNTED_ABOVE, lasts
 from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, wait
 from friso.hunting.measures import Measures, measure_runs, measuring_options, swing_of
-from friso.hunting.settings import check_settings
 from friso.hunting.turning import LAST_HALF, LAST_QUARTER
 
 
@@ -74,6 +72,16 @@ def rests_off(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     return off
 
 
+LEAST_FOLLOWED_WAITS = 120.0  # [longest waits]
+"""Shortest continuation in waits, which slow stages need for as many swings."""
+
+LEAST_FOLLOWED_TIME = 1000.0  # [s]
+"""Shortest time for which motions that have not settled are continued."""
+
+STEADY_MOTION_SHARE = 0.01
+"""Largest change of a steady swing over a quarter of the run. With more it grows or decays."""
+
+
 @dataclass(frozen=True)
 class FollowedMotions:
     """Motions of stages without a stable cycle, arrays of shape (count,).
@@ -107,8 +115,8 @@ class FollowedMotions:
         `flat` has the keys of their `count` stages in SI. Raises Exhausted if an allowance of work is used up.
         """
         stages = Ensemble.held(flat, count, form=shared_structure(flat))
-        waits = check_settings.least_followed_waits * wait(stages, loose_from(stages))
-        lasts_for = np.maximum(np.maximum(check_settings.least_followed_time, flat["motion.duration"]), waits)
+        waits = LEAST_FOLLOWED_WAITS * wait(stages, loose_from(stages))
+        lasts_for = np.maximum(np.maximum(LEAST_FOLLOWED_TIME, flat["motion.duration"]), waits)
         long = {**flat, "motion.duration": lasts_for + last_corner(flat)}
         last = run_motions(long, count, replace(run_options, window=LAST_QUARTER))
         done = last.completed.copy()
@@ -117,7 +125,7 @@ class FollowedMotions:
             done[swinging] = half.completed
             swing = last.swing[swinging]
             self.steady[which[swinging]] = half.completed & lasts(
-                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + check_settings.steady_motion_share)
+                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY_MOTION_SHARE)
             )
         self.followed[which], self.away[which] = np.where(done, lasts_for, np.nan), last.away
         after = np.where(self.rests[which], self.after[which], last.settling)
@@ -153,7 +161,7 @@ def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
 
     `flat` has the keys of stages of one structure in SI.
     """
-    return 2 * settings.least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
+    return 2 * LEAST_SWING * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble, stuck
 from friso.hunting.cycle.find import CYCLE_RTOL, described, kept
 from friso.hunting.cycle.shooting import close
-from friso.hunting.settings import edge_settings
 
 
 @dataclass(frozen=True)
@@ -154,6 +153,12 @@ class ParameterPath:
         return np.arange(self.own + 1, len(self.factors)) if side > 0 else np.arange(self.own - 1, -1, -1)
 
 
+BEYOND_BANDWIDTHS = (1.0095, 1.03, 1.06)
+"""Factors beyond the end of an orbit in bandwidth at which other attractors are looked for. The first makes the
+edge accurate to one per cent. Most windows to which no orbit leads lie at the others, and they are narrower than
+the steps of a search through all bandwidths."""
+
+
 def bandwidth_path(flat: Mapping[str, Any], attracting: bool) -> ParameterPath:
     """Return the path along which the whole controller of a stage becomes faster.
 
@@ -165,7 +170,7 @@ def bandwidth_path(flat: Mapping[str, Any], attracting: bool) -> ParameterPath:
     lowest, highest = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
     below = np.geomspace(lowest, 1.0, round(-to_lower * np.log10(lowest)), endpoint=False)
     above = np.geomspace(1.0, highest, round(to_higher * np.log10(highest)) + 1)[1:]
-    return ParameterPath.of(lambda factors: faster(flat, factors), below, above, edge_settings.beyond_bandwidths)
+    return ParameterPath.of(lambda factors: faster(flat, factors), below, above, BEYOND_BANDWIDTHS)
 
 
 def static_friction_path(flat: Mapping[str, Any]) -> ParameterPath:
@@ -182,11 +187,34 @@ def key_path(flat: Mapping[str, Any], key: str) -> ParameterPath:
     return _path_of_factors(lambda factors: {**flat, key: flat[key] * factors}, 1 / SEARCH_LIMITS.most_friction)
 
 
+MARGIN_STEPS = (0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0)  # [of the log of the farthest factor]
+"""Values tried first on either side of the stage's own. They lie closest together near it, and are as many as most
+processors run at once."""
+
+BEYOND_FACTORS = (1.03, 1.06)
+"""Factors beyond the end of an orbit in another parameter, which is shown with fewer digits. Nearer, motions take
+long to decay."""
+
+
 def _path_of_factors(scaled: Callable[[np.ndarray], Mapping[str, Any]], lowest: float) -> ParameterPath:
     """Return a path from the factor `lowest`, at most 1, to the highest one; its steps grow outward."""
-    steps = np.array(edge_settings.margin_steps)
+    steps = np.array(MARGIN_STEPS)
     below = lowest ** steps[::-1] if lowest < 1 else np.empty(0)
-    return ParameterPath.of(scaled, below, SEARCH_LIMITS.most_friction**steps, edge_settings.beyond_factors)
+    return ParameterPath.of(scaled, below, SEARCH_LIMITS.most_friction**steps, BEYOND_FACTORS)
+
+
+CHATTERING_EDGE_STEP = 2e-3  # [log of the parameter]
+"""Step with a chattering limiter. Shorter steps follow the roughness of multipliers."""
+
+FLIP_SEARCH_STEP = 1e-4  # [log of the parameter]
+"""Precision of a flip; the edge is shown with four digits."""
+
+LONGEST_EDGE_STEP = 0.12  # [log of the parameter]
+"""Longest step between orbits that are closed on the way to an edge. Over more, Newton's method mostly fails."""
+
+MET_MULTIPLIER_SHARE = 0.01
+"""Largest difference of a multiplier from its limit at an orbit that is taken for the end. A multiplier that jumps
+past its limit does not come so near."""
 
 
 @dataclass
@@ -270,8 +298,8 @@ class OrbitLine:
         third one is closed half-way.
         """
         chatters, last = self._stages(self.places[:1]).chatters, float(np.log(farthest))
-        tolerance = edge_settings.chattering_edge_step if chatters else edge_settings.flip_search_step
-        step, tries = min(abs(float(np.log(outside)) - self.places[0]), edge_settings.longest_edge_step), 0
+        tolerance = CHATTERING_EDGE_STEP if chatters else FLIP_SEARCH_STEP
+        step, tries = min(abs(float(np.log(outside)) - self.places[0]), LONGEST_EDGE_STEP), 0
         while True:
             at = self._last_stable
             low, beyond = float(self.places[at]), self.places[at + 1 :]
@@ -280,7 +308,7 @@ class OrbitLine:
             if beyond.size:
                 target = self._root(at)
                 near = int(np.abs(self.places - target).argmin())
-                met = abs(abs(self.multiplier[near]) - 1) < edge_settings.met_multiplier_share
+                met = abs(abs(self.multiplier[near]) - 1) < MET_MULTIPLIER_SHARE
                 if (met and abs(self.places[near] - target) < tolerance) or abs(beyond[0] - low) < tolerance:
                     return float(np.exp(target)), self._kind(at)
                 tries += 1
@@ -289,7 +317,7 @@ class OrbitLine:
                 target = low + self.ahead * step if step < abs(last - low) else last
             self.close_at(target)
             closed = target in self.places
-            step = min(1.5 * step, edge_settings.longest_edge_step) if closed else step / 3
+            step = min(1.5 * step, LONGEST_EDGE_STEP) if closed else step / 3
             if not closed and (beyond.size or step < max(tolerance, np.log(self.path.beyond[0]) / 32)):
                 return float(np.exp(low)), "lost"
 

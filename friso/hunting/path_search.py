@@ -17,7 +17,6 @@ from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble, spans
 from friso.hunting.cycle.hunting import surely_told
 from friso.hunting.path import AttractionEnd, BandwidthWindow, LossKind, OrbitLine, ParameterPath
-from friso.hunting.settings import edge_settings
 from friso.hunting.what_attracts import bends, has_a_map, sketched, what_attracts
 
 
@@ -36,6 +35,19 @@ class _Place:
 
 class Beyond(Exception):
     """An attractor was followed to the end of the path."""
+
+
+MOST_ORBITS_FOLLOWED = 8
+"""Most orbits followed one after the other. More than eight in a row were not met."""
+
+REACH_LOG = 0.06  # [log of bandwidth]
+"""First distance ahead at which attractors are looked for. It doubles each time."""
+
+BRACKET_STEPS = 5
+"""Steps in which a bracket is divided. More take more surveys at once, fewer take more rounds."""
+
+EDGE_BRACKET_SHARE = 0.02  # [of the bandwidth]
+"""Widest bracket of an edge to which no orbit was followed. A narrower one takes more surveys."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +79,7 @@ class EdgeSearch:
 
         Raises Beyond if an attractor exists up to the end of the search.
         """
-        for _ in range(edge_settings.most_orbits_followed):
+        for _ in range(MOST_ORBITS_FOLLOWED):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 return self._bracketed(place)
@@ -137,10 +149,10 @@ class EdgeSearch:
         is not certain where gains follow a schedule or windows remember the past: there a swing was found to attract
         again between the factors of the search, narrower than these are apart.
         """
-        reach, ahead, place.kind = edge_settings.reach_log, self._ahead(place.at), "seen"
+        reach, ahead, place.kind = REACH_LOG, self._ahead(place.at), "seen"
         place.outside = _nearer(ahead, place.outside, self.farthest)
         while True:
-            factors = np.geomspace(place.at, place.outside, edge_settings.bracket_steps + 2)[1:]
+            factors = np.geomspace(place.at, place.outside, BRACKET_STEPS + 2)[1:]
             survey = self._told(factors, _followed_from([motion.distance for motion in place.motions]))
             attracts = np.flatnonzero(survey.attracts)
             if attracts.size:
@@ -154,7 +166,7 @@ class EdgeSearch:
                 continue
             place.outside = float(factors[last])
             end = AttractionEnd(place.at, place.outside, bool(survey.decided[last:].all()))
-            if end.reserve <= edge_settings.edge_bracket_share:
+            if end.reserve <= EDGE_BRACKET_SHARE:
                 sure = end.certain and not bends(self.path.stages(np.array([place.at])))
                 return replace(end, certain=sure and self._surely_attracts(place))
 
@@ -179,12 +191,18 @@ class EdgeSearch:
     def _still_ahead(self, at: float, outside: float) -> float:
         """Return `outside`, a factor without attractor, or one farther ahead if `at` has passed it."""
         ahead = self._ahead(at)
-        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * edge_settings.reach_log))
+        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * REACH_LOG))
+
+
+# [of the sticking distance]
+FOLLOWED_STARTS = (0.92, 0.96, 0.98, 0.99, 0.995, 0.9975, 1.0, 1.0025, 1.005, 1.01, 1.02, 1.04, 1.08)
+"""Starts from which a motion is followed to the next bandwidth. A motion moves by less than a tenth, and its basin
+may be narrow."""
 
 
 def _followed_from(distances: list[float]) -> np.ndarray:
     """Return start distances [m], shape (n,), from which motions are followed that stick at some distances [m]."""
-    return np.outer(distances, edge_settings.followed_starts).ravel()
+    return np.outer(distances, FOLLOWED_STARTS).ravel()
 
 
 def _nearer(ahead: float, one: float, other: float) -> float:
@@ -194,6 +212,25 @@ def _nearer(ahead: float, one: float, other: float) -> float:
 
 class Undecided(Exception):
     """Error: the search could not decide whether hunting begins or ends on a side."""
+
+
+BANDWIDTHS_AT_ONCE = 8
+"""Bandwidths surveyed at once, as many as stages in one register."""
+
+SIMULATED_WORK_SHARE = 0.33  # [of the work left]
+"""Work for simulations of the few stages whose maps do not decide. Beside an end of attraction these take long, and
+following an orbit past them decides."""
+
+INSIDE_END_LOG = 0.02  # [log of factor]
+"""Distance from an end on the hunting side at which hunting is told. Nearer, a cycle attracts from hardly anywhere,
+and motions take too long to decay."""
+
+MOST_PROOFS = 6
+"""Rounds of searches after which a side stays open because rough surveys were wrong."""
+
+THOROUGH_MARGIN_STEPS = (1, 3, -1)
+"""Numbers of the values, counted outward, that are searched thoroughly if a rough survey finds no change: 9 and
+23 % off for a farthest factor of three, and the farthest, at which a rough survey once saw hunting that was not."""
 
 
 class PathSearch:
@@ -234,7 +271,7 @@ class PathSearch:
         left = numbers[~self.decided[numbers]]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
         at_once, share = (
-            (edge_settings.bandwidths_at_once, edge_settings.simulated_work_share)
+            (BANDWIDTHS_AT_ONCE, SIMULATED_WORK_SHARE)
             if 2 * len(left) < len(numbers)  # maps decide most
             else (len(left), 1.0)
         )
@@ -303,7 +340,7 @@ class PathSearch:
             raise Undecided
         nearer = end.inside if hunts else end.outside
         before = numbers[side * np.log(self.factors[numbers] / nearer) <= 0]
-        hunting_side = edge_settings.inside_end_log * np.sign(np.log(end.inside / end.outside))
+        hunting_side = INSIDE_END_LOG * np.sign(np.log(end.inside / end.outside))
         inside = float(np.clip(end.inside * np.exp(hunting_side), self.factors[0], self.factors[-1]))
         if hunts and side * np.log(inside) < 0:
             inside = end.inside
@@ -332,10 +369,10 @@ class PathSearch:
         Nearer factors, at which a rough survey found nothing, are searched thoroughly in part. Raises Undecided if
         rough surveys are wrong again and again.
         """
-        for _ in range(edge_settings.most_proofs):
+        for _ in range(MOST_PROOFS):
             hunts = numbers[self.attracts[numbers]]
             nearer = numbers if not hunts.size else numbers[np.abs(numbers - numbers[0]) < abs(hunts[0] - numbers[0])]
-            searched = numbers[[*edge_settings.thorough_margin_steps]]
+            searched = numbers[[*THOROUGH_MARGIN_STEPS]]
             left = np.setdiff1d(np.append(searched[np.isin(searched, nearer)], nearer[-1:]), [*self.inspected])
             if left.size:
                 self._inspect(left)
@@ -425,7 +462,7 @@ class PathSearch:
                 end = np.flatnonzero(~self.attracts[behind])
                 some = [k for k in behind[: end[0] if end.size else None].tolist() if k not in self.inspected]
                 if some:
-                    self._inspect(np.array(some[: edge_settings.bandwidths_at_once]))
+                    self._inspect(np.array(some[:BANDWIDTHS_AT_ONCE]))
         return bool(self.attracts[at])
 
     def _inspect(self, numbers: np.ndarray) -> None:

@@ -23,7 +23,6 @@ from friso.hunting.path import (
     static_friction_path,
 )
 from friso.hunting.path_search import PathSearch, Undecided
-from friso.hunting.settings import check_settings, edge_settings
 from friso.hunting.verdict import Judgement
 from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
@@ -88,6 +87,10 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
     return _margin(static_friction_path(flat), judgement)
 
 
+JOINT_MARGIN_WORK = 2e8
+"""Work for the margins of a joint, which only --details needs: a quarter of a check's time."""
+
+
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
     """Find what change in stroke and stiffness of a free joint starts or ends hunting.
 
@@ -97,7 +100,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
         return {}
-    with allowance(edge_settings.joint_margin_work):
+    with allowance(JOINT_MARGIN_WORK):
         return {key: _margin(key_path(flat, key), judgement) for key in JOINT_KEYS if flat.get(key)}
 
 
@@ -178,6 +181,10 @@ class BandwidthAdvice:
     keeps_friction: bool | None
 
 
+ADVICE_WORK_SHARE = 0.1
+"""Work for two stages that show whether a bandwidth advised keeps a margin, as a fraction of that of a case."""
+
+
 def advised(
     stage: Stage,
     judgement: Judgement,
@@ -193,7 +200,7 @@ def advised(
     fraction of the `work`, and only if there is a margin.
     """
     windows = (*judgement.windows, *unstable)
-    share = check_settings.advice_work_share * work if margin else 0.0
+    share = ADVICE_WORK_SHARE * work if margin else 0.0
     if judgement.swing is None:
         thin = margin is not None and _is_thin(margin)
         return _beyond(stage, AttractionEnd(1.0, 1.0, True), windows, share) if thin else None, None
@@ -210,6 +217,10 @@ def _is_thin(margin: ParameterMargin) -> bool:
     return any(max(end, 1 / end) < SEARCH_LIMITS.edge_distance for end in ends)
 
 
+ADVISED_STEPS = 4
+"""Bandwidths tried for advice, each farther from the edge by the distance that advice keeps: up to twice."""
+
+
 def _beyond(
     stage: Stage, edge: AttractionEnd, windows: tuple[BandwidthWindow, ...], work: float
 ) -> BandwidthAdvice | None:
@@ -221,7 +232,7 @@ def _beyond(
     if _within(windows, edge.outside, edge.outside):
         return None
     first: BandwidthAdvice | None = None
-    for steps in range(1, check_settings.advised_steps + 1):
+    for steps in range(1, ADVISED_STEPS + 1):
         factor = edge.outside * SEARCH_LIMITS.edge_distance ** (ahead * steps)
         within = SEARCH_LIMITS.lowest_bandwidth <= factor <= SEARCH_LIMITS.highest_bandwidth
         reach = factor * SEARCH_LIMITS.edge_distance**ahead

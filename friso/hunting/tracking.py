@@ -24,7 +24,6 @@ from friso.hunting.criteria import settling_of_traces
 from friso.hunting.cycle.ensemble import Ensemble, done, spans
 from friso.hunting.measures import LAST_QUARTER, bands_of, measuring_options
 from friso.hunting.motions import some_of
-from friso.hunting.settings import tracking_settings
 from friso.stage import Stage
 from friso.stage.rig import DURATION, motion_of
 
@@ -140,6 +139,10 @@ def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tu
     return tuple(sorted(listed, key=lambda dwell: dwell.slowness, reverse=True))
 
 
+SAMPLES_OF_A_PERIOD = 4000
+"""Samples of a period. Fewer miss the peak of an error behind a reversal; more take memory."""
+
+
 def tracking(stage: Stage, rtol: float) -> Tracking | None:
     """Return how a stage follows a moving reference; None if its run was not completed.
 
@@ -154,7 +157,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
     if period is not None and period <= end and (orbit := _closed(shape, flat, period, rtol)) is not None:
         start, multiplier = orbit
         begins, ends, end = 0.0, period, 2 * period  # the error behind the last reversal lasts into the next period
-    interval = (ends - begins) / tracking_settings.samples_of_a_period
+    interval = (ends - begins) / SAMPLES_OF_A_PERIOD
     options = RunOptions(rtol=rtol, interval=interval, record_from=np.inf, least_swing=np.inf)
     (runs,) = run_chunks(shape, {**flat, DURATION: end}, 1, options, start)
     if runs.results.statuses[0] != Status.DONE:
@@ -191,6 +194,19 @@ def _reversals(
     return tuple(reversals)
 
 
+CLOSING_ROUNDS = 30
+"""Newton steps, or equal waits, after which a periodic response is abandoned."""
+
+DERIVATIVE_STEP = 1e-4  # [of the scales of the states]
+"""Step of numerical derivatives. Smaller ones are lost in the tolerance; larger ones cross jumps of derivatives."""
+
+CLOSED_DISTANCE = 1e-4  # [of the scales of the states]
+"""Largest distance between states one period apart on a closed response, of which three digits are shown."""
+
+PERIODS_WAITED = 4  # [periods]
+"""Periods of a plain run where jumps of friction's derivatives keep a Newton step from coming closer."""
+
+
 def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:
     """Close the response of a stage to a periodic reference; None if that fails.
 
@@ -215,25 +231,23 @@ def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) 
         return ends
 
     state = later(None, max(1, int(flat[DURATION] / period)))
-    for _ in range(tracking_settings.closing_rounds):
+    for _ in range(CLOSING_ROUNDS):
         if state is None:
             return None
-        beside = np.vstack(
-            [state, state + np.eye(size, state.shape[1]) * tracking_settings.derivative_step * scales[:, None]]
-        )
+        beside = np.vstack([state, state + np.eye(size, state.shape[1]) * DERIVATIVE_STEP * scales[:, None]])
         ends = later(beside)
         if ends is None:
             return None
         gap = (ends[0, :size] - state[0, :size]) / scales
-        by = (ends[1:, :size] - ends[0, :size]).T / (tracking_settings.derivative_step * scales[:, None])
+        by = (ends[1:, :size] - ends[0, :size]).T / (DERIVATIVE_STEP * scales[:, None])
         step = np.linalg.lstsq(np.eye(size) - by, gap, rcond=None)[0]
-        if max(np.abs(gap).max(), np.abs(step).max()) <= tracking_settings.closed_distance:
+        if max(np.abs(gap).max(), np.abs(step).max()) <= CLOSED_DISTANCE:
             return state, float(np.abs(np.linalg.eigvals(by)).max())
         tried = ends[:1].copy()
         tried[0, :size] = state[0, :size] + step * scales
         after = later(tried)
         closer = after is not None and np.abs((after - tried)[0, :size] / scales).max() < np.abs(gap).max() / 2
-        state = tried if closer else later(ends[:1], tracking_settings.periods_waited)
+        state = tried if closer else later(ends[:1], PERIODS_WAITED)
     return None
 
 
@@ -275,6 +289,16 @@ def is_moved_evenly(stage: Stage) -> bool:
     return flat["motion.kind"] == "ramp" and bool(flat[VELOCITY]) and flat.get("friction.model", "none") != "none"
 
 
+SPEEDS_TRIED = (3e-3, 300.0)  # [of the speed of the reference]
+"""Lowest and highest constant speed at which stick-slip is looked for."""
+
+SPEED_COUNT = 41
+"""Speeds tried at first, a third apart. Ranges of stick-slip narrower than a step are missed."""
+
+SPEEDS_BETWEEN = 8
+"""Speeds tried between two with different results. They bracket the change to three per cent."""
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
     """Find out at which speeds a stage sticks and slips; None if that takes more than the given `work`.
@@ -291,7 +315,7 @@ def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
         return None
     own_lasts = bool(lasts[0]) if decided[0] else None
     with suppress(Exhausted), allowance(work):
-        others = np.geomspace(*tracking_settings.speeds_tried, tracking_settings.speed_count)
+        others = np.geomspace(*SPEEDS_TRIED, SPEED_COUNT)
         for _ in range(2):
             more = lasting_swings({**flat, VELOCITY: own * others}, len(others))[:2]
             columns = zip((lasts, decided), more, strict=True)
@@ -302,7 +326,7 @@ def stick_slip(stage: Stage, work: float) -> StickSlipSpeeds | None:
             changes = np.flatnonzero(decided[:-1] & decided[1:] & (lasts[:-1] != lasts[1:]))
             if not changes.size:
                 break
-            count = tracking_settings.speeds_between + 2
+            count = SPEEDS_BETWEEN + 2
             others = np.concatenate([np.geomspace(factors[k], factors[k + 1], count)[1:-1] for k in changes])
     speeds = abs(own) * factors
     return StickSlipSpeeds(
@@ -328,6 +352,25 @@ def _ranges(speeds: np.ndarray, lasts: np.ndarray, decided: np.ndarray) -> tuple
     )
 
 
+LONGER_RUNS = 2
+"""Most runs that follow the first at a speed. A swing that changes slowly is not decided then."""
+
+MOST_SLIDING_STEPS = 2_000_000
+"""Most steps of a run at constant speed. A speed that needs more is not decided."""
+
+NO_SWING_SHARE = 1e-4  # [of the deflection at break-away]
+"""Swing below which a stage slides smoothly."""
+
+LASTING_SHARE = 0.8  # [of the swing of the last run]
+"""Least swing of the next run that lasts."""
+
+DYING_SHARE = 0.3  # [of the swing of the last run]
+"""Largest swing of the next run that dies out."""
+
+LONGER_RUN = 3.0
+"""Length of the next run, which shows whether a swing lasts, in lengths of the last one."""
+
+
 @np.errstate(all="ignore")
 def lasting_swings(flat: Mapping[str, Any], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Tell whether stages that move at constant speeds keep swinging about their references, always from rest.
@@ -339,9 +382,9 @@ def lasting_swings(flat: Mapping[str, Any], count: int) -> tuple[np.ndarray, np.
     shape, lengths = kernel(shared_structure(flat)), _lengths(flat, count)
     lasts, decided, swings = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
     left, durations = np.arange(count), _durations(flat, count)
-    for number in range(1 + tracking_settings.longer_runs):
+    for number in range(1 + LONGER_RUNS):
         moved = {**some_of(flat, left), DURATION: durations[left]}
-        budget = tracking_settings.most_sliding_steps
+        budget = MOST_SLIDING_STEPS
         options = RunOptions(SURVEY_RTOL, window=LAST_QUARTER, record_from=np.inf, least_swing=np.inf, budget=budget)
         swing = np.full(len(left), np.nan)
         for runs in run_chunks(shape, moved, len(left), options):
@@ -349,21 +392,25 @@ def lasting_swings(flat: Mapping[str, Any], count: int) -> tuple[np.ndarray, np.
             swing[runs.numbers] = np.where(done(runs.results), spread, np.nan)
         before = swings[left]
         swings[left] = np.where(np.isfinite(swing), swing, before)
-        small = swing < tracking_settings.no_swing_share * lengths[left]
+        small = swing < NO_SWING_SHARE * lengths[left]
         if number:
-            lasts[left] = ~small & (swing > tracking_settings.lasting_share * before)
-        dies = small | (swing < tracking_settings.dying_share * before)
+            lasts[left] = ~small & (swing > LASTING_SHARE * before)
+        dies = small | (swing < DYING_SHARE * before)
         decided[left] = lasts[left] | dies
         left = left[~decided[left] & np.isfinite(swing)]
         if not left.size:
             break
-        durations[left] *= tracking_settings.longer_run
+        durations[left] *= LONGER_RUN
     return lasts, decided, swings
 
 
 def _lengths(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Return the lengths [m] by which the loops of stages are deflected at break-away, (count,)."""
     return np.broadcast_to(Ensemble.held(flat, count, form=shared_structure(flat)).length, (count,)).astype(float)
+
+
+SWINGS_FOLLOWED = 20.0
+"""Length of a run at constant speed, in times of sticking, slipping and swinging of the loop."""
 
 
 def _durations(flat: Mapping[str, Any], count: int) -> np.ndarray:
@@ -373,13 +420,20 @@ def _durations(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """
     rate = np.broadcast_to(Ensemble.held(flat, count, form=shared_structure(flat)).number("rate"), (count,))
     swing = 2 * np.pi / rate + 2 * _lengths(flat, count) / np.abs(flat[VELOCITY])
-    return np.asarray(tracking_settings.swings_followed * swing)
+    return np.asarray(SWINGS_FOLLOWED * swing)
+
+
+SAMPLES_OF_A_COURSE = 20_000
+"""Samples of the run at the speed of the reference, some hundred in each swing."""
+
+STANDING_SPEED_SHARE = 0.02  # [of the speed of the reference]
+"""Speed below which a stage stands."""
 
 
 def _course(flat: Mapping[str, Any], speed: float) -> tuple[float | None, bool]:
     """Return the period of the error's swing [s] (None: too few swings), and whether the stage sticks in it."""
     shape, duration = kernel(structure(flat)), float(_durations(flat, 1)[0])
-    interval = duration / tracking_settings.samples_of_a_course
+    interval = duration / SAMPLES_OF_A_COURSE
     options = RunOptions(SURVEY_RTOL, interval=interval, record_from=np.inf, least_swing=np.inf)
     (runs,) = run_chunks(shape, {**flat, DURATION: duration}, 1, options)
     samples = runs.results.samples[0]
@@ -389,4 +443,4 @@ def _course(flat: Mapping[str, Any], speed: float) -> tuple[float | None, bool]:
     middle = (error.max() + error.min()) / 2
     rises = np.flatnonzero((error[:-1] < middle) & (error[1:] >= middle))
     period = float(np.diff(rises).mean()) * interval if len(rises) > 2 else None
-    return period, bool((moved < tracking_settings.standing_speed_share).any())
+    return period, bool((moved < STANDING_SPEED_SHARE).any())

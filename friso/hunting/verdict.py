@@ -12,9 +12,9 @@ from friso.engine.allowance import Exhausted, allowance
 from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner
 from friso.hunting.attractors import Target
-from friso.hunting.attractors.rounds import SURVEY_RTOL
-from friso.hunting.attractors.settings import settings
+from friso.hunting.attractors.rounds import RUN_TURNING_POINTS, SURVEY_RTOL
 from friso.hunting.basin import (
+    DRAWN_MOVES,
     Kick,
     MoveShare,
     displacements_that_hunt,
@@ -38,7 +38,6 @@ from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_
 from friso.hunting.measures import Measures, bands_of, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
 from friso.hunting.path import SEARCH_LIMITS, AttractionEnd, BandwidthWindow
-from friso.hunting.settings import basin_settings, check_settings
 from friso.hunting.what_attracts import resolved_map
 from friso.stage import Stage
 
@@ -137,6 +136,13 @@ class Judgement:
         )
 
 
+CHECK_WORK = 8e8
+"""Work of a check, about 10 s on one core. Stages that need more say what was left out."""
+
+SURVEY_WORK_SHARE = 0.4
+"""Fraction of the work for the search for attractors, which decides the verdict."""
+
+
 def judge(
     stage: Stage,
     ran: Measures,
@@ -151,7 +157,7 @@ def judge(
     Kicks and other bandwidths are searched afterwards; a cycle followed from another bandwidth may still contradict the
     verdict. Parts that `work` does not suffice for (see `friso.engine.allowance`) are not certain.
     """
-    work = check_settings.check_work if work is None else work
+    work = CHECK_WORK if work is None else work
     motions = Motions.of(ran)
     begin(CheckPart.ATTRACTION)
     with allowance() as spent:
@@ -159,7 +165,7 @@ def judge(
         attraction = (
             Hunting((), MOVING, True, None)
             if moves_on
-            else hunting(stage, work=check_settings.survey_work_share * work, side=float(ran.offset[0]))
+            else hunting(stage, work=SURVEY_WORK_SHARE * work, side=float(ran.offset[0]))
         )
     if not motions.completed[0]:
         return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))
@@ -169,6 +175,10 @@ def judge(
         return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used, tell)
     begin(CheckPart.BANDWIDTHS)
     return _without_a_target(stage, motions, rtol, attraction, work - spent.used, tell)
+
+
+REST_WORK_SHARE = 0.3
+"""Fraction of the work for continuing a motion that has not come to rest."""
 
 
 def _without_a_target(
@@ -183,12 +193,12 @@ def _without_a_target(
 
     `motions` has its own motion, and `attraction` the search for attractors. `tell` is called with the verdict.
     """
-    with allowance(check_settings.rest_work_share * work) as spent:
+    with allowance(REST_WORK_SHARE * work) as spent:
         rest = followed_motions(
             stage.flat(),
             motions,
             1,
-            replace(measuring_options(rtol, bands=bands_of(stage.flat())), room=settings.run_turning_points),
+            replace(measuring_options(rtol, bands=bands_of(stage.flat())), room=RUN_TURNING_POINTS),
             possible=attraction.possible,
         )
     if rest.away[0] and leaves_for_good(stage):
@@ -225,6 +235,13 @@ def _without_a_target(
     )
 
 
+RUNAWAY_SWING_FACTOR = 2.0
+"""Swing beyond which a motion that does not come back diverges, as a multiple of the attractor's."""
+
+KICK_WORK_SHARE = 0.3
+"""Fraction of the work for kicks and moves; the search for the edge gets all that is left."""
+
+
 def _with_a_target(
     stage: Stage,
     motions: Motions,
@@ -239,20 +256,20 @@ def _with_a_target(
     `target` is how far and how late a run must swing to count as hunting. `begin` and `tell` are called as in `judge`.
     """
     with allowance() as spent:
-        own = own_motion(stage, target, check_settings.rest_work_share * work)
+        own = own_motion(stage, target, REST_WORK_SHARE * work)
         if not own.completed:
             return Judgement("failed", attraction, runs_away=_runs_away(stage, target) and leaves_for_good(stage))
         within = float(motions.settling[0])
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
         doubt = own.doubt or doubt
-        if own.ends and own.swing > check_settings.runaway_swing_factor * _widest(attraction):
+        if own.ends and own.swing > RUNAWAY_SWING_FACTOR * _widest(attraction):
             doubt = HuntingDoubt.MOTION
         sure = np.ones(1, bool)
         word = verdicts(sure, sure, sure, np.array([own.ends]), ~sure)[0]
         if attraction.certain and not doubt:
             tell(word)
         begin(CheckPart.STARTS)
-        starts, started = _starts(stage, attraction, target, check_settings.kick_work_share * work)
+        starts, started = _starts(stage, attraction, target, KICK_WORK_SHARE * work)
     begin(CheckPart.BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     sought = _as_sure(stage, sought, attraction)
@@ -283,6 +300,14 @@ class OwnMotion:
     doubt: str = ""
 
 
+MASS_CHANGES = (0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5)  # [of the mass]
+"""Changes of the masses with which a stage's own motion is run, because no mass is known that exactly. The
+first is 0, the motion itself."""
+
+SMALL_SWING_FACTOR = 12.0
+"""Factor by which a motion that swings by less than the attractor is continued, because it may still grow."""
+
+
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     """Run the stage's own motion, also with slightly different masses, and find how it ends.
 
@@ -290,7 +315,7 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     or less often, may be decaying. It is then continued, if the given work suffices.
     """
     flat = stage.flat()
-    factors = 1 + np.array(check_settings.mass_changes)
+    factors = 1 + np.array(MASS_CHANGES)
     changed = {key: value * factors for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
     ends, completed, swing = ends_in({**flat, **changed}, len(factors), target)
     doubt = HuntingDoubt.RUNS if np.any(ends[completed] != ends[0]) else "" if completed.all() else HuntingDoubt.WORK
@@ -299,8 +324,8 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
         return own
     longer = replace(
         target,
-        early=check_settings.small_swing_factor * target.lasting,
-        lasting=check_settings.small_swing_factor * target.lasting,
+        early=SMALL_SWING_FACTOR * target.lasting,
+        lasting=SMALL_SWING_FACTOR * target.lasting,
     )
     try:
         with allowance(work):
@@ -337,7 +362,7 @@ def _starts(
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     if attraction.passing:  # a swing that is smaller at its end may be transient as well
         return starts, ()
-    widest = np.inf if attraction.lower_gains is None else check_settings.runaway_swing_factor * _widest(attraction)
+    widest = np.inf if attraction.lower_gains is None else RUNAWAY_SWING_FACTOR * _widest(attraction)
     try:
         with allowance(work):
             surveyed = attraction.surveyed
@@ -372,7 +397,7 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
     """
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
-    return lost or (moved is not None and not moved.hunting and moved.count < basin_settings.drawn_moves)
+    return lost or (moved is not None and not moved.hunting and moved.count < DRAWN_MOVES)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:

@@ -17,14 +17,13 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.loop import winds_up_at_a_limit
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
-from friso.hunting.return_map.landing_map import LandingMap
+from friso.hunting.return_map.landing_map import SURE_ERRORS, LandingMap
 from friso.hunting.return_map.mapped import Mapped, map_stages
 from friso.hunting.return_map.settings import settings
-from friso.hunting.settings import ToleranceSettings
 from friso.stage.controllers import NO_SETTINGS, SCHEDULES, dead_band
 
-SKETCH_RTOL = ToleranceSettings().sketch_rtol
-"""Relative tolerance of the runs of a sketch."""
+SKETCH_RTOL = 1e-5
+"""Tolerance of sketches, which separate hunting from settling but do not locate the edge."""
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -66,7 +65,7 @@ def _repelling(mapped: Mapped, stage: int) -> list[Repelling] | None:
     landing_map, length = mapped.maps[stage], float(mapped.stages.length[stage])
     cycles = []
     for point in landing_map.fixed_points():
-        if not abs(point.slope) > 1 + settings.sure_errors * point.error:
+        if not abs(point.slope) > 1 + SURE_ERRORS * point.error:
             return None
         size = abs(point.distance) + abs(float(landing_map.foretold(np.array([point.distance]))[0]))
         cycles.append(Repelling(stage, length * size, point.slope, point.scatter))
@@ -102,6 +101,10 @@ def sketched(stages: Ensemble) -> tuple[np.ndarray, np.ndarray]:
     return (decided if mapped is None else mapped.surely_attract), decided
 
 
+SKETCHED_STARTS = ((0.003, 0.003, 1), (0.02, 3.0, 14))  # [deflections at break-away]
+"""Starts near the reference for a sketch. With fewer, hunting from a usual range of distances is missed."""
+
+
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
     """Return coarse return maps of stages, and for which they decide what attracts, (count,).
 
@@ -110,7 +113,7 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
     """
     if not has_a_map(stages):
         return None, np.zeros(stages.count, bool)
-    mapped = map_stages(stages, settings.sketched_starts, 1, SKETCH_RTOL, sparse=True)
+    mapped = map_stages(stages, SKETCHED_STARTS, 1, SKETCH_RTOL, sparse=True)
     resolved = MapSurvey(mapped, (), np.zeros(stages.count, bool)).resolved
     quiet = [not (found or stages.chatters) for found in mapped.attractors]
     return mapped, resolved & (mapped.surely_attract | quiet)

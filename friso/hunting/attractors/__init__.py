@@ -38,6 +38,29 @@ class Target(ArrayRows):
     observed: Any = False
 
 
+LONGEST_COUNTED_PERIOD = 3.0  # [typical periods]
+"""Longest period used for arrival times. With a slower cycle, every motion would have to be followed for as
+long."""
+
+ARRIVAL_TIME_CONSTANTS = 8.0  # [time constants]
+"""Waiting time near a stable cycle, in time constants of the cycle. After eight of them 0.03 % of a deviation is
+left."""
+
+OBSERVED_SWING_PERIODS = 24.0  # [periods]
+"""Shortest wait for a swing that was only observed, whose time constant is unknown."""
+
+CLOSED_ORBIT_PERIODS = 6.0  # [periods]
+"""Shortest wait for a motion near a closed orbit, however fast the orbit attracts."""
+
+ARRIVAL_PERIODS = (60.0, 600.0)  # [periods]
+"""Shortest and longest time until a motion counts as arrived. If shorter, slow transients pass for attracted; if
+longer, runs cost more and change nothing."""
+
+EARLY_ARRIVAL_SHARE = 0.25
+"""Time of an early check, as a fraction of the arrival time. Most motions have arrived by then, and their runs can
+end."""
+
+
 @dataclass(frozen=True)
 class Attractors:
     """Result of surveying several stages; arrays have the shape (count,).
@@ -73,18 +96,14 @@ class Attractors:
         observed = np.zeros(len(self.decided), bool)
         for motion in self.motions:
             observed[motion.stage] |= motion.observed
-            k, unit = motion.stage, min(motion.period, settings.longest_counted_period * self.typical[motion.stage])
+            k, unit = motion.stage, min(motion.period, LONGEST_COUNTED_PERIOD * self.typical[motion.stage])
             amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
             period[k] = np.fmax(period[k], motion.period)
-            constants = settings.arrival_time_constants * motion.time_constant / unit
-            waited = (
-                settings.observed_swing_periods if motion.observed else settings.closed_orbit_periods
-            ) * motion.period
-            until = max(np.clip(np.nan_to_num(constants), *settings.arrival_periods) * unit, waited)
+            constants = ARRIVAL_TIME_CONSTANTS * motion.time_constant / unit
+            waited = (OBSERVED_SWING_PERIODS if motion.observed else CLOSED_ORBIT_PERIODS) * motion.period
+            until = max(np.clip(np.nan_to_num(constants), *ARRIVAL_PERIODS) * unit, waited)
             lasting[k] = np.fmax(lasting[k], until)
-            early[k] = np.fmax(
-                early[k], settings.early_arrival_share * until if constants < settings.arrival_periods[1] else until
-            )
+            early[k] = np.fmax(early[k], EARLY_ARRIVAL_SHARE * until if constants < ARRIVAL_PERIODS[1] else until)
         return Target(amplitude, period, lasting, early, observed)
 
     def take(self, numbers: np.ndarray) -> Attractors:

@@ -12,14 +12,10 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS, Status
 from friso.engine.batch import FIRST_TURNING_POINTS
-from friso.hunting.attractors.settings import settings
-from friso.hunting.attractors.settings import settings as survey_settings
 from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, done, wait
 from friso.hunting.cycle.find import GUESS_RTOL, Cycles, described
-from friso.hunting.cycle.guess import last_swings, trace_returns
-from friso.hunting.cycle.settings import settings as orbit_settings
+from friso.hunting.cycle.guess import BREAKAWAY_WAITS, last_swings, trace_returns
 from friso.hunting.cycle.shooting import Orbits, close
-from friso.hunting.settings import ToleranceSettings
 
 
 @dataclass(frozen=True)
@@ -48,6 +44,20 @@ class Recurrence(ArrayRows):
     middle: np.ndarray
 
 
+MOST_REPEATING_SWINGS = 12  # [swings]
+"""Longest repetition looked for. Motions that repeat after more swings count as irregular; detecting them costs
+more."""
+
+REPEATED_SWING_SHARE = 0.03  # [of the largest swing]
+"""Largest difference between swings that repeat. If larger, irregular motion passes for periodic."""
+
+CLOSER_REPETITION_SHARE = 0.2
+"""Factor by which a longer repetition must reduce the error to replace a shorter one."""
+
+COMPARED_SWINGS = 16  # [swings]
+"""Number of swings compared to detect a repetition. With fewer, a slow approach to a cycle looks periodic."""
+
+
 @np.errstate(all="ignore")  # swings that a run does not have are NaN
 def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> Recurrence:
     """Detect how the last swings of runs repeat.
@@ -65,19 +75,19 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
     size, middle = high - low, (high + low) / 2
     swings, better = np.zeros(runs, np.int64), np.zeros(runs, np.int64)
     time, better_time, least, earlier = (np.full(runs, np.nan) for _ in range(4))
-    for n in range(1, settings.most_repeating_swings + 1):
+    for n in range(1, MOST_REPEATING_SWINGS + 1):
         compared = _compared(n)
         if room < compared + n:
             break
         deviations = _deviation(values, n, room) / size
         takes = (times[:, room - compared :] - times[:, room - compared - n : room - n]).mean(axis=1)
-        same = (deviations <= settings.repeated_swing_share) & (mirrored | (n % 2 == 0))
+        same = (deviations <= REPEATED_SWING_SHARE) & (mirrored | (n % 2 == 0))
         first = same & (swings == 0)
         swings[first], time[first] = n, takes[first]
-        closer = first | (same & (deviations < settings.closer_repetition_share * least))
+        closer = first | (same & (deviations < CLOSER_REPETITION_SHARE * least))
         better[closer], better_time[closer], least[closer] = n, takes[closer], deviations[closer]
-        if room - settings.compared_swings >= compared + n:
-            earlier[closer] = (_deviation(values, n, room - settings.compared_swings) / size)[closer]
+        if room - COMPARED_SWINGS >= compared + n:
+            earlier[closer] = (_deviation(values, n, room - COMPARED_SWINGS) / size)[closer]
     return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, earlier, mean, middle)
 
 
@@ -97,9 +107,12 @@ def _compared(swings: int) -> int:
     return max(swings, 4)
 
 
-SURVEY_RTOL = ToleranceSettings().survey_rtol
-TIGHT_SURVEY_RTOL = ToleranceSettings().tight_survey_rtol
-"""Relative tolerances of survey runs: the usual one, and a tighter one where only simulations decide."""
+SURVEY_RTOL = 1e-7
+"""Tolerance of surveys. In looser runs rounding errors break stuck stages away; tighter ones take longer and give
+equal results."""
+
+TIGHT_SURVEY_RTOL = 1e-9
+"""Tolerance of repeated runs where only simulations show an attractor. A looser one would be no second opinion."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +131,10 @@ class Pending(ArrayRows):
     loose: np.ndarray
     mirrored: np.ndarray
     rtol: float = SURVEY_RTOL
+
+
+LEAST_TURNS = 3
+"""Fewest turning points in the second half of a round of a stage that swings. With fewer it creeps."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +158,11 @@ class Ends(ArrayRows):
     @property
     def swing(self) -> np.ndarray:
         """Return which runs swing at the end of the round, shape (runs,), periodically or not."""
-        return (self.repeats.swings > 0) | (np.isfinite(self.values).sum(axis=1) >= survey_settings.least_turns)
+        return (self.repeats.swings > 0) | (np.isfinite(self.values).sum(axis=1) >= LEAST_TURNS)
+
+
+TYPICAL_DISTANCE = 0.3  # [deflections at break-away]
+"""Start distance of the swing whose period is the typical period, the unit of all durations."""
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
@@ -149,7 +170,14 @@ def typical_period(stages: Ensemble) -> np.ndarray:
 
     The estimate is based on the sticking time and the loop's frequency.
     """
-    return 2 * (wait(stages, survey_settings.typical_distance * stages.length) + 2 * np.pi / stages.number("rate"))
+    return 2 * (wait(stages, TYPICAL_DISTANCE * stages.length) + 2 * np.pi / stages.number("rate"))
+
+
+CREEP_DISTANCES = (0.001, 1.0, 16)  # [deflections at break-away]
+"""First and last distance, and number of starts, of the test for where a stage breaks away."""
+
+LEAST_OVERSHOOT_SHARE = 0.05  # [of the distance]
+"""Smallest overshoot of a stage that breaks away. A stage with less creeps to its reference."""
 
 
 def loose_from(stages: Ensemble) -> np.ndarray:
@@ -157,13 +185,34 @@ def loose_from(stages: Ensemble) -> np.ndarray:
 
     From smaller distances it creeps home. If it overshoots from none, the result is the largest tested distance.
     """
-    shares = np.geomspace(*survey_settings.creep_distances)
+    shares = np.geomspace(*CREEP_DISTANCES)
     distances = shares * stages.length[:, None]
     sides = (1.0,) if stages.symmetric.all() else (1.0, -1.0)
     returns = np.max([trace_returns(stages, distances, GUESS_RTOL, side).returns for side in sides], axis=0)
-    breaks = returns > survey_settings.least_overshoot_share * distances
+    breaks = returns > LEAST_OVERSHOOT_SHARE * distances
     first = np.where(breaks.any(axis=1), breaks.argmax(axis=1), len(shares) - 1)
     return distances[np.arange(stages.count), first]
+
+
+LEAST_SWING = 0.0004  # [deflections at break-away]
+"""Smallest swing that counts. Smaller ones are below the resolution of runs; a larger limit would miss small
+cycles."""
+
+RUN_TURNING_POINTS = 1 << 14
+"""Turning points stored for a run at first. Runs that need more are repeated; a larger store slows down every run.
+"""
+
+TURNING_POINT_ROOM = 1 << 20
+"""Turning points stored for all runs of a round together, limited by memory."""
+
+ROUND_STEP_LIMIT = 4_000_000  # [steps]
+"""Steps after which a run of a round is stopped. A run that chatters would hold up all others."""
+
+SWING_LEG_SHARE = 0.25  # [of peak to peak]
+"""Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing of a stage that sticks."""
+
+KEPT_SWINGS = 32  # [swings]
+"""Last swings that are stored of each run. Fewer hide repetitions after several swings; more take memory."""
 
 
 def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
@@ -173,7 +222,7 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
     """
     room = FIRST_TURNING_POINTS
     stages, count = runs.stages, runs.stages.count
-    least = survey_settings.least_swing * stages.length
+    least = LEAST_SWING * stages.length
     results = stages.run(
         runs.states,
         runs.durations,
@@ -182,22 +231,24 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
         window=0.5,
         record_from=np.inf,
         least_swing=least,
-        room=max(room, min(survey_settings.run_turning_points, survey_settings.turning_point_room // count)),
-        budget=int(min(budget, survey_settings.round_step_limit)),
+        room=max(room, min(RUN_TURNING_POINTS, TURNING_POINT_ROOM // count)),
+        budget=int(min(budget, ROUND_STEP_LIMIT)),
     )
     completed, away = done(results), np.equal(results.statuses, Status.DIVERGED)
     high, low, steps = (
         results.statistics[:, STATISTICS.index(name)] for name in ("deviation_max", "deviation_min", "attempted")
     )
-    values, times = last_swings(
-        results, np.maximum(survey_settings.swing_leg_share * (high - low), least), survey_settings.kept_swings
-    )
+    values, times = last_swings(results, np.maximum(SWING_LEG_SHARE * (high - low), least), KEPT_SWINGS)
     standing = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
     # a run that repeats itself may swing about its reference for ever
     rest = completed & standing & (repeats.swings == 0)
     ends = Ends(results.ends, completed, away, rest, steps, repeats, values, times)
     return replace(runs, states=results.ends), ends
+
+
+REST_WAITS = 4.0  # [waits]
+"""Standstill after which a stage certainly rests, because the integrator has passed twice from limit to limit."""
 
 
 def _stands_still(
@@ -209,15 +260,21 @@ def _stands_still(
     is the distance from which a stage breaks away.
     """
     distances = np.abs(ends[:, stages.sticking])
-    home = (
-        (swing < loose / 2)
-        & (distances < loose / 2)
-        & (durations / 2 > survey_settings.rest_waits * wait(stages, loose))
-    )
-    aside = (swing < 2 * survey_settings.least_swing * stages.length) & (
-        durations / 2 > 2 * orbit_settings.breakaway_waits * wait(stages, distances)
-    )
+    home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > REST_WAITS * wait(stages, loose))
+    aside = (swing < 2 * LEAST_SWING * stages.length) & (durations / 2 > 2 * BREAKAWAY_WAITS * wait(stages, distances))
     return home | aside
+
+
+LONGEST_WAITS = 24.0  # [longest waits]
+"""Longest round, in the longest sticking time. A slower swing repeats within half of it; longer runs only cost
+time."""
+
+QUIET_ROUND_FACTOR = 10.0
+"""Length of the next round over the last one, for a run that has not swung yet."""
+
+NEXT_ROUND_FACTOR = 3.0
+"""Length of a round over that of the previous one. If smaller, slow transients take many rounds; if larger, the
+last one wastes work."""
 
 
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
@@ -230,11 +287,15 @@ def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
         swing,
         0.0,
         np.minimum(
-            survey_settings.longest_waits * wait(runs.stages, runs.loose),
-            survey_settings.quiet_round_factor * runs.durations,
+            LONGEST_WAITS * wait(runs.stages, runs.loose),
+            QUIET_ROUND_FACTOR * runs.durations,
         ),
     )
-    return replace(runs, durations=np.maximum(survey_settings.next_round_factor * runs.durations, least))
+    return replace(runs, durations=np.maximum(NEXT_ROUND_FACTOR * runs.durations, least))
+
+
+CLOSED_SWING_SHARE = 0.2  # [of peak to peak]
+"""Largest relative difference in size between a closed orbit and the run from which it was started."""
 
 
 def close_orbits(
@@ -260,7 +321,7 @@ def close_orbits(
         if sign < 0:
             starts = starts * np.sign(starts[:, stages.sticking])[:, None]
         cycles = described(stages, close(stages, starts, times, sign, rtol, n), rtol)
-        cycles.closed[~(np.abs(2 * cycles.amplitude / sizes[group] - 1) < settings.closed_swing_share)] = False
+        cycles.closed[~(np.abs(2 * cycles.amplitude / sizes[group] - 1) < CLOSED_SWING_SHARE)] = False
         parts.append((group, cycles))
         return cycles
 
@@ -278,6 +339,10 @@ def close_orbits(
     return parts
 
 
+REPEATED_ORBIT_SHARE = 1e-3
+"""Largest relative difference between an orbit and a simpler one that it passes through several times."""
+
+
 def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
     """Return which closed orbits, shape (count,), only repeat a simpler orbit of `fewer` swings.
 
@@ -288,7 +353,7 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
         return np.zeros(0, bool)
     ends = stages.run(orbits.states, orbits.times * fewer / orbits.swings, rtol).ends[:, stages.sticking]
     sign, sticks = -1.0 if fewer % 2 else 1.0, orbits.states[:, stages.sticking]
-    return np.abs(sign * ends - sticks) < settings.repeated_orbit_share * np.abs(sticks)
+    return np.abs(sign * ends - sticks) < REPEATED_ORBIT_SHARE * np.abs(sticks)
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
@@ -297,9 +362,14 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
     Compared are the sticking distance, in the state numbered `sticking`, and the time of return.
     """
     distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
-    return (np.abs(distances - 1) < settings.repeated_orbit_share) & (
-        np.abs(passes * once.times / orbits.times - 1) < settings.repeated_orbit_share
+    return (np.abs(distances - 1) < REPEATED_ORBIT_SHARE) & (
+        np.abs(passes * once.times / orbits.times - 1) < REPEATED_ORBIT_SHARE
     )
+
+
+SAMPLES_PER_REPETITION = 400
+"""Samples of one repetition when a sticking instant is looked for. Fewer miss short standstills; more take longer.
+"""
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
@@ -313,12 +383,16 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
     numbers, ahead = np.arange(stages.count), np.zeros(stages.count)
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
     for group in (numbers[octave == n] for n in np.unique(octave)):
-        runs, step = pending.take(group), float(times[group].min()) / settings.samples_per_repetition
+        runs, step = pending.take(group), float(times[group].min()) / SAMPLES_PER_REPETITION
         paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step).samples
         for k, path in zip(group, paths, strict=True):
             residuals = stages.unbalanced(path, k)
             ahead[k] = step * _balanced(residuals, path[:, stages.sticking])
     return stages.run(pending.states, np.maximum(ahead, 1e-9 * times), pending.rtol).ends[:, :size]
+
+
+STILL_MOVE_SHARE = 1e-3  # [of peak to peak]
+"""Largest move between samples of a stage that sticks. If larger, slow sliding passes for sticking."""
 
 
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
@@ -330,9 +404,7 @@ def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
     """
     if not np.isfinite(place).any():  # the run failed
         return 0.0
-    standing = np.abs(np.diff(place)) < settings.still_move_share * np.nanmax(
-        place
-    ) - settings.still_move_share * np.nanmin(place)
+    standing = np.abs(np.diff(place)) < STILL_MOVE_SHARE * np.nanmax(place) - STILL_MOVE_SHARE * np.nanmin(place)
     moves = np.where(~standing, np.arange(len(standing)), -1)
     stood = np.arange(len(standing)) - np.maximum.accumulate(moves)
     crossed = np.flatnonzero((residuals[:-1] * residuals[1:] <= 0) & np.isfinite(residuals[1:]))

@@ -12,6 +12,46 @@ from friso.hunting.cycle.ensemble import Ensemble, bent, pushed, spread_over, st
 from friso.hunting.cycle.find import Cycles
 from friso.stage.controllers import FORCE_LIMIT
 
+THOROUGH_STARTS = ((0.001, 0.009, 12), (0.01, 3.0, 96), (4.0, 300.0, 16))  # [deflections at break-away]
+"""Distances at which a stage sticks at first: first, last and number of each range. From the nearest ones most runs
+creep home; from the farthest ones they do not stick. Attractors are missed between two of them."""
+
+LIMITED_STARTS = (500.0, 30000.0, 8)  # [deflections at break-away]
+"""Farther starts with a force limit. A cycle driven by the limit is as large as the limit moves the masses while
+the integrator unwinds."""
+
+OUTER_INTEGRAL_WINDUPS = (-10.0, -1.0, 1.0, 10.0)  # [loop times]
+"""Initial windups of the outer integral of a cascade, of both signs. More multiply the starts."""
+
+PUSHED_STARTS = (0.03, 300.0, 12)  # [speeds that deflect the loop to break-away]
+"""Speeds of stages that start at their reference. They lead where starts at rest do not."""
+
+WOUND_UP_STARTS = ((0.1, 100.0, 24), (0.0, 1.0, 10.0))
+"""Starts without anti-windup: first, last and number of distances, and windups of the integrator."""
+
+FARTHEST_START = 1e5  # [deflections at break-away]
+"""Farthest start. It is a tenth of the deviation at which a run counts as diverged."""
+
+REMEMBERING_STARTS = ((0.01, 10.0, 32), (0.01, 30.0, 128))  # [deflections at break-away]
+"""Starts of stages with several bristles bent in many ways, for other surveys and for a thorough one. Each counts
+seven times, once for each past."""
+
+LEAST_BEND_BACK_SHARE = 1e-3  # [of the travel]
+"""Smallest reversal after bending the bristles. A smaller one leaves them as they were."""
+
+BENDING_TRAVELS = (1e-3, 10.0)  # [deflections at break-away]
+"""Shortest and longest travel by which bristles are bent before a start, from presliding to far beyond it."""
+
+BESIDE_CYCLE_SHARES = (-0.03, -0.003, 0.003, 0.03)  # [of the distance]
+"""Offsets of starts from an unstable cycle, on both sides, that lead to the attractors next to it."""
+
+START_STRIDES = (64, 16, 4, 1)
+"""Strides through the starts of many stages. Every 64th start runs first, because a few starts decide most stages.
+"""
+
+FIRST_ROUND_PERIODS = 24.0  # [typical periods]
+"""Length of the first round. If shorter, slow stages show no swing yet; if longer, stages at rest waste work."""
+
 
 class Starts:
     """Runs to be started: initial states (runs, states) and the numbers of their stages (runs,)."""
@@ -34,8 +74,8 @@ class Starts:
         """
         controller = self.stages.structure.controller
         limited = controller is not None and controller.anti_windup is not None
-        ranges = settings.thorough_starts if thorough else settings.usual_starts
-        units = spread_over(*ranges, *([settings.limited_starts] if limited else []))
+        ranges = THOROUGH_STARTS if thorough else settings.usual_starts
+        units = spread_over(*ranges, *([LIMITED_STARTS] if limited else []))
         for side in (1.0, -1.0):
             which = np.flatnonzero((side > 0) | ~self.stages.symmetric)
             if which.size:
@@ -43,12 +83,12 @@ class Starts:
                 stages = self.stages.take(owners)
                 distances = side * np.tile(units, which.size) * stages.length
                 self._add(owners, stuck(stages, distances))
-                for wound in settings.outer_integral_windups if stages.outer_integrals else ():
+                for wound in OUTER_INTEGRAL_WINDUPS if stages.outer_integrals else ():
                     self._add(owners, stuck(stages, distances, wound / stages.number("rate")))
                 if controller is not None and controller.anti_windup == "none":
                     self._wound_up(which, side)
                 if thorough:
-                    pushes = spread_over(settings.pushed_starts)
+                    pushes = spread_over(PUSHED_STARTS)
                     owners = np.repeat(which, len(pushes))
                     stages = self.stages.take(owners)
                     speeds = np.tile(pushes, which.size) * stages.length * stages.number("rate")
@@ -59,11 +99,11 @@ class Starts:
 
         `which` are the numbers of the stages, which have a force limit; `side` is 1 or -1.
         """
-        span, times = settings.wound_up_starts
+        span, times = WOUND_UP_STARTS
         distances = spread_over(span)
         stages = self.stages.take(np.repeat(which, len(distances)))
         limit = stages.flat[FORCE_LIMIT] / stages.number("stiffness")
-        begin = side * np.minimum(np.tile(distances, which.size) * limit, settings.farthest_start * stages.length)
+        begin = side * np.minimum(np.tile(distances, which.size) * limit, FARTHEST_START * stages.length)
         for wound in times:
             states = stages.at_rest(begin, begin)
             states[:, stages.integral] -= wound * stages.relaxed * begin
@@ -76,12 +116,12 @@ class Starts:
         a travel outward over the distance itself, a long travel out or back, or random travels to and fro. A
         `thorough` survey gets more distances.
         """
-        units = spread_over(settings.remembering_starts[thorough])
+        units = spread_over(REMEMBERING_STARTS[thorough])
         rng = np.random.default_rng(0)
-        shares = np.exp(rng.uniform(np.log(settings.least_bend_back_share), 0.0, (2, len(units))))
-        way = np.exp(
-            rng.uniform(np.log(settings.bending_travels[0]), np.log(settings.bending_travels[1]), len(units))
-        ) * rng.choice([-1.0, 1.0], len(units))
+        shares = np.exp(rng.uniform(np.log(LEAST_BEND_BACK_SHARE), 0.0, (2, len(units))))
+        way = np.exp(rng.uniform(np.log(BENDING_TRAVELS[0]), np.log(BENDING_TRAVELS[1]), len(units))) * rng.choice(
+            [-1.0, 1.0], len(units)
+        )
         for side in (1.0, -1.0):
             which = np.flatnonzero((side > 0) | ~self.stages.symmetric)
             owners = np.repeat(which, len(units))
@@ -99,8 +139,8 @@ class Starts:
         """Add runs that begin on both sides of unstable cycles."""
         which = np.flatnonzero(cycles.closed & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
         owners, away = (
-            np.repeat(which, len(settings.beside_cycle_shares)),
-            np.tile(settings.beside_cycle_shares, which.size),
+            np.repeat(which, len(BESIDE_CYCLE_SHARES)),
+            np.tile(BESIDE_CYCLE_SHARES, which.size),
         )
         size = np.abs(cycles.states[owners, self.stages.sticking])
         self._add(owners, cycles.states[owners] + (away * size)[:, None] * cycles.direction[owners])
@@ -120,7 +160,7 @@ class Starts:
         `state`, shape (kept,), is the final state of that run, and `owner` the number of its stage. A run from that
         state itself could stay on a weakly unstable cycle.
         """
-        states = np.outer(1 + np.array(settings.beside_cycle_shares), state[: self.stages.kernel.initial_size])
+        states = np.outer(1 + np.array(BESIDE_CYCLE_SHARES), state[: self.stages.kernel.initial_size])
         self._add(np.full(len(states), owner), states)
 
     def _add(self, owners: np.ndarray, states: np.ndarray) -> None:
@@ -140,7 +180,7 @@ class Starts:
         rank = np.empty(len(owners), np.int64)
         rank[order] = np.arange(len(owners)) - np.searchsorted(owners[order], owners[order])
         left = np.ones(len(owners), bool)
-        for step in settings.start_strides[-1:] if at_once else settings.start_strides:
+        for step in START_STRIDES[-1:] if at_once else START_STRIDES:
             if (which := np.flatnonzero(left & (rank % step == step // 2))).size:
                 yield self._begun(owners[which], states[which]), owners[which]
             left[which] = False
@@ -157,5 +197,5 @@ class Starts:
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)
         return Pending(
-            stages, begins, settings.first_round_periods * self.period[owners], self.loose[owners], mirrored, self.rtol
+            stages, begins, FIRST_ROUND_PERIODS * self.period[owners], self.loose[owners], mirrored, self.rtol
         )

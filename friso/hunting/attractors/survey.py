@@ -6,10 +6,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from friso.hunting.attractors.rounds import Ends, Pending, Recurrence, close_orbits, lengthened, one_round
+from friso.hunting.attractors.rounds import (
+    COMPARED_SWINGS,
+    Ends,
+    Pending,
+    Recurrence,
+    close_orbits,
+    lengthened,
+    one_round,
+)
 from friso.hunting.attractors.settings import settings
 from friso.hunting.cycle.ensemble import ArrayRows
 from friso.hunting.cycle.find import Cycles
+
+SAME_ORBIT_SHARE = 1e-3
+"""Largest relative difference between two computations of the same closed orbit."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +56,8 @@ class Swinging:
         if self.stage != other.stage:
             return False
         same = (
-            abs(self.amplitude / other.amplitude - 1) < settings.same_orbit_share
-            and abs(self.period / other.period - 1) < settings.same_orbit_share
+            abs(self.amplitude / other.amplitude - 1) < SAME_ORBIT_SHARE
+            and abs(self.period / other.period - 1) < SAME_ORBIT_SHARE
         )
         return same and (self.cycles is None) == (other.cycles is None)
 
@@ -81,6 +92,13 @@ _Kind = tuple[int, float, float]
 """A kind of motion: number of the stage, peak-to-peak deviation [m], and time of repetition [s]."""
 
 
+OUTER_SHARE = 0.25
+"""Outer fraction of the runs beside an unstable cycle that is followed, because these leave it first."""
+
+RUNS_PER_SIDE = 4
+"""Runs followed on either side of an unstable cycle. Fewer would miss the side on which runs leave."""
+
+
 @dataclass(frozen=True)
 class _Beside(ArrayRows):
     """Unstable cycles that runs resemble, arrays of shape (runs,).
@@ -107,9 +125,13 @@ class _Beside(ArrayRows):
         for cycle, side in {*zip(self.cycles.tolist(), sides.tolist(), strict=True)} - {(-1, 0.0)}:
             group = np.flatnonzero((self.cycles == cycle) & (sides == side))
             group = group[np.argsort(-far[group], kind="stable")]
-            group = group[far[group] >= settings.outer_share * far[group[0]]]
-            chosen[group[np.linspace(0, len(group) - 1, settings.runs_per_side).round().astype(int)]] = True
+            group = group[far[group] >= OUTER_SHARE * far[group[0]]]
+            chosen[group[np.linspace(0, len(group) - 1, RUNS_PER_SIDE).round().astype(int)]] = True
         return chosen
+
+
+SAME_MOTION_SHARE = 0.05
+"""Largest relative difference in time and size between runs on the same motion."""
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -124,8 +146,8 @@ def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
     for stage, motions in motions_of.items():
         which = np.flatnonzero(owners == stage)
         for size, time in motions:
-            same = np.abs(ends.repeats.size[which] / size - 1) < settings.same_motion_share
-            like[which] |= same & (np.abs(ends.repeats.time[which] / time - 1) < settings.same_motion_share)
+            same = np.abs(ends.repeats.size[which] / size - 1) < SAME_MOTION_SHARE
+            like[which] |= same & (np.abs(ends.repeats.time[which] / time - 1) < SAME_MOTION_SHARE)
     return like
 
 
@@ -149,6 +171,60 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndar
         )
         for k in np.flatnonzero(cycles.attracting if which is None else which)
     ]
+
+
+THOROUGH_STEP_LIMIT = 16_000_000  # [steps]
+"""Most steps for all runs of a stage in a survey that decides; slow transients need most of them."""
+
+MOST_PERIOD_MULTIPLE = 2
+"""Longest repetition beside an unstable cycle, as a multiple of the cycle's time."""
+
+MOST_ROUNDS = 5
+"""Most rounds of a run. The last one takes two thousand typical periods."""
+
+ENOUGH_ROUNDS = 3
+"""Rounds in which a thorough survey looks for further attractors once one is certain."""
+
+UNPROVED_ROUND_STEPS = 400_000  # [steps]
+"""Most steps of a round of one of many stages, which would keep all others waiting if it chatters."""
+
+CLOSE_FROM_ROUND = 3
+"""Round from which an orbit is closed from every remaining run, if possible."""
+
+REGULAR_FROM_ROUND = 2
+"""Round from which regular motion is trusted. Before two hundred typical periods slow transients look regular."""
+
+SETTLED_SWING_SHARE = 0.005  # [of peak to peak]
+"""Largest error of a repetition from which Newton's method is started to close an orbit."""
+
+LEFT_REPETITIONS = 8
+"""Repetitions over which the growth of a deviation tells that a run leaves a cycle. Over fewer, noise hides it."""
+
+ORBITS_PER_ROUND = 3
+"""Orbits closed per round and stage. Further ones rarely show anything, and each costs as much as a round."""
+
+LEAVING_TIME_CONSTANTS = 15.0  # [time constants]
+"""Time for which runs are followed near an unstable cycle. Afterwards rounding errors have grown to the size of the
+swing."""
+
+LONGEST_LEAVING_ROUNDS = 20.0  # [of the last round]
+"""Longest wait for runs to leave an unstable cycle. A cycle that needs longer leaves its stage undecided."""
+
+UNCHANGED_SWING_SHARE = 2e-3
+"""Largest change of the mean swing over a round. A motion that changes more still grows or decays."""
+
+EXACT_REPETITION_SHARE = 1e-7  # [of peak to peak]
+"""Largest error of a repetition that proves an attractor: no run stays so close to an unstable cycle by chance."""
+
+APPROACH_SHARE = 0.7
+"""Factor by which the error of a repetition must shrink over some swings for the run to approach an orbit."""
+
+CONVERGED_SWING_SHARE = 1e-5  # [of peak to peak]
+"""Largest error of a repetition that counts as converged where attraction need not be proved. Runs come closer than
+a larger one to unstable cycles by chance."""
+
+STEADY_SWING_SHARE = 0.8
+"""Fraction of the swing that a motion must keep over the last round to count as a cycle."""
 
 
 @dataclass
@@ -188,9 +264,7 @@ class Survey:
 
     def __post_init__(self) -> None:
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
-        self.left = np.full(
-            self.count, float(settings.thorough_step_limit if self.decides else settings.quick_step_limit)
-        )
+        self.left = np.full(self.count, float(THOROUGH_STEP_LIMIT if self.decides else settings.quick_step_limit))
         self.rested, self.away = np.zeros(self.count), np.zeros(self.count)
 
     @property
@@ -220,16 +294,14 @@ class Survey:
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
             size, time = 2 * float(cycles.amplitude[k]), float(cycles.orbits.times[k])
-            self._closed += [
-                (int(numbers[k]), size, times * time) for times in range(1, settings.most_period_multiple + 1)
-            ]
+            self._closed += [(int(numbers[k]), size, times * time) for times in range(1, MOST_PERIOD_MULTIPLE + 1)]
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
         """Follow runs round by round to their attractors; `owners`, (runs,), number their stages."""
         before, begun = np.full(len(owners), np.nan), np.abs(runs.states[:, runs.stages.sticking])
-        for number in range(settings.most_rounds):
-            enough = settings.enough_rounds if self.thorough else 0
+        for number in range(MOST_ROUNDS):
+            enough = ENOUGH_ROUNDS if self.thorough else 0
             dropped = (self.attracted[owners] & (number >= enough)) | (self.left[owners] <= 0)
             self.unknown[owners[dropped]] = True
             keep = np.flatnonzero(~dropped)
@@ -237,10 +309,10 @@ class Survey:
                 return
             owners, before, begun = owners[keep], before[keep], begun[keep]
             most = self.left[owners].max()
-            runs, ends = one_round(runs.take(keep), most if self.prove else min(most, settings.unproved_round_steps))
+            runs, ends = one_round(runs.take(keep), most if self.prove else min(most, UNPROVED_ROUND_STEPS))
             for farthest, which in ((self.rested, ends.rest), (self.away, ends.away)):
                 np.maximum.at(farthest, owners[which], begun[which])
-            close_from = settings.close_from_round if self.prove else settings.regular_from_round
+            close_from = CLOSE_FROM_ROUND if self.prove else REGULAR_FROM_ROUND
             swinging = self._still_swinging(runs, owners, ends, early=number < close_from)
             swinging = self._within_budget(swinging, owners, ends)
             swinging = swinging[~self._leaves(runs, owners, ends)[swinging]]
@@ -254,10 +326,10 @@ class Survey:
             most = self._affordable(owners, ends)[moving]
             kinds = moving[self._kinds(owners[moving], ends.take(moving), most, beside.take(moving))]
             swinging = np.union1d(kinds, still)
-            if number == settings.most_rounds - 1:
+            if number == MOST_ROUNDS - 1:
                 return self._last(runs.take(swinging), owners[swinging], ends.take(swinging), before[swinging])
             regular = self._exact(owners[swinging], ends.take(swinging))
-            if number >= settings.regular_from_round:
+            if number >= REGULAR_FROM_ROUND:
                 regular |= self._regular(owners[swinging], ends.take(swinging), before[swinging])
             self._observe(owners[swinging[regular]], ends.take(swinging[regular]), before[swinging[regular]])
             swinging = swinging[~regular]
@@ -280,7 +352,7 @@ class Survey:
         ready = swinging & (ends.repeats.swings > 0)
         if early:
             leave = self._repels(owners, ends) & ~self._stay(owners, ends)
-            ready &= (ends.repeats.deviation < settings.settled_swing_share) & ~leave
+            ready &= (ends.repeats.deviation < SETTLED_SWING_SHARE) & ~leave
         if not self.prove:
             ready &= ~self._exact(owners, ends)
         self._close(runs, owners, ends, np.flatnonzero(ready))
@@ -327,7 +399,7 @@ class Survey:
         for number, kind in enumerate(self._closed):
             offset = np.where(_like([kind], owners, ends), ends.repeats.size / kind[1] - 1, np.inf)
             nearer = np.abs(offset) < np.abs(offsets)
-            cycles[nearer], offsets[nearer] = number // settings.most_period_multiple, offset[nearer]
+            cycles[nearer], offsets[nearer] = number // MOST_PERIOD_MULTIPLE, offset[nearer]
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -342,17 +414,17 @@ class Survey:
         growth count as growing.
         """
         leaves, repeats = np.zeros(len(owners), bool), ends.repeats
-        slow = 1 + settings.settled_swing_share / settings.same_motion_share
+        slow = 1 + SETTLED_SWING_SHARE / SAME_MOTION_SHARE
         for cycle in self.repelling:
             off = np.abs(repeats.size / cycle.size - 1)
-            near = (owners == cycle.stage) & (off < settings.same_motion_share)
+            near = (owners == cycle.stage) & (off < SAME_MOTION_SHARE)
             which = np.flatnonzero(near & (repeats.swings > 0))
             if which.size and abs(cycle.slope) < slow:
                 sizes = np.abs(ends.values[which]) if runs.mirrored[which[0]] else ends.values[which][:, 1::2]
-                apart, times = np.abs(np.diff(sizes, axis=1)), settings.left_repetitions
+                apart, times = np.abs(np.diff(sizes, axis=1)), LEFT_REPETITIONS
                 hidden = apart[:, -1] < cycle.size * cycle.scatter / (abs(cycle.slope) - 1)
                 grows = apart[:, -1] > apart[:, -1 - times] * abs(cycle.slope) ** (times / 2)
-                leaves[which] |= grows | (hidden & (off[which] < settings.settled_swing_share))
+                leaves[which] |= grows | (hidden & (off[which] < SETTLED_SWING_SHARE))
         return leaves
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -369,7 +441,7 @@ class Survey:
 
         Runs of one kind have equal period and size.
         """
-        most, repeats = settings.orbits_per_round if self.thorough else 1, ends.repeats
+        most, repeats = ORBITS_PER_ROUND if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # a slow approach to a symmetric cycle also repeats in pairs
         tries = (
@@ -404,12 +476,12 @@ class Survey:
         A run that may still be leaving an unstable cycle is first followed for as long as that takes. `before` [m] has
         the mean swing one round earlier.
         """
-        kinds = self._kinds(owners, ends, settings.orbits_per_round)
-        leave = settings.leaving_time_constants * self.slowest[owners]
+        kinds = self._kinds(owners, ends, ORBITS_PER_ROUND)
+        leave = LEAVING_TIME_CONSTANTS * self.slowest[owners]
         slow = kinds[leave[kinds] > runs.durations[kinds]]
         if slow.size:
             kinds = np.setdiff1d(kinds, slow)
-            longest = settings.longest_leaving_rounds * runs.durations[slow]
+            longest = LONGEST_LEAVING_ROUNDS * runs.durations[slow]
             longer = replace(runs.take(slow), durations=np.minimum(leave[slow], longest))
             self.unknown[owners[slow[leave[slow] > longest]]] = True
             after, last = one_round(longer)
@@ -423,8 +495,8 @@ class Survey:
         Run, stage number in `owners`, and cycle belong together row by row.
         """
         _, ends = one_round(runs)
-        size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < settings.same_motion_share
-        stays = size & (np.abs(ends.repeats.time / cycles.orbits.times - 1) < settings.same_motion_share)
+        size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < SAME_MOTION_SHARE
+        stays = size & (np.abs(ends.repeats.time / cycles.orbits.times - 1) < SAME_MOTION_SHARE)
         which = np.flatnonzero(stays)
         self.add(of_cycles(owners[which], cycles.take(which), runs.stages.sticking))
 
@@ -434,8 +506,8 @@ class Survey:
         `before` [m], shape (runs,), has the mean swing one round earlier. Runs that resemble an unstable cycle, or a
         motion without a stable orbit, are left out.
         """
-        same = np.abs(ends.repeats.mean / before - 1) < settings.unchanged_swing_share
-        return same & (ends.repeats.deviation < settings.settled_swing_share) & ~self._repels(owners, ends)
+        same = np.abs(ends.repeats.mean / before - 1) < UNCHANGED_SWING_SHARE
+        return same & (ends.repeats.deviation < SETTLED_SWING_SHARE) & ~self._repels(owners, ends)
 
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Return which runs repeat as exactly as only a motion on an attractor does, shape (runs,).
@@ -445,11 +517,9 @@ class Survey:
         """
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
         if self.prove:
-            return (unlike & (repeats.deviation < settings.exact_repetition_share)) | self._stay(owners, ends)
-        approaches = (repeats.deviation < settings.settled_swing_share) & (
-            repeats.deviation < settings.approach_share * repeats.earlier
-        )
-        return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
+            return (unlike & (repeats.deviation < EXACT_REPETITION_SHARE)) | self._stay(owners, ends)
+        approaches = (repeats.deviation < SETTLED_SWING_SHARE) & (repeats.deviation < APPROACH_SHARE * repeats.earlier)
+        return unlike & ((repeats.deviation < CONVERGED_SWING_SHARE) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Return which runs near an unstable cycle stay there, because they lie on another cycle.
@@ -457,7 +527,7 @@ class Survey:
         Such a run repeats with an error far smaller than its offset from the unstable cycle. The shape is (runs,).
         """
         offsets = np.abs(self._beside(owners, ends).offsets)
-        return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
+        return (ends.repeats.swings > 0) & (ends.repeats.deviation < EXACT_REPETITION_SHARE * offsets)
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         """Add runs that swing steadily, but of which no orbit was closed, as observed attractors.
@@ -465,11 +535,9 @@ class Survey:
         The stages of other runs are marked unknown. `before` [m] has the mean swing one round earlier.
         """
         repeats = ends.repeats
-        begun = (before == 0) & ~(
-            repeats.deviation < settings.converged_swing_share
-        )  # it has swung for a few times by now
+        begun = (before == 0) & ~(repeats.deviation < CONVERGED_SWING_SHARE)  # it has swung for a few times by now
         steady = (
-            (repeats.mean > 0) & ~begun & ~(repeats.mean < settings.steady_swing_share * before)
+            (repeats.mean > 0) & ~begun & ~(repeats.mean < STEADY_SWING_SHARE * before)
         )  # or in the first round alone
         self.unknown[owners[~steady]] = True
         for k in np.flatnonzero(steady):
@@ -499,10 +567,14 @@ def _slope(repeats: Recurrence, times: np.ndarray) -> float:
     round.
     """
     (time,), (error,), (earlier,) = repeats.time, repeats.deviation, repeats.earlier
-    shrinks = (error / earlier) ** (time / (times[-1] - times[-1 - settings.compared_swings]))
+    shrinks = (error / earlier) ** (time / (times[-1] - times[-1 - COMPARED_SWINGS]))
     if shrinks < 1:
         return float(shrinks)
-    return float(error ** (time / times[-1])) if error < settings.converged_swing_share else float("nan")
+    return float(error ** (time / times[-1])) if error < CONVERGED_SWING_SHARE else float("nan")
+
+
+SAME_IRREGULAR_SHARE = 0.01  # [of peak to peak]
+"""Largest difference between irregular runs of the same kind over a long round."""
 
 
 def _kinds(
@@ -519,7 +591,7 @@ def _kinds(
     surplus: list[int] = []
     repeats = ends.repeats.swings > 0
     sizes, times = ends.repeats.size, np.nan_to_num(ends.repeats.time)
-    near = np.where(repeats, settings.same_motion_share, settings.same_irregular_share)
+    near = np.where(repeats, SAME_MOTION_SHARE, SAME_IRREGULAR_SHARE)
     cycles, leaves_first = beside.cycles, beside.leave_first
 
     def same_kind(k: int, j: int) -> bool:
@@ -528,8 +600,7 @@ def _kinds(
         Two runs that do not repeat may be of one kind. The result is false if run `j` resembles an unstable cycle.
         """
         same = (
-            abs(sizes[k] - sizes[j]) <= near[k] * sizes[j]
-            and abs(times[k] - times[j]) <= settings.same_motion_share * times[j]
+            abs(sizes[k] - sizes[j]) <= near[k] * sizes[j] and abs(times[k] - times[j]) <= SAME_MOTION_SHARE * times[j]
         )
         return bool(same and repeats[k] == repeats[j] and cycles[j] < 0)
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from friso.hunting.boundary.space import Space
 from friso.hunting.continuation.branch import Branch, Point, Tracer
-from friso.hunting.continuation.locate import LocatedPoint, special_points
-from friso.hunting.continuation.settings import continuation_settings
+from friso.hunting.continuation.locate import SAME_CYCLE_LOG, LocatedPoint, special_points
 from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
@@ -65,6 +64,14 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
     return np.any([np.zeros(len(places), bool), *near], axis=0)
 
 
+RANGE_STAGES = 33
+"""Number of stages over the range from which branches start. Branches narrower than a step are missed; more stages
+take longer."""
+
+OTHER_BRANCHES = 6
+"""Most further branches followed. Where periods double again and again, branches would never end."""
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def diagram(space: Space, rtol: float = CYCLE_RTOL, seeds: int | None = None, progress: Progress = silent) -> Diagram:
     """Follow every cycle that is found at `seeds` stages over the range of one key.
@@ -72,7 +79,7 @@ def diagram(space: Space, rtol: float = CYCLE_RTOL, seeds: int | None = None, pr
     The cycles are those that the return map suggests, and those in which simulations end, of any number of swings. Of
     the latter, at most `other_branches` (a setting) are followed. Orbits are closed to the relative tolerance `rtol`.
     """
-    places = np.linspace(0, 1, continuation_settings.range_stages if seeds is None else seeds)
+    places = np.linspace(0, 1, RANGE_STAGES if seeds is None else seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
     sought = families(stages, stages.searching_rtol(rtol))
@@ -102,7 +109,7 @@ def diagram(space: Space, rtol: float = CYCLE_RTOL, seeds: int | None = None, pr
         follow(k, cycles.take(np.array([k])))
     for motion in surveyed.motions:
         tally.add(1, BRANCHES)
-        if motion.cycles is not None and skipped < continuation_settings.other_branches:
+        if motion.cycles is not None and skipped < OTHER_BRANCHES:
             skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     once = each_once(special, hundredth)
     attracting = sought[0].attracting & ~_in_doubt(once, places)
@@ -110,6 +117,10 @@ def diagram(space: Space, rtol: float = CYCLE_RTOL, seeds: int | None = None, pr
     attracts = surveyed.attracts & decided | attracting
     unstable = np.any([*unstable_among(stages).values()], axis=0)
     return Diagram(space, tuple(branches), once, places, sought[0], attracts, decided, unstable)
+
+
+SAME_POINT_HUNDREDTHS = 0.1  # [hundredths of the key]
+"""Distance within which points of overlapping branches are one, where a limiter chatters."""
 
 
 def each_once(
@@ -124,7 +135,7 @@ def each_once(
     once: list[tuple[int, LocatedPoint]] = []
     for number, own in enumerate(special):
         for spot in own:
-            close = continuation_settings.same_point_hundredths * hundredth(spot.point.place)
+            close = SAME_POINT_HUNDREDTHS * hundredth(spot.point.place)
             twins = (k for k, (on, other) in enumerate(once) if _same(other, spot, close if on != number else 0.0))
             twin = next(twins, None)
             if twin is None:
@@ -145,7 +156,7 @@ def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])
     apart = np.abs(first.point.vector - second.point.vector)
     kinds = [(spot.kind, spot.point.cycle.sign, spot.point.cycle.swings) for spot in (first, second)]
-    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < continuation_settings.same_cycle_log)
+    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < SAME_CYCLE_LOG)
 
 
 def _passes(branch: Branch, point: Point) -> bool:
@@ -159,8 +170,8 @@ def _passes(branch: Branch, point: Point) -> bool:
             share = (point.place - first[0]) / (second[0] - first[0]) if high > low else 0.0
             between = first + share * (second - first)
             if (
-                np.abs(between - point.vector)[1:].max() < continuation_settings.same_cycle_log
-                or abs(between[2] - point.time) < continuation_settings.same_cycle_log / 4
+                np.abs(between - point.vector)[1:].max() < SAME_CYCLE_LOG
+                or abs(between[2] - point.time) < SAME_CYCLE_LOG / 4
             ):
                 return True
     return False

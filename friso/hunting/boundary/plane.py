@@ -17,13 +17,12 @@ from friso.engine.side_by_side import side_by_side
 from friso.hunting.attractors import Attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.boundary.space import Space
-from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.cycle.hunting import surely_told
 from friso.hunting.loop import unstable_among
-from friso.hunting.path import LossKind, OrbitLine, ParameterPath
-from friso.hunting.settings import edge_settings
+from friso.hunting.path import BEYOND_BANDWIDTHS, LossKind, OrbitLine, ParameterPath
+from friso.hunting.path_search import EDGE_BRACKET_SHARE
 from friso.hunting.what_attracts import has_a_map, sketched, surveyed_roughly, what_attracts
 from friso.progress import Progress, Tally, silent
 
@@ -96,6 +95,11 @@ class Plane:
         return Curve(self.near[i, j], self.far[i, j], self.kinds[i, j], (first, last), ring)
 
 
+GRID_STAGES = 13
+"""Stages along each side of the grid of two keys. Curves between equal neighbours are missed; cost grows with the
+square."""
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
     """Find the edge of hunting in the plane of two keys, between `nodes` x `nodes` stages.
@@ -103,7 +107,7 @@ def plane(space: Space, rtol: float = CYCLE_RTOL, nodes: int | None = None, prog
     Orbits are closed to the relative tolerance `rtol`. Parts of the edge that pass between neighbours twice are not
     seen.
     """
-    nodes = continuation_settings.grid_stages if nodes is None else nodes
+    nodes = GRID_STAGES if nodes is None else nodes
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
     stages = space.stages(points[allowed])
@@ -189,14 +193,14 @@ class _Search:
         ended = [(line, pair, *end) for line, pair, end in zip(lines, pairs, ends, strict=True) if end]
         inside, kinds = np.array([factor for *_, factor, _ in ended]), [kind for *_, kind in ended]
         lines, farthest = [line for line, *_ in ended], np.array([line.farthest for line, *_ in ended])
-        nearest, *others = edge_settings.beyond_bandwidths
+        nearest, *others = BEYOND_BANDWIDTHS
         outside, begin, unknown = np.minimum(nearest * inside, farthest), inside.copy(), np.zeros(len(lines), bool)
         for factor in (nearest, *others):
             hunts = self._told(lines, factor * inside, factor * inside < farthest, roughly=factor > nearest)
             begin[hunts == 1] = factor * inside[hunts == 1]
         seen = (begin > inside) | (np.array(kinds) == "seen")
         inside, outside[seen] = begin, farthest[seen]
-        while (wide := seen & ~unknown & (outside > inside * (1 + edge_settings.edge_bracket_share))).any():
+        while (wide := seen & ~unknown & (outside > inside * (1 + EDGE_BRACKET_SHARE))).any():
             middle = np.sqrt(inside * outside)
             hunts = self._told(lines, middle, wide)
             inside[hunts == 1], outside[hunts == 0] = middle[hunts == 1], middle[hunts == 0]
@@ -265,7 +269,5 @@ class _Line:
         orbit = next((motion for motion in motions if motion.cycles is not None), None)
         if orbit is None:
             return 1.0, "seen"
-        path = ParameterPath(
-            lambda factors: self.space.stages(self.at(factors)), np.ones(1), 0, edge_settings.beyond_bandwidths
-        )
+        path = ParameterPath(lambda factors: self.space.stages(self.at(factors)), np.ones(1), 0, BEYOND_BANDWIDTHS)
         return OrbitLine.of(path, 1.0, 1.0, orbit, rtol).end(self.farthest, self.farthest)

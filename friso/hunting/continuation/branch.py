@@ -15,11 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
-from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, Cycles, described
 from friso.hunting.cycle.shooting import Border, Condition, ConditionSearch, Family, Followed, close_along
-from friso.hunting.settings import tolerance_settings
 
 END_OF_RANGE = "end of the range"
 """Reason for the end of a branch: it reached the end of the range."""
@@ -78,6 +76,41 @@ class Branch:
     ends: tuple[str, str]
 
 
+FARTHEST_MOVE = 3.0  # [steps]
+"""Distance from a cycle beyond which the search for its neighbour is given up: it leads to another branch."""
+
+FIRST_BRANCH_STEP = 0.002
+"""First step along a branch. A longer one may lead to another branch."""
+
+MOST_BRANCH_STEPS = 300
+"""Most steps along a branch, each of which is an orbit. A branch with more winds without end."""
+
+LONGEST_BRANCH_STEP = 0.1
+"""Longest step along a branch. Longer steps draw corners; shorter ones take more orbits."""
+
+BRANCH_TURN_PER_STEP = 0.3  # [rad]
+"""Largest turn of a branch per step. A sharper turn is a jump to another branch."""
+
+SHORTEST_BRANCH_STEP = 1e-6
+"""Shortest step along a branch, below which its cycle cannot be closed and the branch ends."""
+
+MULTIPLIER_CHANGE_PER_STEP = 0.25
+"""Largest change of the multiplier per step. A larger one may step over two special points at once."""
+
+STEEP_MULTIPLIER = 3.0
+"""Multiplier beyond which its changes do not limit the steps."""
+
+VANISHED_AMPLITUDE = 1e-3  # [deflections at break-away]
+"""Amplitude below which a cycle cannot be told from rest, and its branch ends."""
+
+STEEPEST_MULTIPLIER = 30.0
+"""Multiplier beyond which a branch is left: no motion comes near so unstable a cycle, and its orbits are hard to
+close."""
+
+CHECK_RTOL_FACTOR = 0.01
+"""Factor of the tighter tolerance at which results are repeated to estimate their error."""
+
+
 class Tracer:
     """Tracer of one cycle along a line of stages, from place 0 to 1.
 
@@ -134,7 +167,7 @@ class Tracer:
         if states is not None or near.jacobians is None:
             begin = begin * np.exp(targets[:, 1:2] - near.distance) if states is None else states
             times, places = times * np.exp(targets[:, 2] - near.time), targets[:, 0]
-        reach = continuation_settings.farthest_move * float(np.abs(targets - near.vector).max())
+        reach = FARTHEST_MOVE * float(np.abs(targets - near.vector).max())
         border = Border(np.broadcast_to(normal, targets.shape), targets @ normal)
         return self._points(
             close_along(
@@ -162,7 +195,7 @@ class Tracer:
 
     def shift(self, condition: Condition, point: Point) -> float:
         """Return how far the place of a cycle that meets a condition moves at a hundredth of the tolerance."""
-        tight, place = self.rtol * tolerance_settings.check_rtol_factor, np.array([point.place])
+        tight, place = self.rtol * CHECK_RTOL_FACTOR, np.array([point.place])
         again = ConditionSearch(condition, self._on_line, point.cycle.orbits, place, tight)
         return abs(float(again.moved()[0]))
 
@@ -171,34 +204,28 @@ class Tracer:
 
         A branch of asymmetric cycles also ends where it meets the symmetric cycle.
         """
-        points, direction, step = [start], np.array([ahead, 0.0, 0.0]), continuation_settings.first_branch_step
-        while len(points) <= continuation_settings.most_branch_steps:
+        points, direction, step = [start], np.array([ahead, 0.0, 0.0]), FIRST_BRANCH_STEP
+        while len(points) <= MOST_BRANCH_STEPS:
             last = points[-1]
             target, states = continued(points[-3:], step, direction)
             point = self.solve(last, target, direction, states)
             moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
-            near = point is not None and 0 < length < (
-                2 * step if len(points) > 1 else continuation_settings.longest_branch_step
-            )
+            near = point is not None and 0 < length < (2 * step if len(points) > 1 else LONGEST_BRANCH_STEP)
             ahead = float(moved @ direction) / length if near else 0.0
             if near and (ahead > 0 or len(points) == 1):
                 direction = moved / length
-            if (
-                point is None
-                or not near
-                or (ahead < np.cos(continuation_settings.branch_turn_per_step) and len(points) > 1)
-            ):
+            if point is None or not near or (ahead < np.cos(BRANCH_TURN_PER_STEP) and len(points) > 1):
                 step /= 3  # and along the direction estimated from the points
                 points[-1] = replace(last, jacobians=None)  # the old Jacobian may have misled the search
-                if step < continuation_settings.shortest_branch_step:
+                if step < SHORTEST_BRANCH_STEP:
                     return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
             coarse = (
-                abs(point.multiplier - last.multiplier) > continuation_settings.multiplier_change_per_step
-                and abs(last.multiplier) < continuation_settings.steep_multiplier
+                abs(point.multiplier - last.multiplier) > MULTIPLIER_CHANGE_PER_STEP
+                and abs(last.multiplier) < STEEP_MULTIPLIER
             )
-            if coarse and step > continuation_settings.first_branch_step:
+            if coarse and step > FIRST_BRANCH_STEP:
                 step /= 2
                 continue
             if not 0 <= point.place <= 1:
@@ -206,7 +233,7 @@ class Tracer:
             if self._is_mirrored(start, point):
                 return points[1:], "it meets the symmetric cycle"
             points.append(point)
-            step = min(1.5 * step, continuation_settings.longest_branch_step)
+            step = min(1.5 * step, LONGEST_BRANCH_STEP)
             if reason := self._stop(point):
                 return points[1:], reason
         return points[1:], "it was followed for as many steps as there may be"
@@ -235,9 +262,9 @@ class Tracer:
     def _stop(self, point: Point) -> str:
         """Return the reason why a branch is not followed beyond a point; "" if it is followed on."""
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
-        if point.cycle.amplitude[0] < continuation_settings.vanished_amplitude * stages.length[0]:
+        if point.cycle.amplitude[0] < VANISHED_AMPLITUDE * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
-        if abs(point.multiplier) > (steepest := continuation_settings.steepest_multiplier):
+        if abs(point.multiplier) > (steepest := STEEPEST_MULTIPLIER):
             return f"the cycle repels {steepest:g}-fold and more per return"
         return ""
 

@@ -15,7 +15,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from friso.hunting.continuation.branch import Branch, Point, Tracer
-from friso.hunting.continuation.settings import continuation_settings
 from friso.hunting.cycle.find import decisive_of
 from friso.hunting.cycle.shooting import Condition
 
@@ -32,6 +31,10 @@ class Crossing(NamedTuple):
     slope: float
 
 
+LEAST_CUBIC_VALUES = 6
+"""Fewest values of a cubic whose scatter can be estimated."""
+
+
 def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
     """Fit a cubic to values over places, shape (n,), and return where it passes zero.
 
@@ -43,7 +46,7 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
 
     Returns None if there are too few values, if no zero counts, or if the error exceeds half of the range of places.
     """
-    if len(places) < continuation_settings.least_cubic_values:
+    if len(places) < LEAST_CUBIC_VALUES:
         return None
     trend, curve = (np.polynomial.Polynomial.fit(places, values, degree) for degree in (1, 3))
     slopes, roots = curve.deriv(), curve.roots()
@@ -80,7 +83,7 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
     cubic. Returns None if there are too few places, or if the cubic does not turn within the lengths. Returns None as
     well if the error exceeds half of the range of places.
     """
-    if len(places) < continuation_settings.least_cubic_values:
+    if len(places) < LEAST_CUBIC_VALUES:
         return None
     curve = np.polynomial.Polynomial.fit(lengths, places, 3)
     turns = curve.deriv().roots()
@@ -108,6 +111,10 @@ ALONG_KEY = np.array([1.0, 0.0, 0.0])
 """Direction along the key alone, in the space of place, log distance and log time."""
 
 
+SAME_CYCLE_LOG = 0.02
+"""Largest difference in log distance and log time between two computations of one cycle."""
+
+
 @dataclass(frozen=True)
 class LocatedPoint:
     """Point at which a branch loses or gains stability, by a flip, a fold or a torus (`kind`).
@@ -128,9 +135,7 @@ class LocatedPoint:
         if that error is not known (infinite).
         """
         apart = np.abs(self.point.vector - point.vector)
-        return bool(
-            np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < continuation_settings.same_cycle_log
-        )
+        return bool(np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < SAME_CYCLE_LOG)
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
@@ -181,6 +186,10 @@ def towards(first: Point, second: Point) -> np.ndarray:
     return direction / np.linalg.norm(direction)
 
 
+SPECIAL_POINT_TRIES = 30
+"""Most steps of the search for a special point. A search with more does not converge."""
+
+
 def _enclosed(
     tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float
 ) -> dict[float, Point] | None:
@@ -193,7 +202,7 @@ def _enclosed(
     """
     direction, length = towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     points: dict[float, Point] = {0.0: first, length: second}
-    for tries in range(continuation_settings.special_point_tries):
+    for tries in range(SPECIAL_POINT_TRIES):
         places = np.array(sorted(points))
         distances = np.array([distance_to(kind, points[place]) for place in places.tolist()])
         passed = int(np.flatnonzero(distances[:-1] * distances[1:] <= 0)[0])
@@ -235,6 +244,14 @@ def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
 
+SPECIAL_POINT_STEP = 1e-7
+"""Last step of the search for a special point, far below the decimals shown."""
+
+CHATTERING_STEP_SHARE = 0.25  # [distances of the orbits of a cubic]
+"""Last step of the search for a special point where a limiter chatters. Nearer, the scatter of multipliers leads
+nowhere; farther off, the cubic's orbits may lie on one side."""
+
+
 def _last_step(tracer: Tracer, kind: Bifurcation, place: float) -> float:
     """Return the step with which the search for a special point ends.
 
@@ -242,13 +259,17 @@ def _last_step(tracer: Tracer, kind: Bifurcation, place: float) -> float:
     of several orbits decide in the end: the search need not come nearer than a fraction of their distances.
     """
     if not tracer.chatters:
-        return continuation_settings.special_point_step
-    return continuation_settings.chattering_step_share * _reach(tracer, kind, place)
+        return SPECIAL_POINT_STEP
+    return CHATTERING_STEP_SHARE * _reach(tracer, kind, place)
+
+
+CHATTERING_FOLD_REACH = 0.03
+"""Largest distance from a fold at which the multiplier may be 1, where a limiter chatters."""
 
 
 def _reach(tracer: Tracer, kind: Bifurcation, place: float) -> float:
     """Return how far beside a special point the orbits lie whose multipliers or places are fitted."""
-    return continuation_settings.chattering_fold_reach if kind == "fold" else tracer.hundredth(place)
+    return CHATTERING_FOLD_REACH if kind == "fold" else tracer.hundredth(place)
 
 
 def _special_point(
@@ -313,13 +334,17 @@ def _turning_point(
     return LocatedPoint(kind, there, error)
 
 
+CUBIC_VALUES = 9
+"""Values through which a cubic is fitted. With fewer it follows their scatter."""
+
+
 def _beside(tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray) -> list[Point]:
     """Return orbits on both sides of a guessed special point, in steps along a direction.
 
     The `guess` and the `direction`, (3,), are in the space of place, log distance and log time. The orbits are closed
     at once, from the cycle `near` them.
     """
-    reach, count = _reach(tracer, kind, float(guess[0])), continuation_settings.cubic_values
+    reach, count = _reach(tracer, kind, float(guess[0])), CUBIC_VALUES
     return tracer.solve_all(near, guess + np.linspace(-reach, reach, count)[:, None] * direction, direction)
 
 

@@ -20,8 +20,6 @@ from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations.motion import without_motion
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, carrying_force, shared_structure
-from friso.hunting.cycle.settings import settings
-from friso.hunting.settings import tolerance_settings
 from friso.stage.controllers import integral_leak
 from friso.stage.tables import BACKLASH
 
@@ -59,6 +57,14 @@ PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancin
 
 OF_ALL = ("structure", "kernel")
 """Cached properties of an ensemble that are common to all its stages."""
+
+
+FRICTIONLESS_SIZE = 1e-6  # [m]
+"""Size of the motion of a stage without friction. It is linear, so any size will do."""
+
+CHATTERING_RTOL = 1e-7
+"""Tolerance of cycles that may chatter, where many are followed or searched for, and widest one for the slope of a
+return map. Finer runs change their multipliers by less than the scatter from one stage to the next."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +122,7 @@ class Ensemble:
 
     def searching_rtol(self, rtol: float) -> float:
         """Return the relative tolerance at which many cycles are closed: `rtol`, or a wider one if they may chatter."""
-        return max(rtol, tolerance_settings.chattering_rtol) if self.chatters else rtol
+        return max(rtol, CHATTERING_RTOL) if self.chatters else rtol
 
     @property
     def remember(self) -> bool:
@@ -169,7 +175,7 @@ class Ensemble:
     @cached_property
     def scales(self) -> np.ndarray:
         """Return the magnitudes of the states, shape (count, states)."""
-        size = np.where(self.length > 0, self.length, settings.frictionless_size)
+        size = np.where(self.length > 0, self.length, FRICTIONLESS_SIZE)
         values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
         return columns(self.kernel.module.scales(values), self.count)
 
@@ -346,6 +352,10 @@ def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
     return states
 
 
+LEAK_TIME_CONSTANTS = 10.0  # [time constants]
+"""Time after which the integrator of a stuck stage is 5e-5 off its final value."""
+
+
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     """Return the time [s] in which the integrator winds up to break-away, (count,).
 
@@ -355,7 +365,7 @@ def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)
     with np.errstate(divide="ignore"):
         winding = np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))
-        return np.minimum(winding, settings.leak_time_constants / np.asarray(2 * np.pi * integral_leak(stages.flat)))
+        return np.minimum(winding, LEAK_TIME_CONSTANTS / np.asarray(2 * np.pi * integral_leak(stages.flat)))
 
 
 def spread_over(*ranges: tuple[float, float, int]) -> np.ndarray:

@@ -11,11 +11,17 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, stuck, wait
-from friso.hunting.cycle.guess import Guess, ReturnMap, return_map, swings, symmetric_guess, whole_guess
-from friso.hunting.cycle.settings import settings
+from friso.hunting.cycle.ensemble import CHATTERING_RTOL, ArrayRows, Ensemble, stuck, wait
+from friso.hunting.cycle.guess import (
+    UNWINDING_WAIT_SHARE,
+    Guess,
+    ReturnMap,
+    return_map,
+    swings,
+    symmetric_guess,
+    whole_guess,
+)
 from friso.hunting.cycle.shooting import Orbits, Shot, close, shoot, swings_of_simplest
-from friso.hunting.settings import ToleranceSettings, tolerance_settings
 
 
 @dataclass(frozen=True)
@@ -84,15 +90,33 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
         return values, np.real(first / first[:, stages.sticking, None])
 
 
+SLOPE_RANGE_SHARE = 0.01  # [of the distance]
+"""Range of the return map's slope where a limiter chatters. Over a smaller one the slope follows the chatter."""
+
+SLOPE_RUNS = 25
+"""Runs through which the slope is fitted. Fewer follow the scatter of returns."""
+
+SLOPE_RTOL_FACTOR = 100.0  # [of cycle_rtol]
+"""Tolerance of runs for the slope of a return map, relative to that of cycles. The slope is taken over a wide
+range."""
+
+
 def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
     """Return the slope of the return map over a small range about the orbits, shape (count,).
 
     Runs start beside the orbits along a direction (count, states); a straight line is fitted to their returns.
     """
-    coarser = min(tolerance_settings.slope_rtol_factor * rtol, max(rtol, tolerance_settings.chattering_rtol))
-    away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]
+    coarser = min(SLOPE_RTOL_FACTOR * rtol, max(rtol, CHATTERING_RTOL))
+    away = np.linspace(-SLOPE_RANGE_SHARE / 2, SLOPE_RANGE_SHARE / 2, SLOPE_RUNS)[None, :]
     heights = returns_of(stages, orbits, direction, away, 2, coarser)
     return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])
+
+
+LEAST_SLOPE_RUNS = 18
+"""Fewest returning runs for the slope of a return map. With fewer, the range crosses a break of the map."""
+
+NEAR_RETURN_SHARE = 0.25  # [of the range]
+"""Largest distance of a return from the others. Farther off it belongs to another branch of the map."""
 
 
 def _straight(pairs: np.ndarray) -> float:
@@ -100,14 +124,14 @@ def _straight(pairs: np.ndarray) -> float:
 
     The slope is NaN if too few pairs are left. A stage that does not break away makes an outlier.
     """
-    if len(pairs) < settings.least_slope_runs:
+    if len(pairs) < LEAST_SLOPE_RUNS:
         return np.nan
     first, second = (pairs - np.median(pairs, axis=0)).T
     earlier, later = np.triu_indices(len(first), 1)
     # median of all slopes, after Theil and Sen
     slope = np.nanmedian((second[later] - second[earlier]) / (first[later] - first[earlier]))
-    near = np.abs(second - slope * first) < settings.near_return_share * np.ptp(first)
-    if np.count_nonzero(near) < settings.least_slope_runs:
+    near = np.abs(second - slope * first) < NEAR_RETURN_SHARE * np.ptp(first)
+    if np.count_nonzero(near) < LEAST_SLOPE_RUNS:
         return np.nan
     return float(np.polyfit(first[near], second[near], 1)[0])
 
@@ -131,11 +155,12 @@ def returns_of(
     return np.abs(extrema.values[:, per_return - 1 :: per_return]).reshape(count, points, returns)
 
 
-CYCLE_RTOL = ToleranceSettings().cycle_rtol
-"""Default relative tolerance of closed orbits."""
+CYCLE_RTOL = 1e-9
+"""Tolerance of cycles. Looser runs scatter multipliers near -1; tighter ones take longer."""
 
-GUESS_RTOL = ToleranceSettings().guess_rtol
-"""Relative tolerance of runs that only supply guesses."""
+
+GUESS_RTOL = 1e-6
+"""Tolerance of runs that start Newton's method. Looser ones miss narrow cycles."""
 
 
 NO_RETURN = "from every distance the stage swings back less far than it started"
@@ -259,15 +284,22 @@ def families(stages: Ensemble, rtol: float = CYCLE_RTOL) -> tuple[Cycles, ...]:
     return symmetric_cycles(stages, rtol, positive), asymmetric_cycles(stages, positive, rtol)
 
 
+LEAST_ASYMMETRY_SHARE = 0.05
+"""Smallest asymmetry of a guess of an asymmetric cycle. With less, the guess leads to the symmetric cycle."""
+
+LEAST_LEAN_SHARE = 1e-3  # [of the amplitude]
+"""Smallest offset of the middle of an asymmetric cycle. With less, the orbit is the symmetric one."""
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = CYCLE_RTOL) -> Cycles:
     """Find one of the pair of asymmetric cycles of each symmetric stage, if it has one.
 
     `positive` is the return map, which suggests the cycle. The other cycle of the pair is its mirror image.
     """
-    guess = whole_guess(stages, positive, positive, settings.least_asymmetry_share)
+    guess = whole_guess(stages, positive, positive, LEAST_ASYMMETRY_SHARE)
     cycles = _closed(stages, guess, 1.0, rtol)
-    same = np.abs(cycles.middle) < settings.least_lean_share * cycles.amplitude
+    same = np.abs(cycles.middle) < LEAST_LEAN_SHARE * cycles.amplitude
     cycles.closed[same], cycles.reasons[same] = False, NO_PAIR
     return cycles
 
@@ -280,6 +312,10 @@ def whole_cycles(stages: Ensemble, rtol: float = CYCLE_RTOL, positive: ReturnMap
     """
     positive = positive or return_map(stages, GUESS_RTOL)
     return _closed(stages, whole_guess(stages, positive, return_map(stages, GUESS_RTOL, -1.0)), 1.0, rtol)
+
+
+GUESS_VARIANTS = ((1.0, 1.0), (0.985, 1.05), (0.985, 1.0), (0.97, 1.05), (1.015, 1.0))
+"""Factors on the guessed distance and time, tried in turn. More variants close hardly any further orbit."""
 
 
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
@@ -296,7 +332,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
         np.zeros(count, bool),
         swings_of_simplest(sign),
     )
-    for distance, time in settings.guess_variants:
+    for distance, time in GUESS_VARIANTS:
         missing = guess.numbers[~orbits.closed[guess.numbers]]
         if not missing.size:
             break
@@ -309,9 +345,13 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
     return described(stages, orbits, rtol, reasons)
 
 
+KEPT_DISTANCE_SHARE = 0.5
+"""Largest distance of an orbit from its guess. Farther off it is another solution, such as rest."""
+
+
 def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
     """Return which orbits stick near the guessed `distances` [m], shape (count,)."""
-    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < settings.kept_distance_share
+    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < KEPT_DISTANCE_SHARE
 
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
@@ -319,6 +359,13 @@ def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, 
     good = trial.closed & kept(stages, trial, guess.distances[which])
     for name in ("states", "times", "gaps", "closed"):
         getattr(orbits, name)[which[good]] = getattr(trial, name)[good]
+
+
+GUESS_RETURNS = 40  # [returns]
+"""Returns that are simulated to find an attractor where no orbit closes near a guess."""
+
+STEADY_RETURN_SHARE = 0.02
+"""Largest change of the last returns of a simulation that has reached a cycle."""
 
 
 def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
@@ -331,20 +378,16 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
         return
     subset, sign = stages.take(missing), orbits.sign
     starts = stuck(subset, guess.distances[missing])
-    extrema = swings(
-        subset, starts, settings.guess_returns * guess.times[missing], 4 * settings.guess_returns, GUESS_RTOL
-    )
+    extrema = swings(subset, starts, GUESS_RETURNS * guess.times[missing], 4 * GUESS_RETURNS, GUESS_RTOL)
     rows, step = np.arange(subset.count), 1 if sign < 0 else 2
     last = np.maximum(np.isfinite(extrema.values).sum(axis=1) - 2, step)
     last -= (sign > 0) & (extrema.values[rows, last] < 0)  # on the side on which the orbit begins
     heights = np.abs(np.stack([extrema.values[rows, last], extrema.values[rows, last - step]]))
     times = extrema.times[rows, last] - extrema.times[rows, last - step]
-    fine = np.flatnonzero(
-        (last > settings.guess_returns // 2) & (np.abs(heights[0] / heights[1] - 1) < settings.steady_return_share)
-    )
+    fine = np.flatnonzero((last > GUESS_RETURNS // 2) & (np.abs(heights[0] / heights[1] - 1) < STEADY_RETURN_SHARE))
     if not fine.size:
         return
-    ends_at = extrema.times[rows, last] + settings.unwinding_wait_share * wait(subset, heights[0])
+    ends_at = extrema.times[rows, last] + UNWINDING_WAIT_SHARE * wait(subset, heights[0])
     ends = subset.take(fine).run(starts[fine], ends_at[fine], GUESS_RTOL).ends
     if sign < 0:
         ends *= np.sign(ends[:, stages.sticking])[:, None]

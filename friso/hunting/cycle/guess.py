@@ -14,7 +14,6 @@ import numpy as np
 
 from friso.engine.arrays import Results
 from friso.hunting.cycle.ensemble import Ensemble, done, stuck, wait
-from friso.hunting.cycle.settings import settings
 
 
 @dataclass(frozen=True)
@@ -28,6 +27,10 @@ class Swings:
     times: np.ndarray
 
 
+SWING_LEG_SHARE = 0.5  # [of the distance]
+"""Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing of a stage that sticks."""
+
+
 def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: int, rtol: float) -> Swings:
     """Return the first `most` swings of stages that start at rest; a failed run has none.
 
@@ -35,7 +38,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
     has come back by a fraction of its start's distance, or the run is over.
     """
     position = starts[:, stages.kernel.position]
-    legs = settings.swing_leg_share * np.abs(position)
+    legs = SWING_LEG_SHARE * np.abs(position)
     results = stages.run(starts, durations, rtol, least_swing=0.1 * legs)
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
@@ -100,18 +103,25 @@ class ReturnMap:
     times: np.ndarray
 
 
+MAP_RANGE = (0.02, 2.0)  # [deflections at break-away]
+"""Range of a return map. From nearer a stage creeps home; from farther off it does not stick."""
+
+MAP_POINTS = 32
+"""Points of a return map before refinement. Fixed points closer than a step are missed."""
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
     """Compute the map of stages that stick on one side, 1 or -1, of their reference.
 
     The map is finer where a stage may land as far off as it started.
     """
-    coarse = np.geomspace(*settings.map_range, settings.map_points)[None, :] * stages.length[:, None]
+    coarse = np.geomspace(*MAP_RANGE, MAP_POINTS)[None, :] * stages.length[:, None]
     first = trace_returns(stages, coarse, rtol, side)
     gain = np.argmax(first.returns / first.distances, axis=1)
     rows = np.arange(stages.count)
-    low, high = (first.distances[rows, np.clip(gain + step, 0, settings.map_points - 1)] for step in (-1, 1))
-    finer = np.geomspace(low, high, settings.map_points // 2 + 2, axis=1)[:, 1:-1]
+    low, high = (first.distances[rows, np.clip(gain + step, 0, MAP_POINTS - 1)] for step in (-1, 1))
+    finer = np.geomspace(low, high, MAP_POINTS // 2 + 2, axis=1)[:, 1:-1]
     second = trace_returns(stages, finer, rtol, side)
     parts = (np.hstack(pair) for pair in zip(_columns(first), _columns(second), strict=True))
     distances, returns, times = parts
@@ -123,6 +133,13 @@ def _columns(return_map: ReturnMap) -> tuple[np.ndarray, ...]:
     return return_map.distances, return_map.returns, return_map.times
 
 
+BREAKAWAY_WAITS = 2.0  # [waits]
+"""Longest wait for break-away. A stage that takes longer creeps home."""
+
+FLIGHT_TIME = 60.0  # [1/natural frequencies]
+"""Longest crossing of a stage to the other side. One that takes longer creeps."""
+
+
 def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
     """Release every stage from each distance [m], (count, points), and measure its first swing.
 
@@ -131,9 +148,7 @@ def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: fl
     shape = distances.shape
     several = stages.take(np.repeat(np.arange(stages.count), shape[1]))
     starts = stuck(several, side * distances.ravel())
-    durations = settings.breakaway_waits * wait(several, distances.ravel()) + settings.flight_time / several.number(
-        "rate"
-    )
+    durations = BREAKAWAY_WAITS * wait(several, distances.ravel()) + FLIGHT_TIME / several.number("rate")
     first = swings(several, starts, durations, 1, rtol)
     returns, times = (np.nan_to_num(part).reshape(shape) for part in (-side * first.values, first.times))
     return ReturnMap(distances, returns, times)
@@ -155,6 +170,13 @@ class Guess:
         return np.flatnonzero(np.isfinite(self.times))
 
 
+REFINED_DISTANCES = 8
+"""Distances on which a fixed point of the map is narrowed down before Newton's method begins."""
+
+UNWINDING_WAIT_SHARE = 0.4  # [waits]
+"""Time from a stop until the actuator only balances constant forces, as a fraction of the wait."""
+
+
 def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
     """Guess the symmetric cycle from the return map `positive` of stages on the positive side.
 
@@ -166,12 +188,10 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
     distances, times = np.full(stages.count, np.nan), np.full(stages.count, np.nan)
     if numbers.size:
         subset = stages.take(numbers)
-        between = np.linspace(low[numbers], high[numbers], settings.refined_distances, axis=1)
+        between = np.linspace(low[numbers], high[numbers], REFINED_DISTANCES, axis=1)
         finer = trace_returns(subset, between, rtol, 1.0)
         distances[numbers] = root = _crossing(finer.distances, finer.returns - finer.distances)
-        times[numbers] = _interpolated(root, finer.distances, finer.times) + settings.unwinding_wait_share * wait(
-            subset, root
-        )
+        times[numbers] = _interpolated(root, finer.distances, finer.times) + UNWINDING_WAIT_SHARE * wait(subset, root)
     return Guess(distances, times)
 
 
@@ -194,8 +214,12 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
                 middle, negative.distances[k], negative.times[k]
             )
             waits = wait(stages.take(np.array([k, k])), np.array([at, middle]))
-            guess.distances[k], guess.times[k] = at, flights + settings.unwinding_wait_share * waits.sum()
+            guess.distances[k], guess.times[k] = at, flights + UNWINDING_WAIT_SHARE * waits.sum()
     return guess
+
+
+ALMOST_RETURN_LOG = 0.03
+"""Largest error of a return that serves as the guess of a cycle."""
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
@@ -214,7 +238,7 @@ def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.nd
         i = crosses[differ.argmax() if apart else differ.argmin()]
         return float(np.interp(0.0, *_ascending(rise[i : i + 2], start[i : i + 2])))
     change = np.abs(np.log(end[goes] / start[goes]))
-    if not goes.size or change.min() >= settings.almost_return_log:
+    if not goes.size or change.min() >= ALMOST_RETURN_LOG:
         return None
     nearest = goes[change.argmin()]
     towards = nearest + int(side[nearest])  # the side on which the symmetric fixed point lies

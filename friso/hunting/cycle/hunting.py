@@ -23,7 +23,6 @@ from friso.hunting.attractors.rounds import TIGHT_SURVEY_RTOL
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import CYCLE_RTOL, GUESS_RTOL, Cycles, returns_of, slopes, time_constant
 from friso.hunting.cycle.guess import ReturnMap, return_map
-from friso.hunting.cycle.settings import settings
 from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm, unstable
 from friso.hunting.path import MORE_WORK
 from friso.stage import Stage
@@ -273,17 +272,28 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
     return why
 
 
+LEAST_CERTAIN_SWING = 0.001  # [deflections at break-away]
+"""Smallest swing that counts as resolved. Runs resolve smaller cycles badly and may miss them."""
+
+WIDE_DEAD_ZONE = 2.0  # [deflections at break-away]
+"""Width of a dead zone beyond which most starts of a survey lie within it, where nothing winds up."""
+
+
 def _may_be_missed(stages: Ensemble) -> np.ndarray:
     """Return which stages may have an attractor that is too small for a survey, or lies beyond its starts, (count,)."""
     if stages.outer_integrals:
         missed = np.ones(stages.count, bool)
     else:
-        narrow = (stages.backlash > 0) & (stages.backlash < settings.least_certain_swing * stages.length)
+        narrow = (stages.backlash > 0) & (stages.backlash < LEAST_CERTAIN_SWING * stages.length)
         missed = small_cycles_possible(stages) | narrow
     if bristles := stages.kernel.having(Role.BRISTLE):
         missed = missed | (stages.scales[:, bristles].min(axis=1) < RESOLVED_BRISTLES * stages.length)
-    wide = dead_band(stages.flat) >= settings.wide_dead_zone * stages.length
+    wide = dead_band(stages.flat) >= WIDE_DEAD_ZONE * stages.length
     return np.asarray(missed | (wide & (stages.length > 0)))
+
+
+FRICTION_STAGES_AT_ONCE = 64
+"""Stages whose friction curves are examined at once. More take too much memory."""
 
 
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:
@@ -295,10 +305,30 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
     falls too little for the survey to find all cycles, but steeply enough to feed one.
     """
     possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)
-    for first in range(0, len(rub), settings.friction_stages_at_once):
-        part = rub[first : first + settings.friction_stages_at_once]
+    for first in range(0, len(rub), FRICTION_STAGES_AT_ONCE):
+        part = rub[first : first + FRICTION_STAGES_AT_ONCE]
         possible[part] = _small_cycles_possible(stages.take(part))
     return possible
+
+
+FASTEST_FRICTION_SPEED = 1e7  # [speeds of small swings]
+"""Highest speed at which friction curves are examined. At higher speeds friction no longer falls."""
+
+FRICTION_SPEEDS = 300
+"""Speeds at which friction curves are examined: thirty per decade, narrower than any fall of friction."""
+
+LEAST_FEEDING_RATIO = 0.05
+"""Smallest ratio of the fall of friction to amplitude that can feed a cycle. The least found was forty times
+larger."""
+
+NO_FRICTION_FALL = 1e-9  # [of break-away]
+"""Fall of friction that is only rounding of the friction curve."""
+
+LEAST_FRICTION_FALL = 0.002  # [of break-away]
+"""Smallest fall of friction with speed for which the search covers all cycles."""
+
+FEEDING_RATIO_RANGE = (2.0, 6.0)
+"""Least and largest ratio of the fall of friction over the speeds of a cycle to its amplitude."""
 
 
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
@@ -307,14 +337,12 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
     All stages must have friction. The result is true for all of them if the law has no steady force.
     """
     breakaway = stages.number("breakaway")[:, None]
-    sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)
+    sizes = np.geomspace(1e-3 * LEAST_CERTAIN_SWING, LEAST_CERTAIN_SWING, 60)
     small = np.outer(stages.length * stages.number("rate"), sizes)
     speeds = np.hstack(
         [
             small,
-            np.geomspace(
-                small[:, -1], settings.fastest_friction_speed * small[:, -1], settings.friction_speeds, axis=1
-            ),
+            np.geomspace(small[:, -1], FASTEST_FRICTION_SPEED * small[:, -1], FRICTION_SPEEDS, axis=1),
         ]
     )
     numbers = np.repeat(np.arange(stages.count), 2 * speeds.shape[1])
@@ -331,9 +359,9 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
     last, most = fed[:, :, -1], fed.max(axis=2)
     feeds = (falls / (speeds / (stages.length * stages.number("rate"))[:, None])[:, None]).max(
         axis=2
-    ) > settings.least_feeding_ratio
-    little = (deepest > settings.no_friction_fall) & (deepest < settings.least_friction_fall) & feeds
-    fades = (last < settings.feeding_ratio_range[1]) & (most > np.maximum(settings.feeding_ratio_range[0], 1.2 * last))
+    ) > LEAST_FEEDING_RATIO
+    little = (deepest > NO_FRICTION_FALL) & (deepest < LEAST_FRICTION_FALL) & feeds
+    fades = (last < FEEDING_RATIO_RANGE[1]) & (most > np.maximum(FEEDING_RATIO_RANGE[0], 1.2 * last))
     return np.any(little | fades, axis=1)
 
 
@@ -368,29 +396,41 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
     )
 
 
+BESIDE_CYCLE_SHARE = 2e-3  # [of the distance]
+"""Start of a simulation beside a cycle. Closer to it, rounding decides where the run goes."""
+
+BESIDE_CYCLE_RETURNS = 8  # [returns]
+"""Returns over which deviations are seen to grow or shrink. More leave the linear range."""
+
+LINEAR_DEVIATION_SHARE = 0.02  # [of the distance]
+"""Largest deviation that grows as the multiplier says."""
+
+
 def _growth(stages: Ensemble, cycles: Cycles) -> float:
     """Return by what factor a small deviation from a cycle grows per return, from a simulation.
 
     The result is NaN if too few deviations stay small.
     """
-    away = np.array([[0.0, settings.beside_cycle_share, -settings.beside_cycle_share]])
-    heights = returns_of(
-        stages, cycles.orbits, cycles.direction, away, settings.beside_cycle_returns, GUESS_RTOL / 100
-    )[0]
+    away = np.array([[0.0, BESIDE_CYCLE_SHARE, -BESIDE_CYCLE_SHARE]])
+    heights = returns_of(stages, cycles.orbits, cycles.direction, away, BESIDE_CYCLE_RETURNS, GUESS_RTOL / 100)[0]
     deviations = (heights[1:] - heights[0]) / cycles.amplitude[0]
     before, after = deviations[:, :-1].ravel(), deviations[:, 1:].ravel()
-    small = (np.abs(before) < settings.linear_deviation_share) & (
-        np.abs(after) < settings.linear_deviation_share
+    small = (np.abs(before) < LINEAR_DEVIATION_SHARE) & (
+        np.abs(after) < LINEAR_DEVIATION_SHARE
     )  # NaN counts as not small
     if np.count_nonzero(small) < 2:
         return np.nan
     return float(before[small] @ after[small] / (before[small] @ before[small]))
 
 
+TRACE_SAMPLES = 2000
+"""Samples of a drawn period. With fewer, curves have corners where a stage breaks away."""
+
+
 def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
     """Return the signals of one period of a cycle, by name."""
     period = float(cycles.period[0])
-    results = stages.run(cycles.states, cycles.period, GUESS_RTOL / 100, interval=period / settings.trace_samples)
-    time = np.arange(results.samples.shape[1]) * (period / settings.trace_samples)
+    results = stages.run(cycles.states, cycles.period, GUESS_RTOL / 100, interval=period / TRACE_SAMPLES)
+    time = np.arange(results.samples.shape[1]) * (period / TRACE_SAMPLES)
     flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": period}
     return {**output_variables(stages.kernel, flat, results.samples[0].T, time), **time_axis(time)}

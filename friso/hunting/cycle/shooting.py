@@ -14,8 +14,6 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS
 from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, done
-from friso.hunting.cycle.settings import settings
-from friso.hunting.settings import tolerance_settings
 
 
 @dataclass(frozen=True)
@@ -166,6 +164,40 @@ def close_along(
 _S = TypeVar("_S", bound="_Shooting")
 
 
+STALLED_STEPS = (3, 8, 1)
+"""Steps in which the gap must halve, or the search ends: far from an orbit, near it, and once closed."""
+
+FRESH_JACOBIAN_GAP = 1e-5  # [of the states]
+"""Gap beyond which an old Jacobian misleads Newton's method."""
+
+CONDITION_GAP_SHARE = 1e-3
+"""Gap per error of a condition on orbits. With more, the scatter of multipliers keeps Newton's method from ending;
+with less, it ends too early."""
+
+OLD_JACOBIAN_SHARE = 0.1
+"""Least reduction of the gap per step that keeps an old Jacobian in use."""
+
+NEWTON_STRIDE = 0.3
+"""Longest Newton step, relative to the states. Longer ones leave the range of convergence."""
+
+FINEST_GAP_CHATTERING = 1e-8  # [of the states]
+"""Gap below which everything is rounding where a limiter chatters."""
+
+FINEST_GAP = 1e-11  # [of the states]
+"""Gap below which everything is rounding, so that further steps do not help."""
+
+GAP_RTOL_FACTOR = 0.1  # [of the tolerance of runs]
+"""Smallest useful gap, relative to the tolerance of the runs."""
+
+CLOSED_GAP = 1e-8  # [of the states]
+"""Gap at which an orbit counts as closed. With a larger one runs that are no orbits pass; with a smaller one real
+cycles fail."""
+
+CLOSED_GAP_CHATTERING = 1e-4  # [of the states]
+"""Gap at which an orbit with a chattering limiter counts as closed. The chatter moves the end of a run by about
+this much."""
+
+
 class _Shooting:
     """Newton's method on several orbits at once; closed and failed orbits are left alone.
 
@@ -193,21 +225,21 @@ class _Shooting:
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
         self.finest = (
-            tolerance_settings.finest_gap_chattering
+            FINEST_GAP_CHATTERING
             if self.chatters
             else max(
-                tolerance_settings.finest_gap,
-                min(tolerance_settings.gap_rtol_factor * rtol, tolerance_settings.closed_gap),
+                FINEST_GAP,
+                min(GAP_RTOL_FACTOR * rtol, CLOSED_GAP),
             )
         )
         self.limit, self.stalled = (
-            tolerance_settings.closed_gap_chattering if self.chatters else tolerance_settings.closed_gap,
-            settings.stalled_steps,
+            CLOSED_GAP_CHATTERING if self.chatters else CLOSED_GAP,
+            STALLED_STEPS,
         )
 
     def advance(self) -> bool:
         """Take one step of all active orbits, and tell whether any is still active."""
-        renewed = self.gaps > settings.fresh_jacobian_gap if self.chatters else ~self.serves
+        renewed = self.gaps > FRESH_JACOBIAN_GAP if self.chatters else ~self.serves
         for renew in (False, True):
             if (which := np.flatnonzero(self.active & (renewed == renew))).size:
                 self._advance(which, renew)
@@ -228,9 +260,9 @@ class _Shooting:
         misses, residual = ends - states, self._residual(which, stages, shot)
         gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
         if self.condition:
-            gaps = np.maximum(gaps, np.abs(residual[:, -1]) * settings.condition_gap_share)
+            gaps = np.maximum(gaps, np.abs(residual[:, -1]) * CONDITION_GAP_SHARE)
             gaps = np.where(np.isnan(gaps), np.inf, gaps)
-        serves = gaps < np.maximum(settings.old_jacobian_share * self.gaps[which], self.finest)
+        serves = gaps < np.maximum(OLD_JACOBIAN_SHARE * self.gaps[which], self.finest)
         if shot and (fresh := np.flatnonzero(renew | ~serves)).size:
             jacobians = self._jacobians(which[fresh], stages.take(fresh), shot.take(fresh))
             for k, jacobian in zip(which[fresh], jacobians, strict=True):
@@ -274,9 +306,9 @@ class _Shooting:
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         far, near, closed = self.stalled
         patience = np.where(
-            self.gaps[which] > settings.fresh_jacobian_gap,
+            self.gaps[which] > FRESH_JACOBIAN_GAP,
             far,
-            np.where(self.gaps[which] > max(tolerance_settings.closed_gap, self.rtol), near, closed),
+            np.where(self.gaps[which] > max(CLOSED_GAP, self.rtol), near, closed),
         )
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
@@ -288,8 +320,8 @@ class _Shooting:
         index of the state that is constant while the stage sticks.
         """
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
-        far = abs(step[sticking]) / (settings.newton_stride * abs(self.states[k, sticking]))
-        late = abs(step[size]) / (settings.newton_stride * self.times[k])
+        far = abs(step[sticking]) / (NEWTON_STRIDE * abs(self.states[k, sticking]))
+        late = abs(step[size]) / (NEWTON_STRIDE * self.times[k])
         step = step / max(far, late, 1.0)
         self.states[k] += step[:size]
         self.times[k] += step[size]
@@ -301,6 +333,20 @@ class _Shooting:
         """Return the best orbits so far, and whether they are closed."""
         closed = self.gaps < self.limit
         return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, swings_of_simplest(self.sign))
+
+
+FOLLOWED_STALLED_STEPS = (3, 3, 1)
+"""Steps in which the gap must halve along a branch, where the next orbit is near."""
+
+PLACE_NUDGE_CHATTERING = 1e-5
+"""Change of place for a numerical derivative where a limiter chatters, which moves the end of a run."""
+
+PLACE_NUDGE = 1e-6
+"""Change of place for a numerical derivative. If smaller it is rounding; if larger it includes curvature."""
+
+FOLLOWED_GAP = 1e-6  # [of the states]
+"""Gap at which orbits along a branch count as closed. Stiff stages close no better; with a larger one a step leads
+to another branch."""
 
 
 class _Following(_Shooting):
@@ -319,12 +365,12 @@ class _Following(_Shooting):
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
-        self.stalled = settings.followed_stalled_steps
-        self.nudge = settings.place_nudge_chattering if self.chatters else settings.place_nudge
+        self.stalled = FOLLOWED_STALLED_STEPS
+        self.nudge = PLACE_NUDGE_CHATTERING if self.chatters else PLACE_NUDGE
         if self.chatters:
-            self.finest = tolerance_settings.followed_gap
+            self.finest = FOLLOWED_GAP
         else:
-            self.finest, self.limit = max(self.finest, tolerance_settings.closed_gap), tolerance_settings.followed_gap
+            self.finest, self.limit = max(self.finest, CLOSED_GAP), FOLLOWED_GAP
         # for each orbit, its last step and the residual that the step should have removed
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
@@ -385,7 +431,7 @@ class _Following(_Shooting):
         """
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)
-        serves = self.chatters & np.isfinite(self.gaps[which]) & (gaps < settings.old_jacobian_share * self.gaps[which])
+        serves = self.chatters & np.isfinite(self.gaps[which]) & (gaps < OLD_JACOBIAN_SHARE * self.gaps[which])
         stale = which[~serves]
         if stale.size:
             behind, ahead = self._beside(stale)
@@ -413,6 +459,11 @@ class _Following(_Shooting):
         return np.hstack([super()._residual(which, stages), residual[:, None]])
 
 
+BRANCH_NUDGES = (1e-6, 1e-4)
+"""Smallest and largest relative change of an orbit along its branch for a numerical derivative of the multiplier. A
+smaller one is rounding; a larger one includes curvature."""
+
+
 class ConditionSearch(_Following):
     """Orbits on lines of keys, each followed to the place at which it meets a condition.
 
@@ -425,8 +476,8 @@ class ConditionSearch(_Following):
         super().__init__(family, orbits.states, orbits.times, orbits.sign, rtol, places)
         self.condition = condition
         self.limit, self.finest = (
-            tolerance_settings.closed_gap,
-            tolerance_settings.gap_rtol_factor * tolerance_settings.closed_gap,
+            CLOSED_GAP,
+            GAP_RTOL_FACTOR * CLOSED_GAP,
         )
 
     def moved(self) -> np.ndarray:
@@ -437,7 +488,7 @@ class ConditionSearch(_Following):
         before = self.places.copy()
         self.advance()
         self.advance()
-        near = (self.gaps < settings.fresh_jacobian_gap) & np.isfinite(self.places)
+        near = (self.gaps < FRESH_JACOBIAN_GAP) & np.isfinite(self.places)
         return np.where(near, self.places - before, np.inf)
 
     def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
@@ -454,7 +505,7 @@ class ConditionSearch(_Following):
         along = np.array([_null(rows) for rows in jacobians[:, :-1]])
         sizes = np.stack([self.states[which, stages.sticking], self.times[which], np.ones(len(which))], axis=1)
         along /= np.max(np.abs(along[:, [stages.sticking, -2, -1]] / sizes), axis=1, keepdims=True)
-        off, (least, most) = self.condition(stages, shot), settings.branch_nudges
+        off, (least, most) = self.condition(stages, shot), BRANCH_NUDGES
         with np.errstate(all="ignore"):
             needed = np.abs(off / np.einsum("ki,ki->k", before, along))
         along *= np.clip(np.nan_to_num(needed, nan=most), least, most)[:, None]
@@ -473,9 +524,13 @@ class ConditionSearch(_Following):
         return np.stack([_Shooting._residual(self, which, stages)[:, 0], self.condition(stages, shot)], axis=1)
 
 
+NEWTON_STEPS = 40
+"""Most Newton steps. Orbits that need more do not close."""
+
+
 def _iterated(shooting: _S) -> _S:
     """Take Newton steps until all orbits are closed or stall."""
-    for _ in range(settings.newton_steps):
+    for _ in range(NEWTON_STEPS):
         if not shooting.advance():
             break
     return shooting

@@ -17,16 +17,17 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner, returns
 from friso.equations.structure import shared_structure
-from friso.hunting.attractors.rounds import SURVEY_RTOL, Pending, close_orbits
-from friso.hunting.attractors.settings import settings as survey_settings
+from friso.hunting.attractors.rounds import MOST_REPEATING_SWINGS, SURVEY_RTOL, Pending, close_orbits
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import CYCLE_RTOL
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
 from friso.hunting.return_map.landings import LANDING_RTOL, find_landings
 from friso.hunting.return_map.mapped import Mapped, map_stages
-from friso.hunting.return_map.settings import settings
-from friso.hunting.return_map.settings import settings as return_map_settings
+
+MAP_SCATTER_SHARE = 0.05
+"""Largest scatter of landings about the prediction of their neighbours. With more, the stage remembers more than
+distance."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class MapSurvey:
         Every attractor was closed, no run was lost, and landings at equal distances return alike: where they do not,
         the stage remembers more than its distance.
         """
-        most = return_map_settings.map_scatter_share
+        most = MAP_SCATTER_SHARE
         whole = [one.lost == 0 and one.scatter <= most for one in self.mapped.maps]
         return np.array(whole, bool) & ~self.undecided
 
@@ -69,6 +70,14 @@ class _Proposal:
     run: int
 
 
+ATTRACTOR_TRIES = 4
+"""Tries to close an attractor. Each adds landings where the map predicts them; after four the map does not
+change."""
+
+FOLLOWED_REPETITIONS = 3
+"""Repetitions for which a run must follow an attractor of the map before an orbit is closed from it."""
+
+
 def survey_maps(stages: Ensemble, rtol: float = CYCLE_RTOL) -> MapSurvey:
     """Find the attractors of stages by their return maps.
 
@@ -77,14 +86,14 @@ def survey_maps(stages: Ensemble, rtol: float = CYCLE_RTOL) -> MapSurvey:
     mapped = map_stages(stages)
     motions: list[Swinging] = []
     repelling: list[Swinging] = []
-    for _ in range(return_map_settings.attractor_tries):
+    for _ in range(ATTRACTOR_TRIES):
         proposals = _left(mapped, motions, repelling)
         if not proposals:
             break
         runs = np.array([proposal.run for proposal in proposals])
         most = max(
-            survey_settings.most_repeating_swings,
-            return_map_settings.followed_repetitions * max(_swings(p.attractor) for p in proposals),
+            MOST_REPEATING_SWINGS,
+            FOLLOWED_REPETITIONS * max(_swings(p.attractor) for p in proposals),
         )
         before = len(mapped.owners)
         mapped = mapped.gone_on(runs, most)
@@ -137,6 +146,10 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
     return proposals
 
 
+SAME_ORBIT_DISTANCE_SHARE = 0.05
+"""Largest difference in mean distance between an orbit and the attractor of the map."""
+
+
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
     """Tell whether the attractor of a map is the closed cycle `motion` of its stage.
 
@@ -153,7 +166,7 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
         size = float(distances.max())
     else:
         size = float(distances[::2].max() + distances[1::2].max()) / 2
-    alike = abs(size / motion.amplitude - 1) < return_map_settings.same_orbit_distance_share
+    alike = abs(size / motion.amplitude - 1) < SAME_ORBIT_DISTANCE_SHARE
     return bool(alike and (not attractor.periodic or motion.swings % len(distances) == 0))
 
 
@@ -182,6 +195,13 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
                     kind.append(motion)
 
 
+SIMPLE_CLOSING_SHARE = 0.05
+"""Largest difference between landings of the simplest cycles from which an orbit can be closed."""
+
+CLOSING_SHARE = 0.01
+"""Largest difference between landings of longer cycles, which need better guesses, for an orbit to be closed."""
+
+
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
     """Return after how many swings a run's last landings repeat; 0 if they do not.
 
@@ -192,9 +212,7 @@ def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
     for swings in range(1 if symmetric else 2, len(path) // 2 + 1, 1 if symmetric else 2):
         last = min(max(swings, 2), len(path) - swings)
         again = sizes[-last:] / sizes[-last - swings : len(path) - swings]
-        share = (
-            return_map_settings.simple_closing_share if swings <= 2 - symmetric else return_map_settings.closing_share
-        )
+        share = SIMPLE_CLOSING_SHARE if swings <= 2 - symmetric else CLOSING_SHARE
         if swings >= least and np.all(np.abs(again - 1) < share):
             return swings
     return 0
@@ -222,6 +240,19 @@ def motions_go_on(
     return goes_on & completed, decided & completed
 
 
+FIRST_LANDINGS = 3  # [landings]
+"""Landings after which a stage has forgotten how its motion began."""
+
+FATE_ROUNDS = 8
+"""Rounds after which a run that the map does not decide stays unknown."""
+
+UNSURE_LANDING_SHARE = 0.02
+"""Error of a landing beyond which the stage still remembers its start."""
+
+MORE_LANDINGS = 3  # [landings]
+"""Landings added at a time to runs that the map does not decide yet."""
+
+
 @np.errstate(all="ignore")  # a stage that never lands is still at its reference
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
     """Return which runs swing for ever, and for which that is certain, both (runs,).
@@ -230,25 +261,21 @@ def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tup
     """
     count = len(starts)
     ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
-    states, most = starts, settings.first_landings
-    for _ in range(settings.fate_rounds):
+    states, most = starts, FIRST_LANDINGS
+    for _ in range(FATE_ROUNDS):
         landed = find_landings(stages.take(left), states, most)
         rows = np.arange(left.size)
         before, last = (
             landed.distances[rows, at] / stages.length[left] for at in (np.maximum(landed.count - 1, 0), landed.count)
         )
-        shares = np.array([[1 - settings.unsure_landing_share], [1.0], [1 + settings.unsure_landing_share]])
+        shares = np.array([[1 - UNSURE_LANDING_SHARE], [1.0], [1 + UNSURE_LANDING_SHARE]])
         fates = landing_map.goes_on((last * shares).ravel()).reshape(3, -1)
         foretold = np.abs(landing_map.foretold(before) / last) - 1
-        sure = (
-            (fates == fates[1]).all(axis=0)
-            & (np.abs(foretold) < settings.unsure_landing_share)
-            & (landed.count == most)
-        )
+        sure = (fates == fates[1]).all(axis=0) & (np.abs(foretold) < UNSURE_LANDING_SHARE) & (landed.count == most)
         sure = landed.rest | (sure & ~landed.lost)
         ends[left[sure]], decided[left[sure]] = fates[1][sure] & ~landed.rest[sure], True
         on = ~sure & ~landed.lost
-        left, states, most = left[on], landed.ends[on], settings.more_landings
+        left, states, most = left[on], landed.ends[on], MORE_LANDINGS
         if not left.size:
             break
     return ends, decided

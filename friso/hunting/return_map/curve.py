@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.hunting.return_map.settings import settings
-
 REST_COORDINATE, FIRST_COORDINATE = -1e6, -1e9
 """Coordinate on the map that stands for a stage that rests, or has diverged; and one before all others."""
 
@@ -55,6 +53,10 @@ def at_rest(begin: float) -> Cubics:
     return _flat(np.array([begin]), np.array([REST_COORDINATE]), 0.0)
 
 
+SCATTER_RANGE_LOG = 0.05
+"""Distance between points over which scatter is measured. Over more, the map itself changes."""
+
+
 def curve(places: np.ndarray, after: np.ndarray, inward: bool) -> Cubics:
     """Return the curve through landings at ascending `places` and the next ones `after`, (points,), -inf for rest.
 
@@ -63,7 +65,7 @@ def curve(places: np.ndarray, after: np.ndarray, inward: bool) -> Cubics:
     """
     pieces = _pieces(places, after)
     ends = np.flatnonzero(np.diff(pieces)) + 1
-    parts, begin = list[Cubics](), float(places[0]) - settings.scatter_range_log
+    parts, begin = list[Cubics](), float(places[0]) - SCATTER_RANGE_LOG
     for first, last in zip(np.append(0, ends), np.append(ends, len(places)), strict=True):
         here, ahead = places[first:last], after[first:last]
         if np.isfinite(ahead[0]):
@@ -86,11 +88,18 @@ def _flat(begins: np.ndarray, values: np.ndarray, slope: float) -> Cubics:
     return Cubics(begins, np.array([values, np.full(len(begins), slope), *np.zeros((2, len(begins)))]))
 
 
+BREAK_JUMP_LOG = 0.5
+"""Difference in log distance beyond which neighbouring returns lie on two sides of a break of the map."""
+
+BREAK_STEEPNESS = 3.0
+"""Slope between two points beyond which the map breaks off."""
+
+
 def _pieces(places: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Return on which piece of the map each landing lies, numbered in order, (points,)."""
     goes = np.isfinite(after)
     with np.errstate(all="ignore"):  # two landings after which the stage rests
-        joined = np.abs(np.diff(after)) < settings.break_jump_log + settings.break_steepness * np.diff(places)
+        joined = np.abs(np.diff(after)) < BREAK_JUMP_LOG + BREAK_STEEPNESS * np.diff(places)
     return np.append(0, np.cumsum((goes[1:] | goes[:-1]) & ~joined))
 
 
@@ -121,12 +130,20 @@ def _piece(places: np.ndarray, after: np.ndarray, begin: float, breaks: bool) ->
     ]
 
 
+MERGED_RANGE_LOG = 0.02
+"""Range of log distance in which landings count as one point. The slope between nearer ones is noise."""
+
+FEWEST_FITTED = 7  # [landings]
+"""Fewest landings to which a cubic is fitted, three more than it has coefficients. They form more points than it
+has coefficients, too."""
+
+
 def _merged(places: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the means of landings that are so near to each other that their slope is noise.
 
     A narrow piece of the map keeps as many points as a cubic needs.
     """
-    first, apart = [0], min(settings.merged_range_log, float(places[-1] - places[0]) / settings.fewest_fitted)
+    first, apart = [0], min(MERGED_RANGE_LOG, float(places[-1] - places[0]) / FEWEST_FITTED)
     while (end := int(places.searchsorted(places[first[-1]] + apart, side="right"))) < len(places):
         first.append(end)
     number = np.diff([*first, len(places)])
@@ -157,6 +174,14 @@ class CubicFit:
     good: np.ndarray
 
 
+FITTED_REACHES_LOG = (0.15, 0.075, 0.0375)
+"""Ranges of log distance on either side within which a cubic is fitted. A map bends little over a seventh; beside a
+corner only the narrowest fits."""
+
+FITTED_SCATTER_LOG = 0.01
+"""Scatter of landings about a fitted cubic beyond which the map goes through the landings themselves."""
+
+
 def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> CubicFit:
     """Fit cubics to the landings about coordinates `about`, (n,), of one continuous piece of a map.
 
@@ -167,13 +192,13 @@ def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> CubicFit
     from scipy.special import ndtr, stdtrit  # slow
 
     knots, _ = _merged(places, after)
-    found = np.full((4, len(settings.fitted_reaches_log), len(about)), np.nan)
+    found = np.full((4, len(FITTED_REACHES_LOG), len(about)), np.nan)
     found[2] = np.inf
-    for values, slopes, errors, scatters, reach in zip(*found, settings.fitted_reaches_log, strict=True):
+    for values, slopes, errors, scatters, reach in zip(*found, FITTED_REACHES_LOG, strict=True):
         apart = (places - about[:, None]) / reach
         near = np.abs(apart) < 1
         number, distinct = near.sum(axis=1), (np.abs(knots - about[:, None]) < reach).sum(axis=1)
-        enough = (number >= settings.fewest_fitted) & (distinct > TERMS)
+        enough = (number >= FEWEST_FITTED) & (distinct > TERMS)
         if not enough.any():
             continue
         powers = np.where(near, apart, 0.0)[:, :, None] ** np.arange(TERMS) * near[:, :, None]
@@ -184,7 +209,7 @@ def fitted(places: np.ndarray, after: np.ndarray, about: np.ndarray) -> CubicFit
         left = np.where(near, after - np.einsum("npi,in->np", powers, terms), 0.0)
         freedom = np.maximum(number - TERMS, 1)
         scatter = np.sqrt((left**2).sum(axis=1) / freedom)
-        good = enough & (scatter < settings.fitted_scatter_log)
+        good = enough & (scatter < FITTED_SCATTER_LOG)
         error = scatter * np.sqrt(inverse[:, 1, 1]) / reach * stdtrit(freedom, ndtr(3.0)) / 3
         values[good], slopes[good], errors[good] = terms[0, good], terms[1, good] / reach, error[good]
         scatters[good] = scatter[good]

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.hunting.attractors.settings import settings as survey_settings
+from friso.hunting.attractors.rounds import LEAST_SWING, MOST_REPEATING_SWINGS
 from friso.hunting.return_map.curve import FIRST_COORDINATE, NEGATIVE_SIDE_SHIFT, REST_COORDINATE, Cubics, at_rest, join
-from friso.hunting.return_map.settings import settings
 
 STAGE_SHIFT = 4 * NEGATIVE_SIDE_SHIFT
 """Shift of coordinates from one stage to the next, which leaves room for both sides of each."""
@@ -33,6 +32,29 @@ def side_by_side(curves: Sequence[Cubics]) -> Cubics:
     return join(parts)
 
 
+MOST_PASSED_LANDINGS = 40  # [landings]
+"""Most landings that are passed over at once. Over more, the slope of the map changes."""
+
+SLOW_MOVE_LOG = 1e-3
+"""Change of log distance over two landings below which it hardly changes."""
+
+QUICK_ITERATIONS = (8, 24)  # [landings]
+"""Iterations of the map, in rounds, in which most starts reach an attractor."""
+
+MAP_ITERATIONS = (100, 200, 400)  # [landings]
+"""Iterations, in further rounds, for starts that leave a cycle slowly. One that strays no more after a round than
+after the one before is irregular."""
+
+MOVE_ON_LANDINGS = 4  # [landings]
+"""Landings after which distances that hardly change are moved on."""
+
+ARRIVED_SHARE = 1e-6
+"""Change of landings below which they have reached a cycle."""
+
+SAME_ATTRACTOR_SHARE = 0.02
+"""Largest difference between landings of one attractor reached from two starts."""
+
+
 @dataclass(frozen=True)
 class MapLine:
     """Return map of one stage, or of several side by side, as a function of coordinates."""
@@ -43,7 +65,7 @@ class MapLine:
         """Return the coordinates of the landings that follow landings at `places`, both (count,)."""
         after = self.curve(places)
         distance = after - NEGATIVE_SIDE_SHIFT * np.rint(after / NEGATIVE_SIDE_SHIFT)
-        after[distance < np.log(survey_settings.least_swing)] = REST_COORDINATE
+        after[distance < np.log(LEAST_SWING)] = REST_COORDINATE
         return after
 
     def _moved_on(self, at: np.ndarray) -> np.ndarray:
@@ -57,23 +79,21 @@ class MapLine:
         slope = self.curve.slope(at) * self.curve.slope(after)
         step = self.next(after) - at
         with np.errstate(all="ignore"):
-            times = np.minimum(0.5 / np.abs(1 - slope), settings.most_passed_landings / 2)
-        return np.where(
-            (times > 1) & (at > REST_COORDINATE) & (np.abs(step) < settings.slow_move_log), at + times * step, at
-        )
+            times = np.minimum(0.5 / np.abs(1 - slope), MOST_PASSED_LANDINGS / 2)
+        return np.where((times > 1) & (at > REST_COORDINATE) & (np.abs(step) < SLOW_MOVE_LOG), at + times * step, at)
 
     def followed(self, at: np.ndarray) -> np.ndarray:
         """Iterate the map from coordinates until they are on attractors; return their last landings.
 
         The result holds coordinates, shape (points, landings).
         """
-        landings = 2 * survey_settings.most_repeating_swings + 1
+        landings = 2 * MOST_REPEATING_SWINGS + 1
         paths, left = np.tile(at[:, None], landings), np.flatnonzero(at > REST_COORDINATE)
         before = np.zeros(len(at))
-        for iterations in (*settings.quick_iterations, *settings.map_iterations):
+        for iterations in (*QUICK_ITERATIONS, *MAP_ITERATIONS):
             at = paths[left, -1]
             for number in range(iterations):
-                if number % settings.move_on_landings == 0:
+                if number % MOVE_ON_LANDINGS == 0:
                     goes = at > REST_COORDINATE
                     paths[left[~goes]] = REST_COORDINATE
                     left, at = left[goes], at[goes]
@@ -84,9 +104,9 @@ class MapLine:
             for k in range(landings):
                 paths[left, k], at = at, self.next(at)
             strays = _strays(paths[left])
-            slow = strays > settings.arrived_share
-            if iterations in settings.map_iterations:
-                slow &= (strays > before[left]) | (strays < settings.same_attractor_share)
+            slow = strays > ARRIVED_SHARE
+            if iterations in MAP_ITERATIONS:
+                slow &= (strays > before[left]) | (strays < SAME_ATTRACTOR_SHARE)
                 before[left] = strays
             left = left[slow]
             if not left.size:
@@ -101,9 +121,13 @@ def _strays(paths: np.ndarray) -> np.ndarray:
     are coordinates on the map, shape (points, landings).
     """
     return np.min(
-        [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, survey_settings.most_repeating_swings + 1)],
+        [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, MOST_REPEATING_SWINGS + 1)],
         axis=0,
     )
+
+
+SAME_LANDING_SHARE = 2e-3
+"""Difference beyond which landings one cycle apart count as different."""
 
 
 def repeats_after(paths: np.ndarray, symmetric: bool) -> np.ndarray:
@@ -113,7 +137,7 @@ def repeats_after(paths: np.ndarray, symmetric: bool) -> np.ndarray:
     other side.
     """
     least, found = 1 if symmetric else 2, np.zeros(len(paths), np.int64)
-    for swings in range(least, survey_settings.most_repeating_swings + 1, least):
-        again = np.all(np.abs(paths[:, swings:] - paths[:, :-swings]) < settings.same_landing_share, axis=1)
+    for swings in range(least, MOST_REPEATING_SWINGS + 1, least):
+        again = np.all(np.abs(paths[:, swings:] - paths[:, :-swings]) < SAME_LANDING_SHARE, axis=1)
         found[again & (found == 0)] = swings
     return found

@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting.attractors.settings import settings as survey_settings
+from friso.hunting.attractors.rounds import LEAST_SWING
 from friso.hunting.return_map.curve import (
+    BREAK_JUMP_LOG,
     FIRST_COORDINATE,
     NEGATIVE_SIDE_SHIFT,
     REST_COORDINATE,
+    SCATTER_RANGE_LOG,
     Cubics,
     at_rest,
     curve,
@@ -24,9 +26,8 @@ from friso.hunting.return_map.curve import (
     join,
     piece_about,
 )
-from friso.hunting.return_map.iterated import MapLine, beside, repeats_after, side_by_side
+from friso.hunting.return_map.iterated import SAME_ATTRACTOR_SHARE, MapLine, beside, repeats_after, side_by_side
 from friso.hunting.return_map.landings import Landings
-from friso.hunting.return_map.settings import settings as return_map_settings
 
 BISECTIONS = 40
 """Halvings of an interval of coordinates, after which it is as exact as `repeated_share`."""
@@ -59,6 +60,20 @@ class FixedPoint:
     slope: float
     error: float
     scatter: float
+
+
+REPEATED_SHARE = 1e-9
+"""Largest error of a repetition that is exact. Beside a break of the map a landing differs by more."""
+
+SURE_ERRORS = 3.0  # [standard errors]
+"""Errors of a slope by which a cycle must be unstable to be told so for sure."""
+
+LEAST_ARRIVING_POINTS = 4
+"""Fewest points of a map that must lead to an attractor. Fewer come from gaps of the map."""
+
+HARDLY_ATTRACTING_SHARE = 0.95
+"""Largest fraction of a deviation left per repetition at which a sketched attractor is trusted. Above it, 51 of 149
+sketched attractors did not attract."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +113,8 @@ class LandingMap:
             here = distances[:, k]
             ahead = distances[:, min(k + 1, distances.shape[1] - 1)]
             following = np.where(k < count, ahead, ended)
-            following = np.where(np.abs(following) < survey_settings.least_swing, 0.0, following)
-            which = np.flatnonzero((np.abs(here) >= survey_settings.least_swing) & ~np.isnan(following) & (k <= count))
+            following = np.where(np.abs(following) < LEAST_SWING, 0.0, following)
+            which = np.flatnonzero((np.abs(here) >= LEAST_SWING) & ~np.isnan(following) & (k <= count))
             columns.append((here[which], following[which], which, k + 1 == count[which]))
         before, after, run, final = (np.concatenate(part) for part in zip(*columns, strict=True))
         order = np.argsort(before, kind="stable")
@@ -165,7 +180,7 @@ class LandingMap:
             at = (low + high) / 2
             below = (self._repeated(at) > at) == rises
             low, high = np.where(below, at, low), np.where(below, high, at)
-        for at in low[np.abs(self._repeated(low) - low) < return_map_settings.repeated_share]:  # not a break of the map
+        for at in low[np.abs(self._repeated(low) - low) < REPEATED_SHARE]:  # not a break of the map
             slope, error, scatter, place = 1.0, 0.0, 0.0, np.array([at])
             for _ in self.sides:
                 places, after = self._going(-1.0 if place[0] > NEGATIVE_SIDE_SHIFT / 2 else 1.0)
@@ -188,12 +203,12 @@ class LandingMap:
         It is a simple cycle that is surely stable, or one that is strongly stable and reached from enough points. Other
         motions that go on may come from gaps between points.
         """
-        sure = return_map_settings.sure_errors
+        sure = SURE_ERRORS
         return any(
             one.periodic
             and len(one.distances) == len(self.sides)
-            and one.basin.size >= return_map_settings.least_arriving_points
-            and self.slope(one) <= return_map_settings.hardly_attracting_share
+            and one.basin.size >= LEAST_ARRIVING_POINTS
+            and self.slope(one) <= HARDLY_ATTRACTING_SHARE
             for one in self.attractors
         ) or any(abs(point.slope) + sure * point.error < 1 for point in self.fixed_points())
 
@@ -211,7 +226,7 @@ class LandingMap:
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """Return the coordinates on the map (see `_place`) of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
-        moves = np.isfinite(at) & (np.abs(at) >= survey_settings.least_swing)
+        moves = np.isfinite(at) & (np.abs(at) >= LEAST_SWING)
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST_COORDINATE)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
@@ -224,10 +239,7 @@ class LandingMap:
         while left.any():
             number = int(np.flatnonzero(left)[0])
             first, count = paths[number], int(swings[number])
-            near = (
-                np.abs(paths[:, :, None] - first[None, None, : max(count, 1)])
-                < return_map_settings.same_attractor_share
-            )
+            near = np.abs(paths[:, :, None] - first[None, None, : max(count, 1)]) < SAME_ATTRACTOR_SHARE
             same = left & (near.any(axis=1).all(axis=1) if count else (swings == 0) & _mixed(paths, first))
             same[number] = True
             yield MapAttractor(_distance(first[: count or len(first)]), np.flatnonzero(same), count > 0)
@@ -261,9 +273,9 @@ class LandingMap:
                 v = np.log(np.abs(after))
                 share = (u[1:-1] - u[:-2]) / np.maximum(u[2:] - u[:-2], 1e-12)
                 off = np.abs(v[1:-1] - (1 - share) * v[:-2] - share * v[2:])
-                alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > return_map_settings.break_jump_log)
+                alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > BREAK_JUMP_LOG)
             off = np.where(goes[1:-1] & goes[:-2] & goes[2:], off, np.where(goes[:-2] != goes[1:-1], np.inf, 0.0))
-            off = np.where(alike & (u[2:] - u[:-2] < return_map_settings.scatter_range_log), off, 0.0)
+            off = np.where(alike & (u[2:] - u[:-2] < SCATTER_RANGE_LOG), off, 0.0)
             off[np.fmax(v[1:-1] - u[1:-1], v[2:] - u[2:]) < np.log(0.5)] = 0.0
             worst = max(worst, float(off.max()))
         return worst
@@ -289,6 +301,10 @@ def _distance(places: np.ndarray) -> np.ndarray:
     return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - NEGATIVE_SIDE_SHIFT, places))
 
 
+FARTHEST_STICKING = 3.0  # [deflections at break-away]
+"""Farthest distance of sticking. From farther off a stage passes its reference without sticking."""
+
+
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Leave out landings beyond `farthest_sticking` from which a run comes back.
 
@@ -297,7 +313,7 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
     are in each run, without the start.
     """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
-    near = (np.abs(distances) <= return_map_settings.farthest_sticking) & (order <= count[:, None])
+    near = (np.abs(distances) <= FARTHEST_STICKING) & (order <= count[:, None])
     last = np.where(near.any(axis=1), distances.shape[1] - 1 - near[:, ::-1].argmax(axis=1), -1)
     kept = (near | (order > last[:, None]) | (order == 0)) & (order <= count[:, None])
     kept_first = np.argsort(~kept, axis=1, kind="stable")
@@ -310,6 +326,6 @@ def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
 
     Paths are on it if they spread over the same range.
     """
-    return (paths.min(axis=1) > first.min() - 10 * return_map_settings.same_attractor_share) & (
-        paths.max(axis=1) < first.max() + 10 * return_map_settings.same_attractor_share
+    return (paths.min(axis=1) > first.min() - 10 * SAME_ATTRACTOR_SHARE) & (
+        paths.max(axis=1) < first.max() + 10 * SAME_ATTRACTOR_SHARE
     )

@@ -10,14 +10,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from friso.equations.roles import Role
-from friso.hunting.attractors.settings import settings as survey_settings
+from friso.hunting.attractors.rounds import LEAST_SWING, TYPICAL_DISTANCE
 from friso.hunting.cycle.ensemble import ArrayRows, Ensemble, done, wait
-from friso.hunting.cycle.settings import settings as orbit_settings
-from friso.hunting.return_map.settings import settings as return_map_settings
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.cycle.guess import BREAKAWAY_WAITS
 
-LANDING_RTOL = ToleranceSettings().landing_rtol
-"""Relative tolerance of the runs that find where stages stick."""
+LANDING_RTOL = 1e-6
+"""Tolerance of runs that find where stages stick. They scatter by less than the gaps between points of a map."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +49,25 @@ class Landings(ArrayRows):
         return replace(self, distances=distances, times=times)
 
 
+EXTRA_ROUNDS = 10
+"""Further rounds for a stage that stops short, creeps, or is driven at its force limit."""
+
+STANDING_SPEED = 1e-3  # [distances times natural frequency]
+"""Speed below which a stage has landed."""
+
+FLIGHT_TIME = 30.0  # [1/natural frequencies]
+"""Longest crossing in a round. A slower one continues in the next round."""
+
+RINGING_SHARE = 0.05  # [of the distance]
+"""Largest ringing of a stage that has landed."""
+
+ROUND_STEP_LIMIT = 20_000  # [steps]
+"""Most steps of a round. A swing takes a thousand; a limiter that chatters would take millions."""
+
+RESTING_MOVE_SHARE = 0.01  # [of the distance]
+"""Largest move of a stage that rests or creeps home while it could have broken away."""
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = LANDING_RTOL) -> Landings:
     """Follow stages from states, (runs, states), until each has landed `most` times or rests.
@@ -65,22 +82,15 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
     rest, away, lost = (np.zeros(count, bool) for _ in range(3))
     passed, left, landed = np.zeros(count), np.arange(count), np.zeros(count, np.int64)
     where, when = values, times
-    for _ in range(most + return_map_settings.extra_rounds):
+    for _ in range(most + EXTRA_ROUNDS):
         some, begun = stages.take(left), states[left]
         sticks = np.abs(begun[:, sticking])
-        small = survey_settings.least_swing * some.length
-        moves = (
-            np.abs(begun[:, speeds]).max(axis=1)
-            > return_map_settings.standing_speed * some.number("rate") * some.length
-        )
-        from_where = np.maximum(sticks, np.where(moves, survey_settings.typical_distance * some.length, small))
-        durations = orbit_settings.breakaway_waits * wait(
-            some, from_where
-        ) + return_map_settings.flight_time / some.number("rate")
-        legs = np.maximum(return_map_settings.ringing_share * sticks, small)
-        results = some.run(
-            begun, durations, rtol, with_modes=True, least_swing=legs, budget=return_map_settings.round_step_limit
-        )
+        small = LEAST_SWING * some.length
+        moves = np.abs(begun[:, speeds]).max(axis=1) > STANDING_SPEED * some.number("rate") * some.length
+        from_where = np.maximum(sticks, np.where(moves, TYPICAL_DISTANCE * some.length, small))
+        durations = BREAKAWAY_WAITS * wait(some, from_where) + FLIGHT_TIME / some.number("rate")
+        legs = np.maximum(RINGING_SHARE * sticks, small)
+        results = some.run(begun, durations, rtol, with_modes=True, least_swing=legs, budget=ROUND_STEP_LIMIT)
         fine, room = done(results), results.turn_values.shape[1]
         held = (np.arange(room) < results.turn_counts[:, None]) & fine[:, None]
         more, at = np.full((2, count, room + 1), np.nan)
@@ -91,13 +101,11 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         away[left], lost[left] = ~fine & (np.abs(results.ends[:, position]) > 1e5 * some.length), ~fine
         before = landed[left]
         speed = np.abs(results.ends[:, speeds]).max(axis=1)
-        stands = speed < return_map_settings.standing_speed * some.number("rate") * np.maximum(
-            np.abs(results.ends[:, position]), small
-        )
+        stands = speed < STANDING_SPEED * some.number("rate") * np.maximum(np.abs(results.ends[:, position]), small)
         where, when, landed = _landings(values, times, most)
         ends = np.abs(results.ends[:, sticking])
         rest[left] = fine & stands & (landed[left] == before) & (before < most)
-        rest[left] &= np.abs(ends - sticks) < np.maximum(return_map_settings.resting_move_share * sticks, small)
+        rest[left] &= np.abs(ends - sticks) < np.maximum(RESTING_MOVE_SHARE * sticks, small)
         last = np.abs(where[left, landed[left]])
         rest[left] |= fine & stands & (ends < small) & (last < small)
         unfinished = ~stands & (landed[left] == most) & (before < most)

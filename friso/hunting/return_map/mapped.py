@@ -10,12 +10,18 @@ from functools import cached_property
 
 import numpy as np
 
-from friso.hunting.attractors.settings import settings as survey_settings
+from friso.hunting.attractors.rounds import LEAST_SWING
 from friso.hunting.cycle.ensemble import Ensemble, spread_over, stuck
+from friso.hunting.return_map.curve import BREAK_JUMP_LOG
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor, attractors_of
 from friso.hunting.return_map.landings import LANDING_RTOL, Landings, find_landings
-from friso.hunting.return_map.settings import settings as return_map_settings
 from friso.stage.controllers import FORCE_LIMIT
+
+RUN_LANDINGS = 3  # [landings]
+"""Landings of a run. From the first one on, they no longer depend on the start."""
+
+RUNS_ADDED = 12
+"""Most runs added at once for one stage, because all other stages wait for them."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +97,7 @@ class Mapped:
         Starts are signed, in deflections of the loop by the break-away force. A run lands at most `most` times (None:
         as the settings say).
         """
-        most = return_map_settings.run_landings if most is None else most
+        most = RUN_LANDINGS if most is None else most
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
@@ -121,12 +127,26 @@ class Mapped:
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
         seen = self.landings.distances[which] / length
         seen = np.abs(seen) if symmetric else seen
-        for place in gaps(landing_map)[: return_map_settings.runs_added]:
+        for place in gaps(landing_map)[:RUNS_ADDED]:
             start = _start_that_lands(self.starts[which], seen, place)
             if start is not None and not np.isclose(start, self.starts[which], rtol=1e-6).any():
                 starts.append(start)
         starts += _beside(self.starts[which], which, unclosed(landing_map))
         return np.unique(starts + _at_breaks(self.starts[which], seen[:, 1]))
+
+
+FAR_STARTS = (5.0, 300.0, 6)  # [deflections at break-away]
+"""Starts from which a stage passes its reference without sticking at first. The runs come to lie on the map
+later."""
+
+LIMITED_STARTS = (600.0, 30000.0, 6)  # [deflections at break-away]
+"""Farther starts with a force limit, which lets a stage swing as far as it moves the masses."""
+
+NEAR_STARTS = ((0.001, 0.007, 4), (0.01, 3.0, 24))  # [deflections at break-away]
+"""Starts near the reference: first, last and number of each range. More are added where the map needs them."""
+
+REFINING_ROUNDS = 2
+"""Rounds of refinement. Further rounds change the map only where a search decides in any case."""
 
 
 def map_stages(
@@ -142,16 +162,14 @@ def map_stages(
     the settings say). Up to `rounds` times, runs are added where a map is too coarse. A `sparse` map has every third of
     the farther starts only.
     """
-    far = spread_over(
-        return_map_settings.far_starts, *([return_map_settings.limited_starts] if FORCE_LIMIT in stages.flat else [])
-    )
-    units = np.concatenate([spread_over(*(near or return_map_settings.near_starts)), far[1::3] if sparse else far])
+    far = spread_over(FAR_STARTS, *([LIMITED_STARTS] if FORCE_LIMIT in stages.flat else []))
+    units = np.concatenate([spread_over(*(near or NEAR_STARTS)), far[1::3] if sparse else far])
     sides = [(np.arange(stages.count), 1.0), (np.flatnonzero(~stages.symmetric), -1.0)]
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
     starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
-    landings = _stuck_at(stages, owners, starts, return_map_settings.run_landings, rtol)
+    landings = _stuck_at(stages, owners, starts, RUN_LANDINGS, rtol)
     mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), landings, rtol)
-    for _ in range(return_map_settings.refining_rounds if rounds is None else rounds):
+    for _ in range(REFINING_ROUNDS if rounds is None else rounds):
         mapped = mapped.finer()
     return mapped
 
@@ -164,6 +182,19 @@ def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: in
     """
     several = stages.take(owners)
     return find_landings(several, stuck(several, starts * several.length), most, rtol)
+
+
+DIAGONAL_GAIN_LOG = 0.1
+"""Range about the diagonal in which gaps must be fine: swings grow or shrink by less than a tenth."""
+
+FINE_GAP_LOG = 0.03
+"""Widest gap between points near the diagonal, where the map decides stability. Finer gaps take more runs."""
+
+BREAK_WIDTH_LOG = 0.02
+"""Width to which a break between two starts is narrowed down."""
+
+COARSE_GAP_LOG = 0.15
+"""Widest gap between points away from the diagonal. Wider ones hide folds of the map."""
 
 
 def gaps(landing_map: LandingMap) -> np.ndarray:
@@ -182,19 +213,23 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
             u, gain = np.log(before), np.log(across / before)
             apart = np.diff(u)
             lower, upper = np.minimum(gain[:-1], gain[1:]), np.maximum(gain[:-1], gain[1:])
-            crosses = (lower < return_map_settings.diagonal_gain_log) & (upper > -return_map_settings.diagonal_gain_log)
+            crosses = (lower < DIAGONAL_GAIN_LOG) & (upper > -DIAGONAL_GAIN_LOG)
             away = np.isinf(across[:-1]) & np.isinf(across[1:])
-            breaks = ~(np.abs(np.diff(np.log(across))) < return_map_settings.break_jump_log) & (upper > -1.0) & ~away
+            breaks = ~(np.abs(np.diff(np.log(across))) < BREAK_JUMP_LOG) & (upper > -1.0) & ~away
         limit = np.where(
             crosses & ~breaks,
-            return_map_settings.fine_gap_log,
-            np.where(breaks, return_map_settings.break_width_log, return_map_settings.coarse_gap_log),
+            FINE_GAP_LOG,
+            np.where(breaks, BREAK_WIDTH_LOG, COARSE_GAP_LOG),
         )
         limit = np.where((upper < -1.0) | away, np.inf, limit)
         wide = np.flatnonzero(apart > limit)
         places += (side * np.exp((u[wide] + u[wide + 1]) / 2)).tolist()
         excess += (apart[wide] / limit[wide]).tolist()
     return np.array(places)[np.argsort(-np.array(excess), kind="stable")] if places else np.zeros(0)
+
+
+OUTERMOST_LOSS_LOG = 0.3
+"""Loss of the outermost points beyond which the map leads inward, so that no attractor lies farther out."""
 
 
 def unclosed(landing_map: LandingMap) -> list[int]:
@@ -207,7 +242,7 @@ def unclosed(landing_map: LandingMap) -> list[int]:
     for side in landing_map.sides:
         points = landing_map.points(side)
         for end in points[-1:], points[landing_map.after[points] != 0][:1]:
-            if end.size and np.log(max(landing_map.gain[end[0]], 1e-300)) > -return_map_settings.outermost_loss_log:
+            if end.size and np.log(max(landing_map.gain[end[0]], 1e-300)) > -OUTERMOST_LOSS_LOG:
                 runs.append(int(landing_map.run[end[0]]))
     return runs
 
@@ -226,21 +261,23 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
     return between
 
 
+BREAK_SHARES = (0.2, 0.4, 0.6, 0.8)  # [of the way between two starts]
+"""Places at which more runs begin, to narrow down a break of the map. More run at once for nothing."""
+
+
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
     """Return starts to add where neighbouring runs land very differently, or just one lands.
 
     An attractor may reach up to such a break of the map. `starts`, shape (runs,), ascend; `landings`, (runs,), are the
     first landings. All are in deflections of the loop by the break-away force. The list may be empty.
     """
-    lands = np.abs(np.nan_to_num(landings)) >= survey_settings.least_swing
+    lands = np.abs(np.nan_to_num(landings)) >= LEAST_SWING
     sizes = np.where(lands, np.abs(landings), 1.0)
-    breaks = (lands[:-1] != lands[1:]) | (
-        lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > return_map_settings.break_jump_log)
-    )
-    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= return_map_settings.near_starts[-1][1]
-    apart = np.abs(np.diff(np.log(np.abs(starts)))) > return_map_settings.break_width_log
+    breaks = (lands[:-1] != lands[1:]) | (lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > BREAK_JUMP_LOG))
+    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= NEAR_STARTS[-1][1]
+    apart = np.abs(np.diff(np.log(np.abs(starts)))) > BREAK_WIDTH_LOG
     ends = np.flatnonzero(breaks & near & apart & (starts[:-1] * starts[1:] > 0))
-    shares = np.array(return_map_settings.break_shares)
+    shares = np.array(BREAK_SHARES)
     between = [starts[k] * (starts[k + 1] / starts[k]) ** shares for k in ends]
     return np.concatenate(between).tolist() if between else []
 
@@ -252,7 +289,7 @@ def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> flo
     (runs,) ascend; `seen` (runs, landings) are landings with the start first.
     """
     best, start = np.inf, None
-    for k in range(1, return_map_settings.run_landings):
+    for k in range(1, RUN_LANDINGS):
         low, high = seen[:-1, k], seen[1:, k]
         with np.errstate(all="ignore"):
             around = np.flatnonzero(((low - place) * (high - place) <= 0) & (low * high > 0))
