@@ -196,9 +196,8 @@ class LandingMap:
         """Return the map's attractors, in which a stage swings for ever, from any of its points."""
         return attractors_of((self,))[0]
 
-    @cached_property
-    def surely_attracts(self) -> bool:
-        """Whether the map has an attractor that can be trusted though its points are few.
+    def surely_attracts(self, attractors: Sequence[MapAttractor]) -> bool:
+        """Tell whether one of the map's `attractors` can be trusted though its points are few.
 
         It is a simple cycle that is surely stable, or one that is strongly stable and reached from enough points. Other
         motions that go on may come from gaps between points.
@@ -209,7 +208,7 @@ class LandingMap:
             and len(one.distances) == len(self.sides)
             and one.basin.size >= LEAST_ARRIVING_POINTS
             and self.slope(one) <= HARDLY_ATTRACTING_SHARE
-            for one in self.attractors
+            for one in attractors
         ) or any(abs(point.slope) + sure * point.error < 1 for point in self.fixed_points())
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:

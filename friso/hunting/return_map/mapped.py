@@ -62,7 +62,9 @@ class Mapped:
     @property
     def surely_attract(self) -> np.ndarray:
         """Return which stages have an attractor on their map that can be trusted, shape (count,)."""
-        return np.array([one.surely_attracts for one, _ in zip(self.maps, self.attractors, strict=True)], bool)
+        return np.array(
+            [one.surely_attracts(found) for one, found in zip(self.maps, self.attractors, strict=True)], bool
+        )
 
     def take(self, numbers: np.ndarray) -> Mapped:
         """Select the stages with these numbers, none of them twice, and their runs."""
