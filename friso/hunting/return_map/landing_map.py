@@ -202,14 +202,13 @@ class LandingMap:
         It is a simple cycle that is surely stable, or one that is strongly stable and reached from enough points. Other
         motions that go on may come from gaps between points.
         """
-        sure = SURE_ERRORS
         return any(
             one.periodic
             and len(one.distances) == len(self.sides)
             and one.basin.size >= LEAST_ARRIVING_POINTS
             and self.slope(one) <= HARDLY_ATTRACTING_SHARE
             for one in attractors
-        ) or any(abs(point.slope) + sure * point.error < 1 for point in self.fixed_points())
+        ) or any(abs(point.slope) + SURE_ERRORS * point.error < 1 for point in self.fixed_points())
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
         """Predict the landings that follow landings at signed distances, (count,); 0 for rest.
